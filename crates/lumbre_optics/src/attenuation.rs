@@ -1,0 +1,195 @@
+//! Distance attenuation of a positional light. Not the spot cone: that is `spot`.
+
+use glam::{DVec3, Vec3};
+
+/// How a positional light weakens with the distance d in metres.
+///
+/// The factor is `1 / (constant + linear d + quadratic d²)`, OpenGL 2.1 §2.14.1 and document \[I\],
+/// optionally clamped to 1 (document \[M\]) and optionally faded out at `range` with the window of
+/// KHR_lights_punctual. `(0, 0, 1)` is the inverse-square law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attenuation {
+    /// Constant term a, dimensionless, at least 0.
+    pub constant: f32,
+    /// Linear term b, in 1/m, at least 0.
+    pub linear: f32,
+    /// Quadratic term c, in 1/m², at least 0.
+    pub quadratic: f32,
+    /// Clamp the factor to 1, as document \[M\] does and OpenGL does not.
+    pub clamp: bool,
+    /// Distance in metres at which the light ends, multiplying the factor by
+    /// `clamp(1 - (d/range)⁴, 0, 1)` (KHR_lights_punctual, "range property"); infinite without a window.
+    pub range: f32,
+}
+
+impl Attenuation {
+    /// No attenuation: factor 1 at every distance.
+    pub const NONE: Self =
+        Self { constant: 1.0, linear: 0.0, quadratic: 0.0, clamp: false, range: f32::INFINITY };
+    /// The inverse-square law, 1/d².
+    pub const INVERSE_SQUARE: Self =
+        Self { constant: 0.0, linear: 0.0, quadratic: 1.0, clamp: false, range: f32::INFINITY };
+
+    /// The three coefficients (a, b, c) as one vector.
+    pub fn coefficients(&self) -> Vec3 {
+        Vec3::new(self.constant, self.linear, self.quadratic)
+    }
+
+    /// The range for a shader, where infinity may not be relied on: at most [`UNLIMITED_RANGE`].
+    pub fn shader_range(&self) -> f32 {
+        self.range.min(UNLIMITED_RANGE as f32)
+    }
+
+    /// The factor at a distance in metres: [`attenuate`] with these coefficients.
+    pub fn factor(&self, distance: f64) -> f64 {
+        attenuate(self.coefficients().as_dvec3(), self.clamp, f64::from(self.range), distance)
+    }
+
+    /// The factor at a distance, or nothing where the formula itself has none: 1/0 at the light, (0, 0, 0), a
+    /// negative or non-finite coefficient, a range of 0 or less, a distance that is negative or not finite.
+    pub fn try_factor(&self, distance: f64) -> Option<f64> {
+        let coefficients = self.coefficients().as_dvec3();
+        let usable = coefficients.is_finite() && coefficients.min_element() >= 0.0 && self.range > 0.0;
+        let defined = distance.is_finite()
+            && distance >= 0.0
+            && coefficients.dot(DVec3::new(1.0, distance, distance * distance)) > 0.0;
+        (usable && defined).then(|| self.factor(distance))
+    }
+
+    /// The largest factor that [`attenuate`] gives, which is the one at distance 0.
+    pub fn strongest(&self) -> f64 {
+        self.factor(0.0)
+    }
+
+    /// The distance in metres beyond which the factor is below `threshold`: infinite if it never is, 0 if it
+    /// always is. A bound on what a light can reach, so it ignores how the window weakens the light before
+    /// its range.
+    pub fn reach(&self, threshold: f64) -> f64 {
+        let [constant, linear, quadratic] = self.coefficients().as_dvec3().to_array();
+        let range = f64::from(self.range).max(0.0);
+        let excess = 1.0 / threshold - constant;
+        if threshold <= 0.0 {
+            return range;
+        }
+        if excess < 0.0 || (self.clamp && threshold > 1.0) {
+            return 0.0;
+        }
+        // The positive root of c d² + b d - excess, in the form that does not cancel.
+        let divisor = linear + (linear * linear + 4.0 * quadratic * excess).sqrt();
+        if divisor > 0.0 { (2.0 * excess / divisor).min(range) } else { range }
+    }
+}
+
+/// Distance in metres under which a light with no constant term stops getting stronger: 1 cm.
+///
+/// With a = b = 0 the law has no value at the light itself; there the denominator stays at what it is at this
+/// distance, so an inverse-square light is at most 10⁴ times its intensity. A constant term above b/100 +
+/// c/10⁴ never meets the floor.
+pub const MINIMUM_DISTANCE: f64 = 0.01;
+/// Distances are clamped to 10¹⁸ m, a hundred light years: its square is still an f32.
+pub const MAXIMUM_DISTANCE: f64 = 1e18;
+/// What an infinite range counts as: far enough beyond [`MAXIMUM_DISTANCE`] for the window to be exactly 1.
+pub const UNLIMITED_RANGE: f64 = 1e30;
+/// Smallest denominator, which only coefficients that are refused on loading can reach.
+const MINIMUM_DENOMINATOR: f64 = 1e-30;
+
+/// `1 / (a + b d + c d²)` for `coefficients` (a, b, c) and a distance d in metres, clamped to 1 if
+/// `clamp_to_one`, times the window `1 - (d/range)⁴`. Finite, at least 0, and never rising with the distance.
+///
+/// The denominator is at least what b and c alone give at [`MINIMUM_DISTANCE`]. Constant attenuation (a, 0,
+/// 0) is exactly 1/a at any distance, the light's own position included, as where OpenGL skips the distance.
+pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: f64) -> f64 {
+    let limited = distance.clamp(0.0, MAXIMUM_DISTANCE);
+    let full = coefficients.x + (coefficients.y + coefficients.z * limited) * limited;
+    let floor = (coefficients.y + coefficients.z * MINIMUM_DISTANCE) * MINIMUM_DISTANCE;
+    let factor = 1.0 / full.max(floor).max(MINIMUM_DENOMINATOR);
+    let end = range.clamp(MINIMUM_DENOMINATOR, UNLIMITED_RANGE);
+    let ratio = limited.min(end) / end;
+    let ratio_squared = ratio * ratio;
+    let window = 1.0 - ratio_squared * ratio_squared;
+    window * if clamp_to_one { factor.min(1.0) } else { factor }
+}
+
+impl Default for Attenuation {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triple(constant: f32, linear: f32, quadratic: f32) -> Attenuation {
+        Attenuation { constant, linear, quadratic, ..Attenuation::NONE }
+    }
+
+    #[test]
+    fn the_formula() {
+        assert_eq!(triple(1.0, 2.0, 3.0).factor(2.0), 1.0 / 17.0);
+        assert_eq!(triple(0.0, 2.0, 0.0).factor(4.0), 0.125);
+        assert_eq!(Attenuation::INVERSE_SQUARE.factor(10.0), 0.01);
+    }
+
+    #[test]
+    fn document_m_clamps_and_opengl_does_not() {
+        let clamped = Attenuation { clamp: true, ..Attenuation::INVERSE_SQUARE };
+        assert_eq!(clamped.factor(0.5), 1.0);
+        assert_eq!(clamped.factor(2.0), 0.25);
+        assert_eq!(Attenuation::INVERSE_SQUARE.factor(0.5), 4.0);
+    }
+
+    #[test]
+    fn at_the_light() {
+        // OpenGL's constant term decides exactly; without one, the value at a centimetre.
+        assert_eq!(triple(1.0, 1.0, 1.0).factor(0.0), 1.0);
+        assert_eq!(triple(0.5, 0.0, 0.0).factor(0.0), 2.0);
+        assert!((Attenuation::INVERSE_SQUARE.factor(0.0) / 1e4 - 1.0).abs() < 1e-15);
+        assert_eq!(triple(0.0, 2.0, 0.0).factor(0.0), 50.0);
+        assert_eq!(Attenuation::INVERSE_SQUARE.factor(0.01), Attenuation::INVERSE_SQUARE.factor(0.0));
+        assert_eq!(Attenuation::INVERSE_SQUARE.try_factor(0.0), None);
+        assert_eq!(triple(0.5, 0.0, 0.0).try_factor(0.0), Some(2.0));
+    }
+
+    #[test]
+    fn constant_attenuation_ignores_the_distance() {
+        for distance in [0.0, 1.0, 1e30, f64::MAX, f64::INFINITY] {
+            assert_eq!(Attenuation::NONE.factor(distance), 1.0);
+            assert_eq!(triple(4.0, 0.0, 0.0).factor(distance), 0.25);
+        }
+    }
+
+    #[test]
+    fn the_window_ends_the_light() {
+        let light = Attenuation { range: 2.0, ..Attenuation::INVERSE_SQUARE };
+        assert_eq!(light.factor(1.0), 1.0 - 1.0 / 16.0);
+        assert_eq!(light.factor(2.0), 0.0);
+        assert_eq!(light.factor(1e300), 0.0);
+    }
+
+    #[test]
+    fn what_is_refused_on_loading_is_still_finite() {
+        for (constant, linear, quadratic) in
+            [(0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, -1.0), (1e-38, 0.0, 0.0)]
+        {
+            for range in [f32::INFINITY, 0.0, -1.0, 1.0] {
+                let light = Attenuation { range, ..triple(constant, linear, quadratic) };
+                for distance in [0.0, 1e-300, 1.0, 1e300] {
+                    let factor = light.factor(distance);
+                    assert!(factor.is_finite() && factor >= 0.0, "{light:?} at {distance}: {factor}");
+                }
+            }
+        }
+        assert_eq!(triple(0.0, 0.0, 0.0).try_factor(1.0), None);
+        assert_eq!(triple(f32::NAN, 0.0, 0.0).try_factor(1.0), None);
+    }
+
+    #[test]
+    fn reach_is_where_the_factor_crosses_the_threshold() {
+        assert_eq!(Attenuation::INVERSE_SQUARE.reach(0.01), 10.0);
+        assert_eq!(triple(1.0, 2.0, 3.0).reach(1.0 / 17.0), 2.0);
+        assert_eq!(Attenuation::NONE.reach(0.5), f64::INFINITY);
+        assert_eq!(Attenuation::NONE.reach(2.0), 0.0);
+        assert_eq!(Attenuation { range: 5.0, ..Attenuation::INVERSE_SQUARE }.reach(1e-6), 5.0);
+    }
+}

@@ -1,0 +1,142 @@
+//! A light as one point of a surface meets it: its direction and its two factors. Not what the surface does
+//! with it: that is `shade`. Not its visibility either: shadows are another's factor.
+
+use glam::DVec3;
+
+use crate::normalization::{safe_length, safe_normalize};
+use crate::spot::{SpotCosines, spot_factor};
+use crate::{Light, LightKind};
+
+/// One light at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// L_a, linear RGB.
+    pub ambient: DVec3,
+    /// L_d, linear RGB.
+    pub diffuse: DVec3,
+    /// L_s, linear RGB.
+    pub specular: DVec3,
+    /// l: unit, from the point to the light; zero for an ambient light and at a point light's own position.
+    pub direction: DVec3,
+    /// Distance factor; 1 for directional and ambient lights.
+    pub attenuation: f64,
+    /// Spot factor in [0, 1].
+    pub spot: f64,
+}
+
+impl LightSample {
+    /// No light.
+    pub const DARK: Self = Self {
+        ambient: DVec3::ZERO,
+        diffuse: DVec3::ZERO,
+        specular: DVec3::ZERO,
+        direction: DVec3::ZERO,
+        attenuation: 0.0,
+        spot: 0.0,
+    };
+}
+
+/// The light as it arrives at `point`, in metres and world space like `light_position`. `light_axis` is the
+/// unit direction in which it shines, the -Z axis of its entity; only directional lights and spotlights read
+/// it.
+///
+/// OpenGL's rules: a directional light is not attenuated, and a spot narrows it too; the ambient colour takes
+/// both factors. At the light's own position there is no direction, so only the ambient part is left there
+/// (with a cone, not even that).
+pub fn evaluate_light(light: &Light, light_position: DVec3, light_axis: DVec3, point: DVec3) -> LightSample {
+    if !light.enabled {
+        return LightSample::DARK;
+    }
+    let ambient = light.ambient.as_dvec3();
+    if light.kind == LightKind::Ambient {
+        return LightSample { ambient, attenuation: 1.0, spot: 1.0, ..LightSample::DARK };
+    }
+    let (direction, attenuation) = if light.kind == LightKind::Directional {
+        (safe_normalize(-light_axis), 1.0)
+    } else {
+        // Halved, the difference of any two finite positions is finite.
+        let half_way = light_position * 0.5 - point * 0.5;
+        (safe_normalize(half_way), light.attenuation.factor(2.0 * safe_length(half_way)))
+    };
+    let spot = light.spot.map_or(1.0, |cone| {
+        let SpotCosines { smooth_cone, outer, inner_or_exponent } = cone.cosines();
+        spot_factor(smooth_cone, outer, inner_or_exponent, -direction.dot(light_axis))
+    });
+    LightSample {
+        ambient,
+        diffuse: light.diffuse.as_dvec3(),
+        specular: light.specular.as_dvec3(),
+        direction,
+        attenuation,
+        spot,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::{Attenuation, SpotCone};
+
+    #[test]
+    fn a_point_light_by_the_inverse_square() {
+        let sample =
+            evaluate_light(&Light::point(Vec3::ONE), DVec3::new(0.0, 5.0, 0.0), DVec3::ZERO, DVec3::Y);
+        assert_eq!(sample.direction, DVec3::Y);
+        assert_eq!(sample.attenuation, 1.0 / 16.0);
+        assert_eq!(sample.spot, 1.0);
+        assert_eq!(sample.diffuse, DVec3::ONE);
+    }
+
+    #[test]
+    fn a_directional_light_is_the_same_everywhere() {
+        let mut light = Light::directional(Vec3::ONE);
+        light.attenuation = Attenuation::INVERSE_SQUARE;
+        for point in [DVec3::ZERO, DVec3::splat(1e300)] {
+            let sample = evaluate_light(&light, DVec3::ONE, -DVec3::Y, point);
+            assert_eq!((sample.direction, sample.attenuation, sample.spot), (DVec3::Y, 1.0, 1.0));
+        }
+        // The spot applies to it: on its own axis that is all, or nothing with a cutoff of 0.
+        light.spot = Some(SpotCone::Exponent { cutoff: 0.0, exponent: 0.0 });
+        assert_eq!(evaluate_light(&light, DVec3::ONE, -DVec3::Y, DVec3::ZERO).spot, 0.0);
+    }
+
+    #[test]
+    fn a_spotlight_shines_along_its_axis() {
+        let light = Light::spot(Vec3::ONE, SpotCone::Exponent { cutoff: 1.0, exponent: 2.0 });
+        let (position, axis) = (DVec3::new(0.0, 4.0, 0.0), -DVec3::Y);
+        // 3-4-5: the cosine is 0.8.
+        let sample = evaluate_light(&light, position, axis, DVec3::new(3.0, 0.0, 0.0));
+        assert!((sample.spot - 0.64).abs() < 1e-15);
+        assert_eq!(sample.attenuation, 0.04);
+        assert_eq!(evaluate_light(&light, position, axis, DVec3::new(0.0, 8.0, 0.0)).spot, 0.0);
+        assert_eq!(evaluate_light(&light, position, DVec3::ZERO, DVec3::ZERO).spot, 0.0);
+    }
+
+    #[test]
+    fn at_the_lights_own_position() {
+        let sample = evaluate_light(&Light::point(Vec3::ONE), DVec3::ONE, -DVec3::Y, DVec3::ONE);
+        assert_eq!(sample.direction, DVec3::ZERO);
+        assert!((sample.attenuation / 1e4 - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_ends_of_f64() {
+        let far = DVec3::splat(f64::MAX);
+        let sample = evaluate_light(&Light::point(Vec3::ONE), far, -DVec3::Y, -far);
+        assert!((sample.direction - DVec3::splat(1.0 / 3f64.sqrt())).length() < 1e-15, "{sample:?}");
+        assert!(sample.attenuation >= 0.0 && sample.attenuation < 1e-35);
+    }
+
+    #[test]
+    fn ambient_and_off() {
+        let ambient = evaluate_light(&Light::ambient(Vec3::ONE), DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        assert_eq!(
+            ambient,
+            LightSample { ambient: DVec3::ONE, attenuation: 1.0, spot: 1.0, ..LightSample::DARK }
+        );
+        let off = Light { enabled: false, ..Light::point(Vec3::ONE) };
+        assert_eq!(evaluate_light(&off, DVec3::ZERO, DVec3::ZERO, DVec3::Y), LightSample::DARK);
+    }
+}

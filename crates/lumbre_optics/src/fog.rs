@@ -1,0 +1,185 @@
+//! Atmospheric attenuation: OpenGL's three fogs and document \[M\]'s depth cueing.
+
+use glam::{DVec3, Vec3};
+
+/// How the weight of the lit colour falls with the distance z from the viewer, in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FogMode {
+    /// (end - z)/(end - start), clamped to [0, 1].
+    Linear {
+        /// Distance in metres where the fog begins.
+        start: f32,
+        /// Distance in metres where only fog is left.
+        end: f32,
+    },
+    /// exp(-density z).
+    Exponential {
+        /// Density in 1/m.
+        density: f32,
+    },
+    /// exp(-(density z)²).
+    ExponentialSquared {
+        /// Density in 1/m.
+        density: f32,
+    },
+    /// Document \[M\]: `near_weight` nearer than `start`, `far_weight` beyond `end`, linear between.
+    DepthCue {
+        /// d_A in metres.
+        start: f32,
+        /// d_B in metres.
+        end: f32,
+        /// S_A in [0, 1].
+        near_weight: f32,
+        /// S_B in [0, 1].
+        far_weight: f32,
+    },
+}
+
+/// Fog: `weight * lit + (1 - weight) * color`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fog {
+    /// How the weight falls with distance.
+    pub mode: FogMode,
+    /// Linear RGB of the fog.
+    pub color: Vec3,
+}
+
+impl FogMode {
+    /// The feature that `shaders/optics/fog.wesl` compiles this mode under.
+    pub fn shader_feature(&self) -> &'static str {
+        match self {
+            Self::Linear { .. } => "FOG_LINEAR",
+            Self::Exponential { .. } => "FOG_EXPONENTIAL",
+            Self::ExponentialSquared { .. } => "FOG_EXPONENTIAL_SQUARED",
+            Self::DepthCue { .. } => "FOG_DEPTH_CUE",
+        }
+    }
+
+    /// The four numbers of [`fog_weight`]'s twin in WGSL: (start, end, 0, 0), (density, 0, 0, 0), or
+    /// (start, end, near weight, far weight).
+    pub fn parameters(&self) -> [f32; 4] {
+        match *self {
+            Self::Linear { start, end } => [start, end, 0.0, 0.0],
+            Self::Exponential { density } | Self::ExponentialSquared { density } => [density, 0.0, 0.0, 0.0],
+            Self::DepthCue { start, end, near_weight, far_weight } => [start, end, near_weight, far_weight],
+        }
+    }
+}
+
+/// Distances beyond 10¹⁸ m count as that: its square is still an f32.
+const MAXIMUM_DISTANCE: f64 = 1e18;
+/// exp(-80) is 2·10⁻³⁵, the last power of ten before f32's denormals.
+const LARGEST_EXPONENT: f64 = 80.0;
+
+/// The part of the way from `start` to `end` that `distance` has gone, 0 to 1: a step at `end` where the two
+/// are equal.
+fn fraction(start: f64, end: f64, distance: f64) -> f64 {
+    let span = end - start;
+    if span == 0.0 {
+        return if distance < end { 0.0 } else { 1.0 };
+    }
+    ((distance - start) / span).clamp(0.0, 1.0)
+}
+
+/// OpenGL's linear fog: (end - z)/(end - start), clamped to [0, 1].
+pub fn fog_linear(start: f64, end: f64, distance: f64) -> f64 {
+    1.0 - fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE))
+}
+
+/// OpenGL's exponential fog: exp(-density z).
+pub fn fog_exponential(density: f64, distance: f64) -> f64 {
+    let depth = density * distance.abs().min(MAXIMUM_DISTANCE);
+    (-depth.clamp(0.0, LARGEST_EXPONENT)).exp()
+}
+
+/// OpenGL's squared exponential fog: exp(-(density z)²).
+pub fn fog_exponential_squared(density: f64, distance: f64) -> f64 {
+    // Clamped before the square, which overflows f32 sooner than the product.
+    let depth = (density * distance.abs().min(MAXIMUM_DISTANCE)).clamp(0.0, LARGEST_EXPONENT.sqrt());
+    (-depth * depth).exp()
+}
+
+/// Document \[M\]'s depth cue: S_A nearer than `start`, S_B beyond `end`, linear between.
+pub fn fog_depth_cue(start: f64, end: f64, near_weight: f64, far_weight: f64, distance: f64) -> f64 {
+    let far = fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE));
+    near_weight * (1.0 - far) + far_weight * far
+}
+
+/// The weight of the lit colour at a distance in metres from the viewer, in [0, 1].
+///
+/// In WGSL the mode is one of the features `FOG_LINEAR`, `FOG_EXPONENTIAL`, `FOG_EXPONENTIAL_SQUARED`,
+/// `FOG_DEPTH_CUE`.
+pub fn fog_weight(mode: &FogMode, distance: f64) -> f64 {
+    let [first, second, near_weight, far_weight] = mode.parameters().map(f64::from);
+    match mode {
+        FogMode::Linear { .. } => fog_linear(first, second, distance),
+        FogMode::Exponential { .. } => fog_exponential(first, distance),
+        FogMode::ExponentialSquared { .. } => fog_exponential_squared(first, distance),
+        FogMode::DepthCue { .. } => fog_depth_cue(first, second, near_weight, far_weight, distance),
+    }
+}
+
+/// `weight * lit + (1 - weight) * fog_color`, linear RGB. Alpha is untouched.
+pub fn apply_fog(weight: f64, lit: DVec3, fog_color: DVec3) -> DVec3 {
+    weight * lit + (1.0 - weight) * fog_color
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn linear() {
+        let mode = FogMode::Linear { start: 2.0, end: 10.0 };
+        for (distance, weight) in
+            [(0.0, 1.0), (2.0, 1.0), (4.0, 0.75), (10.0, 0.0), (1e300, 0.0), (-4.0, 0.75)]
+        {
+            assert_eq!(fog_weight(&mode, distance), weight, "at {distance}");
+        }
+    }
+
+    #[test]
+    fn a_linear_fog_of_no_depth_is_a_wall() {
+        let mode = FogMode::Linear { start: 5.0, end: 5.0 };
+        assert_eq!(fog_weight(&mode, 4.999), 1.0);
+        assert_eq!(fog_weight(&mode, 5.0), 0.0);
+        let mode = FogMode::DepthCue { start: 5.0, end: 5.0, near_weight: 0.75, far_weight: 0.25 };
+        assert_eq!(fog_weight(&mode, 4.0), 0.75);
+        assert_eq!(fog_weight(&mode, 6.0), 0.25);
+    }
+
+    #[test]
+    fn exponential_and_squared() {
+        assert!((fog_weight(&FogMode::Exponential { density: 0.5 }, 2.0) - (-1f64).exp()).abs() < 1e-16);
+        assert!(
+            (fog_weight(&FogMode::ExponentialSquared { density: 0.5 }, 4.0) - (-4f64).exp()).abs() < 1e-16
+        );
+        for mode in [FogMode::Exponential { density: 1e30 }, FogMode::ExponentialSquared { density: 1e30 }] {
+            let far = fog_weight(&mode, 1e300);
+            // exp(-80), the smallest weight there is.
+            assert!((0.0..2e-35).contains(&far), "{mode:?}: {far}");
+            assert_eq!(fog_weight(&mode, 0.0), 1.0);
+        }
+        assert_eq!(fog_weight(&FogMode::Exponential { density: -1.0 }, 1e300), 1.0);
+    }
+
+    #[test]
+    fn depth_cue_is_the_documents_line() {
+        let (start, end, near_weight, far_weight) = (2.0, 6.0, 0.875, 0.125);
+        let mode = FogMode::DepthCue { start, end, near_weight, far_weight };
+        for distance in [2.0f32, 3.0, 4.5, 6.0] {
+            let line = far_weight + (distance - end) * (near_weight - far_weight) / (start - end);
+            assert_eq!(fog_weight(&mode, f64::from(distance)), f64::from(line));
+        }
+        assert_eq!(fog_weight(&mode, 0.0), 0.875);
+        assert_eq!(fog_weight(&mode, 60.0), 0.125);
+    }
+
+    #[test]
+    fn the_mix() {
+        let (lit, color) = (DVec3::new(1.0, 2.0, 4.0), DVec3::ONE);
+        assert_eq!(apply_fog(0.25, lit, color), DVec3::new(1.0, 1.25, 1.75));
+        assert_eq!(apply_fog(1.0, lit, color), lit);
+        assert_eq!(apply_fog(0.0, lit, color), color);
+    }
+}

@@ -1,0 +1,27 @@
+//! Lambert's cosine law. Not the diffuse colour: `shade` multiplies it in.
+
+use glam::DVec3;
+
+/// max(n·l, 0) of unit vectors, at most 1. Zero for a zero normal or a light behind.
+pub fn lambert(normal: DVec3, light: DVec3) -> f64 {
+    normal.dot(light).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cosine_in_front_and_nothing_behind() {
+        let light = DVec3::new(3f64.sqrt() / 2.0, 0.5, 0.0);
+        assert_eq!(lambert(DVec3::Y, light), 0.5);
+        assert_eq!(lambert(-DVec3::Y, light), 0.0);
+        assert_eq!(lambert(DVec3::X, DVec3::Y), 0.0);
+        assert_eq!(lambert(DVec3::ZERO, light), 0.0);
+    }
+
+    #[test]
+    fn rounding_cannot_lift_it_above_one() {
+        assert_eq!(lambert(DVec3::Y * (1.0 + 1e-7), DVec3::Y), 1.0);
+    }
+}

@@ -1,0 +1,99 @@
+//! Light and material types and the reflection equations in f64.
+//!
+//! Everything that documents \[I\], \[E\] and \[M\] say about one light at one point, and nothing about
+//! scenes, files or devices. Each equation is a file with a twin in `shaders/optics`: the same name, the same
+//! order of arguments, the same guards.
+//!
+//! ```text
+//!       Light                                   viewer_direction ─┐            Material, front or back
+//!         │ where it stands, where it shines                      │                  │ + textures
+//!         ▼                                                       │                  ▼
+//!   evaluate_light ──► LightSample ──────────────► light_contribution ◄──────── SurfaceSample
+//!     attenuate          l, colours, factors         │  lambert                  k_a k_d k_s n
+//!     spot_factor                                    │  phong │ blinn_phong (4n, matched) │ torrance_sparrow
+//!                                                    ▼                           D: microfacets  F: fresnel
+//!                          apply_fog ◄── add_emission ◄── Contribution { ambient, diffuse, specular }
+//!
+//!   beside it: transmitted_direction (Snell), fresnel_conductor, facing_normal (two-sided)
+//! ```
+//!
+//! Directions are unit and point away from the surface: `normal`, `light`, `viewer`. The zero vector stands
+//! for "has none" and takes no light. For finite input every function is finite; where a formula has no value
+//! its `try_` twin says so with `None`. What may not be loaded at all, [`Light::validate`],
+//! [`Material::validate`] and [`Fog::validate`] refuse by name.
+//!
+//! ```
+//! use glam::{DVec3, Vec3};
+//! use lumbre_optics::{Light, Material, ReflectionModel, evaluate_light, light_contribution};
+//!
+//! let lamp = Light::point(Vec3::splat(4.0)); // inverse square
+//! lamp.validate("lamp")?;
+//! let paper = Material::matt(Vec3::splat(0.5));
+//! let at_point = evaluate_light(&lamp, DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, DVec3::ZERO);
+//! let lit = light_contribution(ReflectionModel::Phong, &paper.front, &at_point, DVec3::Y, DVec3::Y);
+//! assert_eq!(lit.diffuse, DVec3::splat(0.5)); // 0.5 · 4 / 2² · cos 0
+//! # Ok::<(), lumbre_optics::LightError>(())
+//! ```
+
+mod attenuation;
+mod blinn_phong;
+mod emission;
+mod evaluate_light;
+mod fog;
+mod fog_validation;
+mod fresnel;
+mod half_vector;
+mod lambert;
+mod light;
+mod light_validation;
+mod material;
+mod material_validation;
+mod microfacets;
+mod normalization;
+mod phong;
+mod power;
+mod roughness;
+mod shade;
+mod shading;
+mod snell;
+mod spot;
+mod torrance_sparrow;
+mod two_sided;
+mod validation;
+mod viewer;
+
+pub use attenuation::{Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate};
+pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
+pub use emission::{add_emission, exitance};
+pub use evaluate_light::{LightSample, evaluate_light};
+pub use fog::{
+    Fog, FogMode, apply_fog, fog_depth_cue, fog_exponential, fog_exponential_squared, fog_linear, fog_weight,
+};
+pub use fog_validation::FogError;
+pub use fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
+pub use half_vector::{half_vector, try_half_vector};
+pub use lambert::lambert;
+pub use light::{BakeMode, Light, LightKind};
+pub use light_validation::{LARGEST_INTENSITY, LightError};
+pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
+pub use material_validation::MaterialError;
+pub use microfacets::{
+    distribution_cosine_power, distribution_gaussian, distribution_trowbridge_reitz, half_value_angle,
+    half_value_sine_squared,
+};
+pub use normalization::{TINY_LENGTH_SQUARED, safe_length, safe_normalize, try_normalize};
+pub use phong::{phong, reflected_direction};
+pub use power::{cosine_lobe, power_of_cosine, safe_pow};
+pub use roughness::{MAX_SHININESS, shininess_from_roughness};
+pub use shade::{Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, shade, specular_factor};
+pub use shading::{ReflectionModel, Shading};
+pub use snell::{
+    critical_angle, is_totally_reflected, transmitted_cosine, transmitted_direction, transmitted_highlight,
+    try_transmitted_direction,
+};
+pub use spot::{MINIMUM_COSINE_DIFFERENCE, SpotCone, SpotCosines, spot_factor};
+pub use torrance_sparrow::{
+    MINIMUM_VIEW_COSINE, geometric_attenuation, torrance_sparrow, torrance_sparrow_geometry,
+};
+pub use two_sided::{facing_normal, shading_normal};
+pub use viewer::viewer_direction;

@@ -1,0 +1,98 @@
+//! The light component: what it emits and how it spreads. Where it stands is its entity's transform.
+//! Not the equations: those are one file each beside this one.
+
+use bevy_ecs::component::Component;
+use glam::Vec3;
+
+use crate::{Attenuation, SpotCone};
+
+/// From where a light comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightKind {
+    /// From everywhere: adds `k_a ambient`, without position or direction.
+    Ambient,
+    /// From infinitely far along the entity's -Z axis (the light travels along -Z); no distance attenuation.
+    Directional,
+    /// From the entity's position.
+    Point,
+}
+
+/// Who evaluates a light: the baker, the frame, or both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum BakeMode {
+    /// Shaded every frame, unknown to the baker. The default for lights made in code.
+    #[default]
+    Dynamic,
+    /// Direct light is shaded every frame; its bounces are baked.
+    Mixed,
+    /// Baked whole: a lightmapped mesh skips its diffuse part and keeps the specular; any other mesh is lit
+    /// in full. The default for lights imported from glTF.
+    Static,
+}
+
+/// A light source. Its three colours are the columns of document \[I\]'s 3x3 matrix: a material with ambient,
+/// diffuse and specular coefficients k receives
+/// `k_a ambient + attenuation spot (k_d diffuse (l·n) + k_s specular (r·v)^n)`.
+///
+/// Units: what multiplies k_d is irradiance / π, so a KHR_lights_punctual intensity (candela, lux) is divided
+/// by π.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct Light {
+    /// From where it comes.
+    pub kind: LightKind,
+    /// L_a: linear RGB added through k_a, attenuated like the rest but not gated by l·n.
+    pub ambient: Vec3,
+    /// L_d: linear RGB, (W/m²)/π at distance factor 1.
+    pub diffuse: Vec3,
+    /// L_s: linear RGB, in the units of `diffuse`.
+    pub specular: Vec3,
+    /// Distance attenuation; ignored by directional and ambient lights.
+    pub attenuation: Attenuation,
+    /// The cone, if it is a spotlight. Applies to directional lights too, as in OpenGL.
+    pub spot: Option<SpotCone>,
+    /// A light that is off costs nothing.
+    pub enabled: bool,
+    /// Whether the light asks for a shadow map.
+    pub shadow: bool,
+    /// Who evaluates it.
+    pub bake: BakeMode,
+}
+
+impl Light {
+    /// A point light that follows the inverse-square law, with the same diffuse and specular colour.
+    pub fn point(color: Vec3) -> Self {
+        Self {
+            kind: LightKind::Point,
+            ambient: Vec3::ZERO,
+            diffuse: color,
+            specular: color,
+            attenuation: Attenuation::INVERSE_SQUARE,
+            spot: None,
+            enabled: true,
+            shadow: false,
+            bake: BakeMode::Dynamic,
+        }
+    }
+
+    /// A distant light shining along its entity's -Z axis.
+    pub fn directional(color: Vec3) -> Self {
+        Self { kind: LightKind::Directional, attenuation: Attenuation::NONE, ..Self::point(color) }
+    }
+
+    /// A spotlight shining along its entity's -Z axis.
+    pub fn spot(color: Vec3, cone: SpotCone) -> Self {
+        Self { spot: Some(cone), ..Self::point(color) }
+    }
+
+    /// An ambient light.
+    pub fn ambient(color: Vec3) -> Self {
+        Self {
+            kind: LightKind::Ambient,
+            ambient: color,
+            diffuse: Vec3::ZERO,
+            specular: Vec3::ZERO,
+            attenuation: Attenuation::NONE,
+            ..Self::point(color)
+        }
+    }
+}

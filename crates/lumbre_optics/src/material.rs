@@ -1,0 +1,169 @@
+//! The Phong material component. Textures that modulate it belong to the scene crate; the equations to their
+//! own files.
+
+use bevy_ecs::component::Component;
+use glam::Vec3;
+
+use crate::roughness::{MAX_SHININESS, shininess_from_roughness};
+
+/// The Phong coefficients of one side of a surface. All linear RGB in [0, 1] except emission, which is at
+/// least 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// k_a.
+    pub ambient: Vec3,
+    /// k_d; also the diffuse reflectance ρ that the baker uses.
+    pub diffuse: Vec3,
+    /// k_s.
+    pub specular: Vec3,
+    /// Radiance that the surface adds, W/(m² sr). Lights nothing in real time; lights everything in the
+    /// baker.
+    pub emission: Vec3,
+    /// Exponent n, at least 0.
+    pub shininess: f32,
+}
+
+impl Default for Surface {
+    fn default() -> Self {
+        Self {
+            ambient: Vec3::splat(0.8),
+            diffuse: Vec3::splat(0.8),
+            specular: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            shininess: 1.0,
+        }
+    }
+}
+
+impl Surface {
+    /// The exponent clamped to what is used, 0 to [`MAX_SHININESS`].
+    pub fn shininess_in_range(&self) -> f32 {
+        self.shininess.clamp(0.0, MAX_SHININESS)
+    }
+
+    /// Whether the highlight needs the shader feature `SHARP_HIGHLIGHTS`: above [`SHARP_SHININESS`] with
+    /// specular light at all.
+    pub fn has_sharp_highlight(&self) -> bool {
+        self.shininess > SHARP_SHININESS && self.specular != Vec3::ZERO
+    }
+}
+
+/// How coverage is decided.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// A fragment exists where alpha is at least the cutoff.
+    Mask {
+        /// Cutoff in [0, 1].
+        cutoff: f32,
+    },
+    /// Drawn back to front over what is behind.
+    Blend,
+}
+
+/// A material: what a surface does with light.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct Material {
+    /// The front side, where triangles wind counter-clockwise.
+    pub front: Surface,
+    /// The back side, if it differs. Seen only when `double_sided`.
+    pub back: Option<Surface>,
+    /// Opacity in [0, 1], multiplied by texture and vertex alpha.
+    pub alpha: f32,
+    /// How alpha is used.
+    pub alpha_mode: AlphaMode,
+    /// Back faces are drawn, lit with the reversed normal.
+    pub double_sided: bool,
+    /// Shows `front.emission + front.diffuse` whatever the light (KHR_materials_unlit).
+    pub unlit: bool,
+    /// k_r of the ray tree, linear RGB.
+    pub mirror: Vec3,
+    /// k_t of the ray tree, linear RGB.
+    pub transmission: Vec3,
+    /// Index of refraction, at least 1 (1.5 by default).
+    pub ior: f32,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            front: Surface::default(),
+            back: None,
+            alpha: 1.0,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+            mirror: Vec3::ZERO,
+            transmission: Vec3::ZERO,
+            ior: 1.5,
+        }
+    }
+}
+
+impl Material {
+    /// A matt material of one colour.
+    pub fn matt(color: Vec3) -> Self {
+        Self { front: Surface { ambient: color, diffuse: color, ..Surface::default() }, ..Self::default() }
+    }
+
+    /// The coefficients of the side that is seen: the front's on both, if the back does not differ.
+    pub fn surface(&self, front_facing: bool) -> &Surface {
+        match &self.back {
+            Some(back) if !front_facing => back,
+            _ => &self.front,
+        }
+    }
+
+    /// The Phong coefficients for a glTF metallic-roughness material:
+    /// k_d = base (1 - metallic), k_s = mix(0.04, base, metallic), n = 2/α² - 2 with α = roughness²,
+    /// clamped to [0, 10⁶] (beyond it f32 cannot tell the highlight from a point).
+    pub fn from_metallic_roughness(base: Vec3, metallic: f32, roughness: f32) -> Self {
+        let front = Surface {
+            ambient: base,
+            diffuse: base * (1.0 - metallic),
+            specular: Vec3::splat(0.04).lerp(base, metallic),
+            emission: Vec3::ZERO,
+            shininess: shininess_from_roughness(roughness),
+        };
+        Self { front, ..Self::default() }
+    }
+}
+
+/// Exponent up to which f32's pow of the cosine is good to 10⁻⁴: 256. Beyond it shaders want
+/// `SHARP_HIGHLIGHTS`.
+pub const SHARP_SHININESS: f32 = 256.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metals_and_dielectrics() {
+        let base = Vec3::new(0.5, 0.25, 0.125);
+        let metal = Material::from_metallic_roughness(base, 1.0, 0.5).front;
+        assert_eq!((metal.diffuse, metal.specular), (Vec3::ZERO, base));
+        let plastic = Material::from_metallic_roughness(base, 0.0, 0.5).front;
+        assert_eq!((plastic.diffuse, plastic.specular), (base, Vec3::splat(0.04)));
+    }
+
+    #[test]
+    fn the_back_defaults_to_the_front() {
+        let one_sided = Material::matt(Vec3::ONE);
+        assert_eq!(one_sided.surface(false), &one_sided.front);
+        let back = Surface { shininess: 9.0, ..Surface::default() };
+        let two_sided = Material { back: Some(back), ..Material::default() };
+        assert_eq!(two_sided.surface(false), &back);
+        assert_eq!(two_sided.surface(true), &two_sided.front);
+    }
+
+    #[test]
+    fn a_sharp_highlight_needs_specular_light() {
+        let sharp = Surface { shininess: 1000.0, specular: Vec3::ONE, ..Surface::default() };
+        assert!(sharp.has_sharp_highlight());
+        assert!(!Surface { specular: Vec3::ZERO, ..sharp }.has_sharp_highlight());
+        assert!(!Surface { shininess: 256.0, ..sharp }.has_sharp_highlight());
+        assert_eq!(Surface { shininess: 1e9, ..sharp }.shininess_in_range(), MAX_SHININESS);
+    }
+}

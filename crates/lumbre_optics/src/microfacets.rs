@@ -1,0 +1,112 @@
+//! The three distributions of microfacets in Blinn, "Models of light reflection for computer synthesized
+//! pictures" (1977), scaled to 1 where the half vector is the normal. Not the whole model: that is
+//! `torrance_sparrow`.
+//!
+//! All take the cosine and the squared sine of the angle between n and h, and the exponent n whose cosine
+//! lobe falls to a half at the same angle β = acos(2^(-1/n)): so one shininess gives highlights of one width.
+
+use std::f64::consts::{LN_2, SQRT_2};
+
+use crate::power::power_of_cosine;
+
+/// Smallest exponent that is divided by; β is 90 degrees long before.
+const SMALLEST_EXPONENT: f64 = 1e-6;
+
+/// sin² β = 1 - 4^(-1/n): the squared sine of the angle at which cosⁿ is a half.
+///
+/// Taken without the difference from 1 where β is small, so that n = 10⁶ keeps its digits.
+pub fn half_value_sine_squared(shininess: f64) -> f64 {
+    -(-2.0 * LN_2 / shininess.max(SMALLEST_EXPONENT)).exp_m1()
+}
+
+/// β in radians: where the highlight of the exponent `shininess` falls to a half, 0 to π/2.
+pub fn half_value_angle(shininess: f64) -> f64 {
+    let sine_squared = half_value_sine_squared(shininess);
+    sine_squared.sqrt().atan2((1.0 - sine_squared).max(0.0).sqrt())
+}
+
+/// D1 = cosⁿ: Phong's.
+pub fn distribution_cosine_power(cosine: f64, sine_squared: f64, shininess: f64) -> f64 {
+    power_of_cosine(cosine, sine_squared, shininess)
+}
+
+/// D2 = exp(-(c₂ α)²), c₂ = sqrt(ln 2)/β: Torrance and Sparrow's.
+pub fn distribution_gaussian(cosine: f64, sine_squared: f64, shininess: f64) -> f64 {
+    let angle = sine_squared.max(0.0).sqrt().atan2(cosine.clamp(0.0, 1.0));
+    let ratio = angle / half_value_angle(shininess).max(1e-6);
+    // Beyond 10 half widths nothing is left in f32 (2⁻¹⁰⁰).
+    (-LN_2 * (ratio * ratio).min(100.0)).exp()
+}
+
+/// D3 = (c₃²/(cos²α (c₃² - 1) + 1))², c₃² = (1 - cos²β)/(√2 - cos²β): Trowbridge and Reitz's, the one that
+/// Blinn recommends and that `torrance_sparrow` uses.
+///
+/// The divisor is c₃² + sin²α (1 - c₃²), the same without the difference that cancels at the peak.
+pub fn distribution_trowbridge_reitz(sine_squared: f64, shininess: f64) -> f64 {
+    let half_value = half_value_sine_squared(shininess);
+    let c3_squared = half_value / (SQRT_2 - 1.0 + half_value);
+    let ratio = c3_squared / (c3_squared + sine_squared.clamp(0.0, 1.0) * (1.0 - c3_squared));
+    ratio * ratio
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXPONENTS: [f64; 6] = [0.5, 1.0, 10.0, 128.0, 8192.0, 1e6];
+
+    #[test]
+    fn each_is_one_at_the_peak_and_a_half_at_the_half_value_angle() {
+        for shininess in EXPONENTS {
+            let beta = half_value_angle(shininess);
+            let (sine, cosine) = beta.sin_cos();
+            let values = [
+                distribution_cosine_power(cosine, sine * sine, shininess),
+                distribution_gaussian(cosine, sine * sine, shininess),
+                distribution_trowbridge_reitz(sine * sine, shininess),
+            ];
+            for value in values {
+                // sin² β of rounded β: a few 2⁻⁵³ relative, times the slope at the half value, at most ln 2.
+                assert!((value - 0.5).abs() < 4e-15, "n = {shininess}: {values:?}");
+            }
+            assert_eq!(distribution_cosine_power(1.0, 0.0, shininess), 1.0);
+            assert_eq!(distribution_gaussian(1.0, 0.0, shininess), 1.0);
+            assert_eq!(distribution_trowbridge_reitz(0.0, shininess), 1.0);
+        }
+    }
+
+    #[test]
+    fn the_half_value_angle_of_known_exponents() {
+        // cos β = 2^(-1/n): 60 degrees for 1, 45 for 2; ln 2 = n β²/2 for large n, next term β²/6 relative.
+        assert!((half_value_angle(1.0).to_degrees() - 60.0).abs() < 1e-13);
+        assert!((half_value_angle(2.0).to_degrees() - 45.0).abs() < 1e-13);
+        assert!((half_value_angle(1e6) / (2.0 * LN_2 / 1e6).sqrt() - 1.0).abs() < 1e-6);
+        assert!((half_value_angle(0.0) - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn trowbridge_reitz_equals_its_textbook_form() {
+        for shininess in [1.0, 10.0, 100.0] {
+            let cos_beta_squared = half_value_angle(shininess).cos().powi(2);
+            let c3_squared = (1.0 - cos_beta_squared) / (SQRT_2 - cos_beta_squared);
+            for degrees in [0.0, 3.0, 20.0, 60.0, 90.0] {
+                let cosine = f64::to_radians(degrees).cos();
+                let textbook = (c3_squared / (cosine * cosine * (c3_squared - 1.0) + 1.0)).powi(2);
+                let got = distribution_trowbridge_reitz(1.0 - cosine * cosine, shininess);
+                // The textbook's own cancellation, 2⁻⁵³/c₃², is the larger error: c₃² is .03 at n = 100.
+                assert!((got - textbook).abs() < 1e-13, "{shininess} {degrees}");
+            }
+        }
+    }
+
+    #[test]
+    fn exponent_zero_is_finite() {
+        for value in [
+            distribution_cosine_power(0.0, 1.0, 0.0),
+            distribution_gaussian(0.0, 1.0, 0.0),
+            distribution_trowbridge_reitz(1.0, 0.0),
+        ] {
+            assert!((0.0..=1.0).contains(&value));
+        }
+    }
+}

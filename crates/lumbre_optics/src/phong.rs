@@ -1,0 +1,63 @@
+//! Phong's specular factor (r·v)ⁿ, Phong 1975. Not multiplied by k_s, the light or n·l: documents \[I\],
+//! \[E\] and \[M\] use it bare.
+
+use glam::DVec3;
+
+use crate::power::cosine_lobe;
+
+/// r = 2 (l·n) n - l: the direction in which a mirror with unit normal n sends light that comes from l.
+pub fn reflected_direction(normal: DVec3, light: DVec3) -> DVec3 {
+    2.0 * light.dot(normal) * normal - light
+}
+
+/// (r·v)ⁿ where the light is in front of the surface (n·l > 0), else 0. All directions unit, away from the
+/// surface.
+///
+/// Exponent 0 makes it a step on n·l > 0.
+pub fn phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
+    if normal.dot(light) <= 0.0 {
+        return 0.0;
+    }
+    cosine_lobe(reflected_direction(normal, light), viewer, shininess)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(degrees: f64) -> DVec3 {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        DVec3::new(sine, cosine, 0.0)
+    }
+
+    #[test]
+    fn it_peaks_in_the_mirror_direction() {
+        assert!((reflected_direction(DVec3::Y, at(40.0)) - at(-40.0)).length() < 1e-15);
+        assert!((phong(DVec3::Y, at(40.0), at(-40.0), 100.0) - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn sixty_degrees_off_the_mirror_direction_is_a_half_to_the_n() {
+        for exponent in [1.0, 2.0, 10.0] {
+            let expected = 0.5f64.powf(exponent);
+            // Rounding of the cosine, 2⁻⁵³ or two, times n.
+            assert!(
+                (phong(DVec3::Y, at(30.0), at(30.0), exponent) - expected).abs() < 1e-15 * (1.0 + exponent)
+            );
+        }
+    }
+
+    #[test]
+    fn the_light_must_be_in_front() {
+        assert_eq!(phong(DVec3::Y, at(90.1), at(-89.0), 1.0), 0.0);
+        assert_eq!(phong(DVec3::Y, -DVec3::Y, -DVec3::Y, 0.0), 0.0);
+        assert_eq!(phong(DVec3::ZERO, DVec3::Y, DVec3::Y, 0.0), 0.0);
+    }
+
+    #[test]
+    fn exponent_zero_is_a_step() {
+        assert_eq!(phong(DVec3::Y, at(10.0), at(80.0), 0.0), 1.0);
+        // Even where r·v is negative: 0⁰ = 1.
+        assert_eq!(phong(DVec3::Y, at(80.0), at(80.0), 0.0), 1.0);
+    }
+}

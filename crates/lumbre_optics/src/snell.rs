@@ -1,0 +1,136 @@
+//! Refraction: where transmitted light goes, and when none is. Not how much: that is `fresnel`.
+//!
+//! eta is always η_t/η_i, the index behind the surface over the index in front. Document \[I\]'s derivation
+//! mixes eta and 1/eta; here sin θ_t = sin θ_i / eta, and no light is transmitted where sin θ_i > eta.
+
+use glam::DVec3;
+
+use crate::normalization::safe_normalize;
+use crate::power::cosine_lobe;
+
+/// Smallest eta that is divided by; no pair of real media comes near it.
+const SMALLEST_INDEX: f64 = 1e-4;
+
+/// Whether all light is reflected: sin θ_i > eta. At the critical angle itself it still leaves, along the
+/// surface.
+pub fn is_totally_reflected(sin_incident: f64, eta: f64) -> bool {
+    sin_incident > eta.max(SMALLEST_INDEX)
+}
+
+/// The critical angle in radians, where sin θ_i = eta; none towards a denser medium (eta ≥ 1), or for eta
+/// that is not positive.
+pub fn critical_angle(eta: f64) -> Option<f64> {
+    (eta > 0.0 && eta < 1.0).then(|| eta.asin())
+}
+
+/// cos θ_t = sqrt(1 - (sin θ_i / eta)²), and 0 under total internal reflection.
+///
+/// The difference of squares is taken as a product, which keeps its digits near the critical angle.
+pub fn transmitted_cosine(sin_incident: f64, eta: f64) -> f64 {
+    let sine = sin_incident.max(0.0) / eta.max(SMALLEST_INDEX);
+    ((1.0 - sine) * (1.0 + sine)).max(0.0).sqrt()
+}
+
+/// t = -(1/eta) l - (cos θ_t - cos θ_i / eta) n: the unit direction, away from the light, in which light from
+/// l (unit, on the side of the unit normal n) goes on behind the surface. The zero vector under total
+/// internal reflection.
+pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> DVec3 {
+    let index = eta.max(SMALLEST_INDEX);
+    let sin_incident = normal.cross(light).length();
+    if is_totally_reflected(sin_incident, index) {
+        return DVec3::ZERO;
+    }
+    let cos_incident = normal.dot(light);
+    let bent = cos_incident / index - transmitted_cosine(sin_incident, index);
+    safe_normalize(bent * normal - light / index)
+}
+
+/// [`transmitted_direction`], or nothing under total internal reflection, with the light behind the surface,
+/// or for an eta that is not positive and finite.
+pub fn try_transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Option<DVec3> {
+    let usable = eta.is_finite() && eta > 0.0 && normal.dot(light) > 0.0;
+    let direction = if usable { transmitted_direction(normal, light, eta) } else { DVec3::ZERO };
+    (direction != DVec3::ZERO).then_some(direction)
+}
+
+/// (t·v)ⁿ of document \[I\]: the highlight of light that shines through, for a viewer behind the surface (n·v
+/// < 0) with the light in front (n·l > 0), else 0.
+pub fn transmitted_highlight(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, eta: f64) -> f64 {
+    let sin_incident = normal.cross(light).length();
+    if normal.dot(light) <= 0.0 || normal.dot(viewer) >= 0.0 || is_totally_reflected(sin_incident, eta) {
+        return 0.0;
+    }
+    cosine_lobe(transmitted_direction(normal, light, eta), viewer, shininess)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(angle: f64) -> DVec3 {
+        DVec3::new(angle.sin(), angle.cos(), 0.0)
+    }
+
+    #[test]
+    fn snells_law() {
+        for eta in [0.7, 1.0, 1.33, 1.5, 2.42] {
+            for degrees in [0.0, 10.0, 30.0, 44.0] {
+                let incident = f64::to_radians(degrees);
+                let transmitted = (incident.sin() / eta).asin();
+                let expected = -at(transmitted);
+                let got = transmitted_direction(DVec3::Y, at(incident), eta);
+                // At 44 degrees into 0.7 the cosine is .12: its rounding is 2⁻⁵³/.12² at most.
+                assert!((got - expected).length() < 1e-14, "{eta} at {degrees}: {got} {expected}");
+                assert!((transmitted_cosine(incident.sin(), eta) - transmitted.cos()).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn no_boundary_does_not_bend() {
+        assert!((transmitted_direction(DVec3::Y, at(1.2), 1.0) + at(1.2)).length() < 1e-15);
+    }
+
+    #[test]
+    fn the_critical_angle() {
+        let eta = 1.0 / 1.5;
+        let critical = critical_angle(eta).expect("glass to air has one");
+        assert!((critical.to_degrees() - 41.810_314_895_778_6).abs() < 1e-12);
+        assert_eq!(critical_angle(1.0), None);
+        assert_eq!(critical_angle(1.5), None);
+        assert_eq!(critical_angle(f64::NAN), None);
+        // At the angle: along the surface. A hair beyond: nothing.
+        assert!(!is_totally_reflected(eta, eta));
+        assert_eq!(transmitted_cosine(eta, eta), 0.0);
+        assert_eq!(transmitted_direction(DVec3::Y, at(critical + 1e-12), eta), DVec3::ZERO);
+        assert_eq!(try_transmitted_direction(DVec3::Y, at(critical + 1e-12), eta), None);
+        let inside = transmitted_direction(DVec3::Y, at(critical - 1e-12), eta);
+        // cos θ_t = sqrt(2 δ cos θ_i / eta) = 1.5e-6 at δ = 10⁻¹².
+        assert!((inside.x + 1.0).abs() < 1e-11 && inside.y < 0.0 && inside.y > -2e-6, "{inside}");
+    }
+
+    #[test]
+    fn the_highlight_follows_the_bent_light() {
+        let (incident, eta) = (0.6f64, 1.5);
+        let transmitted = (incident.sin() / eta).asin();
+        let peak = transmitted_highlight(DVec3::Y, at(incident), -at(transmitted), 100.0, eta);
+        assert!((peak - 1.0).abs() < 1e-12);
+        let beside = transmitted_highlight(DVec3::Y, at(incident), -at(transmitted + 0.1), 100.0, eta);
+        assert!((beside - 0.1f64.cos().powi(100)).abs() < 1e-12);
+        assert_eq!(transmitted_highlight(DVec3::Y, at(incident), at(0.1), 0.0, eta), 0.0);
+        assert_eq!(transmitted_highlight(DVec3::Y, -at(incident), -at(0.1), 0.0, eta), 0.0);
+        assert_eq!(transmitted_highlight(DVec3::Y, at(1.0), -at(1.5), 0.0, 1.0 / 1.5), 0.0);
+    }
+
+    #[test]
+    fn degenerate_input_is_finite() {
+        for eta in [0.0, -1.0, 1e-300, 1e300] {
+            for light in [DVec3::Y, DVec3::X, DVec3::ZERO, at(1.57)] {
+                assert!(transmitted_direction(DVec3::Y, light, eta).is_finite(), "{eta} {light}");
+                assert!(transmitted_direction(DVec3::ZERO, light, eta).is_finite(), "{eta} {light}");
+            }
+        }
+        assert_eq!(try_transmitted_direction(DVec3::Y, DVec3::Y, 0.0), None);
+        assert_eq!(try_transmitted_direction(DVec3::Y, -DVec3::Y, 1.5), None);
+    }
+}

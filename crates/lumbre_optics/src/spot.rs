@@ -1,0 +1,162 @@
+//! Spot cones: how a light narrows around its axis. Not the distance: that is `attenuation`.
+
+use crate::power::safe_pow;
+
+/// The cone of a spotlight around the -Z axis of its entity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SpotCone {
+    /// OpenGL's spot: `cos(angle)^exponent` inside `cutoff`, nothing outside.
+    Exponent {
+        /// Half angle in radians, 0 to π/2; π makes it a point light.
+        cutoff: f32,
+        /// Concentration exponent, at least 0.
+        exponent: f32,
+    },
+    /// KHR_lights_punctual's spot: full inside `inner`, nothing outside `outer`, and between them the square
+    /// of a linear function of the angle's cosine.
+    Smooth {
+        /// Half angle in radians where the fall-off begins, 0 to `outer`.
+        inner: f32,
+        /// Half angle in radians where the light ends, up to π/2.
+        outer: f32,
+    },
+}
+
+/// A cone as cosines, taken once on the CPU: WGSL's cos is only good to 2⁻¹¹.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpotCosines {
+    /// Whether it is the smooth cone of KHR_lights_punctual rather than OpenGL's.
+    pub smooth_cone: bool,
+    /// Cosine of the half angle at which the light ends, at least 0; -2 for a cutoff of π, which ends
+    /// nowhere.
+    pub outer: f64,
+    /// Cosine of the inner half angle of a smooth cone, OpenGL's exponent of the other.
+    pub inner_or_exponent: f64,
+}
+
+/// Least difference between the two cosines of a smooth cone (KHR_lights_punctual's own example code).
+pub const MINIMUM_COSINE_DIFFERENCE: f64 = 0.001;
+
+/// How far from π a cutoff may be and still mean 180 degrees: the rounding of π, and of degrees times π/180,
+/// in f32.
+const CUTOFF_ROUNDING: f64 = 1e-6;
+
+impl SpotCone {
+    /// The half angle in radians beyond which there is no light.
+    pub fn outer_angle(&self) -> f32 {
+        match *self {
+            Self::Exponent { cutoff, .. } => cutoff,
+            Self::Smooth { outer, .. } => outer,
+        }
+    }
+
+    /// Whether it is OpenGL's cutoff of 180 degrees, which makes a spotlight a point light.
+    pub fn is_everywhere(&self) -> bool {
+        matches!(*self, Self::Exponent { cutoff, .. }
+            if (f64::from(cutoff) - std::f64::consts::PI).abs() <= CUTOFF_ROUNDING)
+    }
+
+    /// The cone as [`spot_factor`] takes it. A cutoff of 90 degrees is cosine 0 exactly, though f32's π/2
+    /// lies beyond it.
+    pub fn cosines(&self) -> SpotCosines {
+        // No cone opens backwards, so the rounding of π/2 must not let it.
+        let cosine = |angle: f32| f64::from(angle).cos().max(0.0);
+        match *self {
+            Self::Exponent { .. } if self.is_everywhere() => {
+                SpotCosines { smooth_cone: false, outer: -2.0, inner_or_exponent: 0.0 }
+            }
+            Self::Exponent { cutoff, exponent } => SpotCosines {
+                smooth_cone: false,
+                outer: cosine(cutoff),
+                inner_or_exponent: f64::from(exponent),
+            },
+            Self::Smooth { inner, outer } => {
+                SpotCosines { smooth_cone: true, outer: cosine(outer), inner_or_exponent: cosine(inner) }
+            }
+        }
+    }
+}
+
+/// The factor of a spotlight in [0, 1], for the cosine between its axis and the direction from the light to
+/// the point.
+///
+/// OpenGL's cone (`smooth_cone` false): `cosine^exponent` where `outer < cosine`, strictly as in Mesa, so a
+/// cutoff of 0 lights nothing and a cutoff of 90 degrees excludes the plane of the light. The smooth cone:
+/// the square of `clamp((cosine - outer)/max(inner - outer, 0.001), 0, 1)`.
+pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine: f64) -> f64 {
+    let cosine = cosine.clamp(-1.0, 1.0);
+    if smooth_cone {
+        let width = (inner_or_exponent - outer).max(MINIMUM_COSINE_DIFFERENCE);
+        let angular = ((cosine - outer) / width).clamp(0.0, 1.0);
+        return angular * angular;
+    }
+    if outer < cosine { safe_pow(cosine, inner_or_exponent) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
+
+    use super::*;
+
+    fn factor(cone: SpotCone, cosine: f64) -> f64 {
+        let SpotCosines { smooth_cone, outer, inner_or_exponent } = cone.cosines();
+        spot_factor(smooth_cone, outer, inner_or_exponent, cosine)
+    }
+
+    #[test]
+    fn inside_the_power_outside_nothing() {
+        let cone = SpotCone::Exponent { cutoff: FRAC_PI_3, exponent: 3.0 };
+        assert!((factor(cone, 0.8) - 0.512).abs() < 1e-15);
+        assert_eq!(factor(cone, 1.0), 1.0);
+        assert_eq!(factor(cone, 0.4999), 0.0);
+    }
+
+    #[test]
+    fn cutoff_0_90_180() {
+        let zero = SpotCone::Exponent { cutoff: 0.0, exponent: 0.0 };
+        assert_eq!(factor(zero, 1.0), 0.0);
+        assert_eq!(factor(zero, 1.0 + 1e-7), 0.0);
+        let right = SpotCone::Exponent { cutoff: FRAC_PI_2, exponent: 0.0 };
+        assert_eq!(factor(right, 0.0), 0.0);
+        assert_eq!(factor(right, -1e-9), 0.0);
+        assert_eq!(factor(right, 1e-9), 1.0);
+        for cutoff in [PI, 180f32.to_radians(), PI.next_down().next_down(), PI.next_up()] {
+            let everywhere = SpotCone::Exponent { cutoff, exponent: 64.0 };
+            for cosine in [-1.0, 0.0, 0.3, 1.0] {
+                assert_eq!(factor(everywhere, cosine), 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn exponent_0_and_128() {
+        assert_eq!(factor(SpotCone::Exponent { cutoff: FRAC_PI_3, exponent: 0.0 }, 0.6), 1.0);
+        let sharp = factor(SpotCone::Exponent { cutoff: FRAC_PI_3, exponent: 128.0 }, 0.9);
+        assert!((sharp / 0.9f64.powi(128) - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_smooth_cone_is_the_square_of_a_linear_function() {
+        let cone = SpotCone::Smooth { inner: 0.0, outer: FRAC_PI_2 };
+        assert_eq!(factor(cone, 0.5), 0.25);
+        assert_eq!(factor(cone, 1.0), 1.0);
+        assert_eq!(factor(cone, -0.5), 0.0);
+    }
+
+    #[test]
+    fn equal_angles_leave_an_edge_a_thousandth_wide() {
+        let cone = SpotCone::Smooth { inner: FRAC_PI_3, outer: FRAC_PI_3 };
+        let outer = cone.cosines().outer;
+        assert_eq!(factor(cone, outer), 0.0);
+        assert!((factor(cone, outer + 0.0005) - 0.25).abs() < 1e-12);
+        assert_eq!(factor(cone, outer + 0.0011), 1.0);
+    }
+
+    #[test]
+    fn a_light_without_a_direction_is_off() {
+        // The cosine with a zero axis is 0.
+        assert_eq!(factor(SpotCone::Exponent { cutoff: 1.0, exponent: 0.0 }, 0.0), 0.0);
+        assert_eq!(factor(SpotCone::Smooth { inner: 0.1, outer: 1.0 }, 0.0), 0.0);
+    }
+}

@@ -1,0 +1,120 @@
+//! Blinn's model of 1977 after Torrance and Sparrow: D G F / (n·v), mirrors too small to see that shadow one
+//! another. Not `blinn_phong`, which keeps only its half vector.
+
+use glam::DVec3;
+
+use crate::fresnel::fresnel_dielectric;
+use crate::microfacets::distribution_trowbridge_reitz;
+use crate::normalization::{TINY_LENGTH_SQUARED, safe_normalize};
+
+/// Smallest n·v that is divided by, so that the factor is at most 10⁴ where light and viewer both graze the
+/// surface.
+pub const MINIMUM_VIEW_COSINE: f64 = 1e-4;
+
+/// G/(n·v) with G = min(1, 2 n·h n·v / v·h, 2 n·h n·l / v·h), from n·l, n·v and n·h of the half vector h, and
+/// v·h.
+///
+/// Each term is divided by n·v by itself, so that the second has no n·v left to vanish. Clamped to [0, 10⁴].
+pub fn geometric_attenuation(n_light: f64, n_viewer: f64, n_half: f64, v_half: f64) -> f64 {
+    let viewer = n_viewer.max(MINIMUM_VIEW_COSINE);
+    let ratio = 2.0 * n_half.max(0.0) / v_half.max(MINIMUM_VIEW_COSINE);
+    (1.0 / viewer).min(ratio).min(ratio * n_light.max(0.0) / viewer)
+}
+
+/// D G / (n·v) with the distribution of Trowbridge and Reitz, where light and viewer are in front, else 0:
+/// the model without its Fresnel factor, for conductors. All directions unit. In [0, 10⁴].
+pub fn torrance_sparrow_geometry(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
+    let (n_light, n_viewer) = (normal.dot(light), normal.dot(viewer));
+    if n_light <= 0.0 || n_viewer <= 0.0 {
+        return 0.0;
+    }
+    let sum = light + viewer;
+    let half = safe_normalize(sum);
+    let sine_squared = normal.cross(half).length_squared();
+    let distribution = distribution_trowbridge_reitz(sine_squared, shininess);
+    distribution * geometric_attenuation(n_light, n_viewer, normal.dot(half), cosine_to_half(sum))
+}
+
+/// v·h = l·h = |l + v|/2 for unit l and v: without the cancellation of v·(l + v) near l = -v.
+fn cosine_to_half(sum: DVec3) -> f64 {
+    0.5 * sum.length_squared().max(TINY_LENGTH_SQUARED).sqrt()
+}
+
+/// D G F / (n·v) for a dielectric of index `ior` in air, where light and viewer are in front of the surface,
+/// else 0.
+///
+/// `shininess` is the exponent of n·h at whose half-value angle D falls to a half. Used like the other
+/// specular factors: times k_s and the light's colour, not times n·l. Reciprocal as a reflectance: its
+/// product with n·v is symmetric in l and v.
+pub fn torrance_sparrow(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, ior: f64) -> f64 {
+    let fresnel = fresnel_dielectric(cosine_to_half(light + viewer), ior);
+    torrance_sparrow_geometry(normal, light, viewer, shininess) * fresnel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::microfacets::half_value_angle;
+
+    fn at(angle: f64) -> DVec3 {
+        DVec3::new(angle.sin(), angle.cos(), 0.0)
+    }
+
+    #[test]
+    fn straight_down_it_is_fresnel_alone() {
+        for shininess in [0.0, 1.0, 1e6] {
+            assert!((torrance_sparrow(DVec3::Y, DVec3::Y, DVec3::Y, shininess, 1.5) - 0.04).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn in_the_mirror_direction() {
+        // D = 1; n·h = 1 and v·h = cos θ, so G = min(1, 2) = 1.
+        for degrees in [10.0, 45.0, 80.0] {
+            let angle = f64::to_radians(degrees);
+            let expected = fresnel_dielectric(angle.cos(), 1.5) / angle.cos();
+            let got = torrance_sparrow(DVec3::Y, at(angle), at(-angle), 50.0, 1.5);
+            // n × h is a rounding, 2⁻⁵³, and the rest five operations, over a cosine of .17.
+            assert!((got / expected - 1.0).abs() < 1e-14, "{degrees}: {got} {expected}");
+        }
+    }
+
+    #[test]
+    fn off_the_mirror_direction_by_the_half_value_angle() {
+        // Light and viewer together at β: h = l = v, n·h = cos β, v·h = 1, so G = min(1, 2 cos² β).
+        let beta = half_value_angle(3.0);
+        let got = torrance_sparrow(DVec3::Y, at(beta), at(beta), 3.0, 1.5);
+        let expected = 0.5 * 0.04 * (2.0 * beta.cos().powi(2)).min(1.0) / beta.cos();
+        assert!((got / expected - 1.0).abs() < 1e-13, "{got} {expected}");
+    }
+
+    #[test]
+    fn masking_takes_over_when_it_grazes() {
+        // n·v = cos 85, light straight down: v·h = cos 42.5 = n·h, so G = 2 n·v and G/(n·v) = 2.
+        let viewer = f64::to_radians(85.0);
+        let got = geometric_attenuation(1.0, viewer.cos(), (0.5 * viewer).cos(), (0.5 * viewer).cos());
+        assert!((got - 2.0).abs() < 1e-15, "{got}");
+    }
+
+    #[test]
+    fn grazing_stays_bounded() {
+        for light_height in [1e-300, 1e-12, 1e-6, 1e-3, 1.0] {
+            for viewer_height in [1e-300, 1e-12, 1e-6, 1e-3, 1.0] {
+                let light = DVec3::new(1.0, light_height, 0.0).normalize();
+                let viewer = DVec3::new(-1.0, viewer_height, 0.0).normalize();
+                for shininess in [0.0, 1.0, 1e6] {
+                    let value = torrance_sparrow(DVec3::Y, light, viewer, shininess, 1.5);
+                    assert!((0.0..=1.0 / MINIMUM_VIEW_COSINE).contains(&value), "{light} {viewer}: {value}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn behind_the_surface_there_is_nothing() {
+        assert_eq!(torrance_sparrow(DVec3::Y, -DVec3::Y, DVec3::Y, 1.0, 1.5), 0.0);
+        assert_eq!(torrance_sparrow(DVec3::Y, DVec3::Y, -DVec3::Y, 1.0, 1.5), 0.0);
+        assert_eq!(torrance_sparrow(DVec3::ZERO, DVec3::Y, DVec3::Y, 1.0, 1.5), 0.0);
+        assert_eq!(torrance_sparrow(DVec3::Y, DVec3::Y, DVec3::ZERO, 1.0, 1.5), 0.0);
+    }
+}

@@ -1,0 +1,259 @@
+//! What holds for all inputs: finite, monotone, linear, symmetric, reciprocal.
+
+use glam::{DVec3, Vec3};
+use lumbre_optics::*;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+/// Every finite f64, the denormals and the largest included.
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -10.0..10.0f64,
+        2 => proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO,
+        1 => prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, f64::MIN_POSITIVE, f64::MAX, f64::MIN, 1e-300]),
+    ]
+}
+
+fn any_float() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        2 => -10.0..10.0f32,
+        2 => proptest::num::f32::NORMAL | proptest::num::f32::SUBNORMAL | proptest::num::f32::ZERO,
+        1 => prop::sample::select(vec![0.0, 1.0, f32::MIN_POSITIVE, f32::MAX, f32::MIN, std::f32::consts::FRAC_PI_2, std::f32::consts::PI]),
+    ]
+}
+
+fn any_vector() -> impl Strategy<Value = DVec3> {
+    [any_number(), any_number(), any_number()].prop_map(DVec3::from)
+}
+
+fn color() -> impl Strategy<Value = Vec3> {
+    [0.0..1.0f32, 0.0..1.0f32, 0.0..1.0f32].prop_map(Vec3::from)
+}
+
+/// Unit vectors, evenly over the sphere, and the zero vector.
+fn unit() -> impl Strategy<Value = DVec3> {
+    prop_oneof![
+        20 => (-1.0..1.0f64, 0.0..std::f64::consts::TAU).prop_map(|(z, azimuth)| {
+            let radius = (1.0 - z * z).sqrt();
+            DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
+        }),
+        1 => Just(DVec3::ZERO),
+        2 => prop::sample::select(vec![DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z]),
+    ]
+}
+
+/// Unit vectors above the plane with normal +Z.
+fn above() -> impl Strategy<Value = DVec3> {
+    (0.001..1.0f64, 0.0..std::f64::consts::TAU).prop_map(|(z, azimuth)| {
+        let radius = (1.0 - z * z).sqrt();
+        DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
+    })
+}
+
+fn shininess() -> impl Strategy<Value = f64> {
+    prop_oneof![Just(0.0), 0.0..1.0f64, 1.0..500.0f64, 500.0..1e6f64]
+}
+
+fn model() -> impl Strategy<Value = ReflectionModel> {
+    prop::sample::select(ReflectionModel::ALL.to_vec())
+}
+
+fn any_light() -> impl Strategy<Value = Light> {
+    let kind = prop::sample::select(vec![LightKind::Ambient, LightKind::Directional, LightKind::Point]);
+    let attenuation = ([any_float(), any_float(), any_float()], any::<bool>(), any_float()).prop_map(
+        |([constant, linear, quadratic], clamp, range)| Attenuation {
+            constant,
+            linear,
+            quadratic,
+            clamp,
+            range,
+        },
+    );
+    let cone = prop_oneof![
+        Just(None),
+        (any_float(), any_float())
+            .prop_map(|(cutoff, exponent)| Some(SpotCone::Exponent { cutoff, exponent })),
+        (any_float(), any_float()).prop_map(|(inner, outer)| Some(SpotCone::Smooth { inner, outer })),
+    ];
+    (kind, [color(), color(), color()], attenuation, cone).prop_map(
+        |(kind, [ambient, diffuse, specular], attenuation, spot)| Light {
+            kind,
+            ambient,
+            diffuse,
+            specular,
+            attenuation,
+            spot,
+            ..Light::point(Vec3::ONE)
+        },
+    )
+}
+
+fn any_surface() -> impl Strategy<Value = Surface> {
+    ([color(), color(), color(), color()], shininess()).prop_map(
+        |([ambient, diffuse, specular, emission], shininess)| Surface {
+            ambient,
+            diffuse,
+            specular,
+            emission,
+            shininess: shininess as f32,
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_function_is_finite_for_every_finite_input(
+        (a, b, c) in (any_vector(), unit(), unit()),
+        (x, y, z, w) in (any_number(), any_number(), any_number(), any_number()),
+        flag in any::<bool>(),
+    ) {
+        prop_assert!(safe_normalize(a).is_finite());
+        prop_assert!(safe_normalize(a).length() <= 1.0 + 1e-15);
+        prop_assert!((0.0..=1.0).contains(&safe_pow(x, y)));
+        prop_assert!((0.0..=1.0).contains(&power_of_cosine(x, y, z)));
+        prop_assert!((0.0..=1.0).contains(&lambert(b, c)));
+        prop_assert!((0.0..=1.0).contains(&spot_factor(flag, x, y, z)));
+        prop_assert!((0.0..=1e30).contains(&attenuate(a, flag, x, y)));
+        prop_assert!(fresnel_schlick(x, b).is_finite());
+        prop_assert!(transmitted_direction(b, c, x).is_finite());
+        prop_assert!((0.0..=1.0).contains(&transmitted_cosine(x, y)));
+        prop_assert!((0.0..=1.0).contains(&transmitted_highlight(b, c, -b, x, y)));
+        prop_assert!((0.0..=1.0).contains(&half_value_sine_squared(x)));
+        prop_assert!((0.0..=1.0).contains(&distribution_gaussian(x, y, z)));
+        prop_assert!((0.0..=1.0).contains(&distribution_trowbridge_reitz(x, y)));
+        prop_assert!((0.0..=1e4).contains(&geometric_attenuation(x, y, z, w)));
+        prop_assert!((0.0..=1.0).contains(&fog_linear(x, y, z)) || !(y - x).is_finite());
+        prop_assert!((0.0..=1.0).contains(&fog_exponential(x, y)));
+        prop_assert!((0.0..=1.0).contains(&fog_exponential_squared(x, y)));
+    }
+
+    #[test]
+    fn a_light_on_a_surface_is_finite_and_not_negative(
+        model in model(), light in any_light(), surface in any_surface(),
+        (position, point) in (any_vector(), any_vector()), (axis, normal, viewer) in (unit(), unit(), unit()),
+    ) {
+        let sample = evaluate_light(&light, position, axis, point);
+        prop_assert!((0.0..=1.0).contains(&sample.spot), "{:?}", sample);
+        prop_assert!(sample.attenuation.is_finite() && sample.attenuation >= 0.0, "{:?}", sample);
+        prop_assert!(sample.direction.is_finite());
+        let lit = light_contribution(model, &surface, &sample, normal, viewer);
+        for part in [lit.ambient, lit.diffuse, lit.specular] {
+            prop_assert!(part.is_finite() && part.min_element() >= 0.0, "{:?}", lit);
+        }
+    }
+
+    #[test]
+    fn attenuation_never_rises_with_the_distance(
+        coefficients in [0.0..10.0f64, 0.0..10.0f64, 0.0..10.0f64], clamp in any::<bool>(),
+        range in prop_oneof![Just(f64::INFINITY), 0.1..1e4f64], (near, far) in (0.0..1e4f64, 0.0..1e4f64),
+    ) {
+        let factor = |distance: f64| attenuate(DVec3::from(coefficients), clamp, range, distance);
+        prop_assert!(factor(near.min(far)) >= factor(near.max(far)));
+    }
+
+    #[test]
+    fn nothing_reaches_beyond_its_reach(
+        [constant, linear, quadratic] in [0.0..10.0f32, 0.0..10.0f32, 0.01..10.0f32], threshold in 1e-6..10.0f64,
+    ) {
+        let attenuation = Attenuation { constant, linear, quadratic, ..Attenuation::NONE };
+        let reach = attenuation.reach(threshold);
+        // A rounding or two in either formula.
+        prop_assert!(attenuation.factor(reach * (1.0 + 1e-12) + 1e-12) <= threshold * (1.0 + 1e-12));
+    }
+
+    #[test]
+    fn light_is_linear_in_its_colour(
+        model in model(), surface in any_surface(), (normal, viewer, axis) in (unit(), unit(), unit()), color in color(),
+    ) {
+        let lit = |color: Vec3| {
+            let light = Light { ambient: color, ..Light::directional(color) };
+            let sample = evaluate_light(&light, DVec3::ZERO, axis, DVec3::ZERO);
+            light_contribution(model, &surface, &sample, normal, viewer).total()
+        };
+        // Powers of two scale exactly.
+        prop_assert_eq!(lit(color * 4.0), lit(color) * 4.0);
+        // Channels do not mix.
+        prop_assert_eq!(lit(color * Vec3::X), lit(color) * DVec3::X);
+    }
+
+    #[test]
+    fn the_order_of_the_lights_does_not_matter(
+        model in model(), surface in any_surface(), (normal, viewer) in (unit(), unit()),
+        lights in prop::collection::vec((color(), unit()), 0..8),
+    ) {
+        let samples: Vec<LightSample> = lights
+            .iter()
+            .map(|(color, axis)| evaluate_light(&Light::directional(*color), DVec3::ZERO, *axis, DVec3::ZERO))
+            .collect();
+        let there = shade(model, &surface, DVec3::ONE, samples.iter().copied(), normal, viewer).total();
+        let back = shade(model, &surface, DVec3::ONE, samples.iter().rev().copied(), normal, viewer).total();
+        // Eight additions of non-negative numbers, each rounded by 2⁻⁵³ of the sum.
+        prop_assert!((there - back).abs().max_element() <= 2e-15 * (1.0 + there.max_element()));
+    }
+
+    #[test]
+    fn phong_and_blinn_are_reciprocal((light, viewer) in (above(), above()), shininess in 0.0..500.0f64) {
+        for model in [phong, blinn_phong, blinn_phong_4n] {
+            let there = model(DVec3::Z, light, viewer, shininess);
+            let back = model(DVec3::Z, viewer, light, shininess);
+            // The cosine's rounding, a few 2⁻⁵³, times an exponent of up to 2000.
+            prop_assert!((there - back).abs() < 2e-12, "{} {}", there, back);
+        }
+    }
+
+    #[test]
+    fn torrance_sparrow_is_reciprocal_as_a_reflectance(
+        (light, viewer) in (above(), above()), shininess in shininess(), ior in 1.0..3.0f64,
+    ) {
+        let there = torrance_sparrow(DVec3::Z, light, viewer, shininess, ior) * viewer.z;
+        let back = torrance_sparrow(DVec3::Z, viewer, light, shininess, ior) * light.z;
+        // Relative: D's slope is at most the square root of n times the angle's rounding, 10³ · 2⁻⁵³.
+        prop_assert!((there - back).abs() <= 1e-12 * there.max(1e-30), "{} {}", there, back);
+    }
+
+    #[test]
+    fn what_is_reflected_and_transmitted_is_all(angle in 0.0..1.57f64, eta in 0.3..3.0f64) {
+        // In the direction reversed, the same part is reflected.
+        let (sine, cosine) = angle.sin_cos();
+        prop_assume!((sine / eta - 1.0).abs() > 1e-9);
+        let there = fresnel_dielectric(cosine, eta);
+        if is_totally_reflected(sine, eta) {
+            prop_assert_eq!(there, 1.0);
+        } else {
+            let back = fresnel_dielectric(transmitted_cosine(sine, eta), 1.0 / eta);
+            // The cosine beyond is a root: 2⁻⁵³ over its value, 4·10⁻⁵ at the assumption's bound.
+            prop_assert!((there - back).abs() < 1e-10, "{} {}", there, back);
+        }
+    }
+
+    #[test]
+    fn transmitted_light_obeys_snell(normal in unit(), light in unit(), eta in 0.3..3.0f64) {
+        let light = if normal.dot(light) < 0.0 { -light } else { light };
+        prop_assume!(normal.dot(light) > 1e-3);
+        if let Some(direction) = try_transmitted_direction(normal, light, eta) {
+            let (before, after) = (normal.cross(light), normal.cross(direction));
+            // n × l = -eta n × t: the same plane and the law of sines in one.
+            prop_assert!((before + eta * after).length() < 1e-14);
+            prop_assert!(normal.dot(direction) <= 0.0 && (direction.length() - 1.0).abs() < 1e-15);
+        } else {
+            prop_assert!(normal.cross(light).length() > eta);
+        }
+    }
+
+    #[test]
+    fn fog_never_lifts_with_the_distance(
+        (near, far) in (0.0..1e3f64, 0.0..1e3f64), (start, depth) in (0.0..100.0f32, 0.0..100.0f32), density in 0.0..1.0f32,
+    ) {
+        let end = start + depth;
+        for mode in [
+            FogMode::Linear { start, end },
+            FogMode::Exponential { density },
+            FogMode::ExponentialSquared { density },
+            FogMode::DepthCue { start, end, near_weight: 0.9, far_weight: 0.2 },
+        ] {
+            prop_assert!(fog_weight(&mode, near.min(far)) >= fog_weight(&mode, near.max(far)));
+        }
+    }
+}

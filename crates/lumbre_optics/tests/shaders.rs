@@ -1,0 +1,185 @@
+//! Every file of `shaders/optics` compiles under every feature it knows, passes naga's validator, holds
+//! nothing that its features did not call for, and takes its arguments in the order of its Rust twin.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use lumbre_optics::{FogMode, ReflectionModel};
+use wesl::Wesl;
+
+fn shaders() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders")
+}
+
+/// The names of the shader files, without their ending, in alphabetical order.
+fn stems() -> Vec<String> {
+    let mut stems: Vec<String> = std::fs::read_dir(shaders().join("optics"))
+        .expect("shaders/optics is part of the source")
+        .map(|entry| entry.expect("a readable entry").path())
+        .inspect(|path| {
+            assert_eq!(path.extension().and_then(|e| e.to_str()), Some("wesl"), "{}", path.display())
+        })
+        .map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned())
+        .collect();
+    stems.sort();
+    stems
+}
+
+/// One file and all that it imports, as WGSL.
+fn compile(stem: &str, features: &[&str]) -> String {
+    let mut compiler = Wesl::new(shaders());
+    compiler.use_stripping(false);
+    for feature in features {
+        compiler.set_feature(feature, true);
+    }
+    let path = format!("package::optics::{stem}").parse().expect("a module path");
+    compiler.compile(&path).unwrap_or_else(|error| panic!("{stem} with {features:?}: {error}")).to_string()
+}
+
+fn validate(name: &str, source: &str) {
+    let module = naga::front::wgsl::parse_str(source)
+        .unwrap_or_else(|error| panic!("{name}: {}\n{source}", error.emit_to_string(source)));
+    let mut validator =
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+    validator.validate(&module).unwrap_or_else(|error| panic!("{name}: {error:?}\n{source}"));
+}
+
+fn reflection_features() -> Vec<&'static str> {
+    ReflectionModel::ALL.iter().map(|model| model.shader_feature()).collect()
+}
+
+fn fog_features() -> Vec<&'static str> {
+    let modes = [
+        FogMode::Linear { start: 0.0, end: 1.0 },
+        FogMode::Exponential { density: 1.0 },
+        FogMode::ExponentialSquared { density: 1.0 },
+        FogMode::DepthCue { start: 0.0, end: 1.0, near_weight: 1.0, far_weight: 0.0 },
+    ];
+    modes.iter().map(FogMode::shader_feature).collect()
+}
+
+/// The kinds of light that `evaluate_light` can be compiled for.
+const LIGHT_FEATURES: [&str; 4] = ["AMBIENT_LIGHTS", "DIRECTIONAL_LIGHTS", "POINT_LIGHTS", "SPOT_LIGHTS"];
+
+#[test]
+fn every_set_of_light_kinds_compiles_and_holds_nothing_else() {
+    for set in 0..1u32 << LIGHT_FEATURES.len() {
+        let features: Vec<&str> = (0..LIGHT_FEATURES.len())
+            .filter(|bit| set >> bit & 1 == 1)
+            .map(|bit| LIGHT_FEATURES[bit])
+            .collect();
+        let mut compiler = Wesl::new(shaders());
+        compiler.keep_declarations(vec!["evaluate_light".to_owned()]);
+        for feature in &features {
+            compiler.set_feature(feature, true);
+        }
+        let path = "package::optics::evaluate_light".parse().expect("a module path");
+        let source = compiler.compile(&path).unwrap_or_else(|e| panic!("{features:?}: {e}")).to_string();
+        validate(&format!("evaluate_light {features:?}"), &source);
+        for (function, feature) in [("attenuate", "POINT_LIGHTS"), ("spot_factor", "SPOT_LIGHTS")] {
+            assert_eq!(source.contains(function), features.contains(&feature), "{features:?}\n{source}");
+        }
+    }
+}
+
+#[test]
+fn every_file_compiles_and_validates_for_each_feature() {
+    let stems = stems();
+    assert!(stems.len() >= 17, "{stems:?}");
+    for stem in stems {
+        let choices = match stem.as_str() {
+            "shade" => reflection_features(),
+            "fog" => fog_features(),
+            "evaluate_light" => LIGHT_FEATURES.to_vec(),
+            _ => vec![""],
+        };
+        for choice in choices {
+            for sharp in ["", "SHARP_HIGHLIGHTS"] {
+                validate(&format!("{stem} {choice} {sharp}"), &compile(&stem, &[choice, sharp]));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_shade_variant_holds_no_other_models_functions() {
+    let functions: BTreeMap<&str, &[&str]> = BTreeMap::from([
+        ("REFLECTION_PHONG", &["reflected_direction"][..]),
+        ("REFLECTION_BLINN", &["half_vector"][..]),
+        ("REFLECTION_BLINN_4N", &["blinn_phong_4n"][..]),
+        ("REFLECTION_BLINN_MATCHED", &["blinn_phong_matched"][..]),
+        ("REFLECTION_TORRANCE_SPARROW", &["fresnel_dielectric", "geometric_attenuation"][..]),
+    ]);
+    for feature in reflection_features() {
+        let mut compiler = Wesl::new(shaders());
+        compiler.set_feature(feature, true).keep_declarations(vec!["light_contribution".to_owned()]);
+        let path = "package::optics::shade".parse().expect("a module path");
+        let source = compiler.compile(&path).expect("compiled above too").to_string();
+        for own in functions[feature] {
+            assert!(source.contains(own), "{feature} lacks {own}");
+        }
+        // The half vector is shared by Blinn's three; everything else belongs to one model only.
+        for foreign in
+            ["reflected_direction", "blinn_phong_4n", "blinn_phong_matched", "fresnel", "geometric"]
+        {
+            let owned = functions[feature].iter().any(|own| own.starts_with(foreign));
+            assert_eq!(source.contains(foreign), owned, "{feature}: {foreign}\n{source}");
+        }
+        assert!(!source.contains("power_of_cosine("), "{feature} pays for sharp highlights\n{source}");
+    }
+}
+
+/// The functions of a source file and the names of their arguments.
+fn signatures(source: &str) -> BTreeMap<String, Vec<String>> {
+    let mut found = BTreeMap::new();
+    // Tests come last in every file and have no twin.
+    let source = source.split("#[cfg(test)]").next().unwrap_or_default();
+    for piece in source.split("fn ").skip(1) {
+        let Some((name, rest)) = piece.split_once('(') else { continue };
+        let Some((arguments, _)) = rest.split_once(')') else { continue };
+        if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            continue;
+        }
+        let names = arguments
+            .split(',')
+            .filter_map(|argument| argument.split_once(':').map(|(name, _)| name.trim().to_owned()))
+            .collect();
+        found.insert(name.to_owned(), names);
+    }
+    found
+}
+
+#[test]
+fn twins_have_the_same_names_and_arguments() {
+    // Where Rust takes the choice as an argument, WESL takes it as a feature or a struct.
+    let choices = ["model", "mode", "parameters", "light_position", "light_axis"];
+    // Called by a public twin, in f64 a library function, a closure or an operator.
+    let helpers = [
+        "is_point_light",
+        "squared_length",
+        "logarithm_of_one_minus",
+        "one_minus_exp",
+        "fog_fraction",
+        "fresnel_conductor_channel",
+    ];
+    let mut twins = 0;
+    for stem in stems() {
+        let read = |path: PathBuf| {
+            std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+        };
+        let shader = signatures(&read(shaders().join("optics").join(format!("{stem}.wesl"))));
+        let rust = signatures(&read(Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("src/{stem}.rs"))));
+        for (name, arguments) in shader {
+            if helpers.contains(&name.as_str()) {
+                continue;
+            }
+            let twin = rust.get(&name).unwrap_or_else(|| panic!("{stem}.rs has no {name}"));
+            let plain = |names: &[String]| -> Vec<String> {
+                names.iter().filter(|name| !choices.contains(&name.as_str())).cloned().collect()
+            };
+            assert_eq!(plain(&arguments), plain(twin), "{stem}: {name}");
+            twins += 1;
+        }
+    }
+    assert!(twins >= 40, "only {twins} twins were found: the reader of signatures is broken");
+}
