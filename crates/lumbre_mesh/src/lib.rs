@@ -1,0 +1,41 @@
+//! Indexed triangle meshes and what lighting needs of them: normals, neighbourhoods, shapes, lightmap coordinates.
+//!
+//! No ECS, no GPU, no files: `glam` in, `glam` out.
+//!
+//! ```text
+//!   shapes ─────────┐                ┌─► normals (flat, smooth)
+//!                   ├─► TriangleMesh ┼─► flat (triangle, normal, centroid)
+//!   a file's mesh ──┘                ├─► weld ─► adjacency
+//!                                    └─► unwrap ─► charts ─► atlas ─► uv1 ─► uv_validation
+//! ```
+//!
+//! ```
+//! use lumbre_mesh::{UnwrapOptions, shapes, unwrap, uv_validation::validate_uv1};
+//!
+//! let room = shapes::cuboid(glam::Vec3::new(4.0, 2.5, 3.0), 1);
+//! // 16 texels per metre; the mesh stands in the world as it is.
+//! let unwrapped = unwrap(&room, &room.positions, 16.0, UnwrapOptions::default())?;
+//! assert_eq!(unwrapped.charts.len(), 6);
+//! let report = validate_uv1(&unwrapped.mesh, unwrapped.width, unwrapped.height)?;
+//! assert!(report.is_sound());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod adjacency;
+pub mod atlas;
+mod bounding_rectangle;
+mod chart;
+pub mod flat;
+pub mod normals;
+mod planar_overlap;
+pub mod shapes;
+mod triangle_mesh;
+mod unwrap;
+pub mod uv_validation;
+mod vertex_split;
+mod weld;
+
+pub use adjacency::Adjacency;
+pub use triangle_mesh::{MeshError, TriangleMesh};
+pub use unwrap::{Chart, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
+pub use weld::weld_positions;

@@ -1,0 +1,117 @@
+//! The indexed triangle mesh that every other crate reads. Not its neighbourhoods: those are `adjacency`.
+
+use glam::{Vec2, Vec3, Vec4};
+
+/// An indexed triangle mesh. An attribute vector is either empty (absent) or as long as `positions`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Positions in metres.
+    pub positions: Vec<Vec3>,
+    /// Unit normals. A zero vector marks a normal that could not be computed.
+    pub normals: Vec<Vec3>,
+    /// TEXCOORD_0: material textures.
+    pub uv0: Vec<Vec2>,
+    /// TEXCOORD_1: lightmap, in [0, 1].
+    pub uv1: Vec<Vec2>,
+    /// Linear RGBA vertex colours.
+    pub colors: Vec<Vec4>,
+    /// Three per triangle, counter-clockwise seen from the front.
+    pub indices: Vec<u32>,
+}
+
+impl TriangleMesh {
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.indices.len() / 3
+    }
+
+    /// The vertex indices of every triangle.
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]])
+    }
+
+    /// The corners of every triangle, in metres: what a hierarchy for ray casting is built from.
+    ///
+    /// # Errors
+    /// [`MeshError`] where the mesh does not [validate](Self::validate).
+    pub fn triangle_positions(&self) -> Result<Vec<[Vec3; 3]>, MeshError> {
+        self.validate()?;
+        Ok(self.triangles().map(|t| t.map(|vertex| self.positions[vertex as usize])).collect())
+    }
+
+    /// Checks that the indices come in threes and in range, and that attributes are as long as the positions.
+    ///
+    /// Positions may be NaN and triangles without area: each algorithm says what it does with those.
+    ///
+    /// # Errors
+    /// The first [`MeshError`] found.
+    pub fn validate(&self) -> Result<(), MeshError> {
+        if !self.indices.len().is_multiple_of(3) {
+            return Err(MeshError::IncompleteTriangle { indices: self.indices.len() });
+        }
+        let vertices = self.positions.len();
+        if let Some(at) = self.indices.iter().position(|&index| index as usize >= vertices) {
+            return Err(MeshError::IndexOutOfRange { triangle: at / 3, index: self.indices[at], vertices });
+        }
+        for (attribute, found) in [
+            ("normals", self.normals.len()),
+            ("uv0", self.uv0.len()),
+            ("uv1", self.uv1.len()),
+            ("colors", self.colors.len()),
+        ] {
+            if found != 0 && found != vertices {
+                return Err(MeshError::AttributeLength { attribute, found, vertices });
+            }
+        }
+        Ok(())
+    }
+
+    /// A mesh whose vertices are copies of this one's, in the order of `sources`; every attribute comes along.
+    ///
+    /// `sources` must hold valid vertices and `indices` refer to `sources`.
+    pub(crate) fn with_vertices(&self, sources: &[u32], indices: Vec<u32>) -> Self {
+        fn copy<T: Copy>(values: &[T], sources: &[u32]) -> Vec<T> {
+            if values.is_empty() { Vec::new() } else { sources.iter().map(|&s| values[s as usize]).collect() }
+        }
+        Self {
+            positions: copy(&self.positions, sources),
+            normals: copy(&self.normals, sources),
+            uv0: copy(&self.uv0, sources),
+            uv1: copy(&self.uv1, sources),
+            colors: copy(&self.colors, sources),
+            indices,
+        }
+    }
+}
+
+/// Why a mesh cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// The number of indices is not a multiple of 3.
+    #[error("{indices} indices do not make whole triangles; give three per triangle")]
+    IncompleteTriangle {
+        /// Number of indices found.
+        indices: usize,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} uses vertex {index}, but the mesh has {vertices} vertices")]
+    IndexOutOfRange {
+        /// The triangle.
+        triangle: usize,
+        /// The index it uses.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// An attribute is neither absent nor one per vertex.
+    #[error("{attribute} has {found} entries for {vertices} vertices; give one per vertex or none")]
+    AttributeLength {
+        /// Field of [`TriangleMesh`], or `metric positions`.
+        attribute: &'static str,
+        /// Its length.
+        found: usize,
+        /// Number of vertices.
+        vertices: usize,
+    },
+}

@@ -1,0 +1,213 @@
+//! Shapes against closed forms: counts, Euler's formula, areas, normals; and the normals of meshes.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::Vec3;
+use lumbre_mesh::flat::flat_triangles;
+use lumbre_mesh::normals::{NormalWeight, compute_flat_normals, compute_smooth_normals, face_normal};
+use lumbre_mesh::{Adjacency, TriangleMesh, shapes, weld_positions};
+
+fn area(mesh: &TriangleMesh) -> f64 {
+    mesh.triangle_positions()
+        .expect("a sound shape")
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|p| p.as_dvec3());
+            0.5 * (b - a).cross(c - a).length()
+        })
+        .sum()
+}
+
+/// Signed volume by the divergence theorem: positive where the faces look outward.
+fn volume(mesh: &TriangleMesh) -> f64 {
+    let triangles = mesh.triangle_positions().expect("a sound shape");
+    triangles.iter().map(|t| t.map(|p| p.as_dvec3())).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}
+
+/// Points, V - E + F, and whether every edge has two triangles, after welding.
+fn topology(mesh: &TriangleMesh) -> (usize, i64, bool) {
+    mesh.validate().expect("a sound shape");
+    let welded = weld_positions(&mesh.positions);
+    let points = welded.iter().enumerate().filter(|&(i, &p)| i == p as usize).count();
+    let triangles: Vec<[u32; 3]> = mesh.triangles().map(|t| t.map(|v| welded[v as usize])).collect();
+    let adjacency = Adjacency::new(&triangles, mesh.positions.len());
+    let euler = points as i64 - adjacency.edge_count() as i64 + triangles.len() as i64;
+    (points, euler, adjacency.edge_valences().keys().eq([&2]))
+}
+
+/// The largest angle between a vertex normal and its face, in degrees; also checks that they are unit vectors.
+fn normal_deviation(mesh: &TriangleMesh) -> f64 {
+    let mut largest = 0.0f64;
+    for triangle in mesh.triangles() {
+        let face =
+            face_normal(&triangle.map(|v| mesh.positions[v as usize])).expect("a sound shape").as_dvec3();
+        for vertex in triangle {
+            let normal = mesh.normals[vertex as usize].as_dvec3();
+            assert!((normal.length() - 1.0).abs() < 1e-6);
+            largest = largest.max(normal.angle_between(face).to_degrees());
+        }
+    }
+    largest
+}
+
+#[test]
+fn the_sphere_from_a_tetrahedron() {
+    // The tetrahedron in the unit sphere: edge sqrt(8/3), area 8 / sqrt(3), volume 8 sqrt(3) / 27.
+    let tetrahedron = shapes::tetrahedral_sphere(1.0, 0, false);
+    assert!((area(&tetrahedron) - 8.0 / 3f64.sqrt()).abs() < 1e-6);
+    assert!((volume(&tetrahedron) - 8.0 * 3f64.sqrt() / 27.0).abs() < 1e-6);
+    assert!(tetrahedron.positions.iter().all(|p| *p == Vec3::Z || (p.z + 1.0 / 3.0).abs() < 1e-7));
+    let mut last_error = f64::INFINITY;
+    for depth in 0..7u32 {
+        let smooth = shapes::tetrahedral_sphere(2.0, depth, false);
+        assert_eq!(smooth.triangle_count(), 4usize.pow(depth + 1));
+        assert_eq!(topology(&smooth), (2 * 4usize.pow(depth) + 2, 2, true));
+        for (position, normal) in smooth.positions.iter().zip(&smooth.normals) {
+            assert!((position.as_dvec3() - normal.as_dvec3() * 2.0).length() < 1e-6);
+            assert!((position.as_dvec3().length() - 2.0).abs() < 1e-6);
+        }
+        // Inscribed: below 4 pi r^2 and ever closer. Each halving of the edges quarters the error in the limit.
+        let error = 1.0 - area(&smooth) / (4.0 * PI * 4.0);
+        assert!(error > 0.0 && error < last_error * if depth < 3 { 0.75 } else { 0.3 }, "{error}");
+        last_error = error;
+        let flat = shapes::tetrahedral_sphere(2.0, depth, true);
+        assert_eq!(flat.positions.len(), 3 * flat.triangle_count());
+        assert!(normal_deviation(&flat) < 0.05);
+        assert!((area(&flat) - area(&smooth)).abs() < 1e-9);
+    }
+    assert!(last_error < 2e-3, "{last_error}");
+}
+
+#[test]
+fn the_sphere_of_990_triangles_and_497_points() {
+    let sphere = shapes::uv_sphere(1.0, 33, 16);
+    assert_eq!(sphere.triangle_count(), 990);
+    assert_eq!(topology(&sphere), (497, 2, true));
+    // Inscribed in 4/3 pi: the deficit is about (1 / 6) (pi / 16)^2 + (1 / 6) (2 pi / 33)^2 * 2, or 1.9 %.
+    assert!((volume(&sphere) / (4.0 / 3.0 * PI) - 1.0).abs() < 0.025);
+    for (position, normal) in sphere.positions.iter().zip(&sphere.normals) {
+        assert_eq!(position, normal);
+    }
+}
+
+#[test]
+fn texture_coordinates_run_on_and_never_flip_on_spheres() {
+    // The tetrahedron's lower pole lies inside a triangle, where no three longitudes are right.
+    for (mesh, around_a_pole) in
+        [(shapes::uv_sphere(1.0, 24, 12), 0), (shapes::tetrahedral_sphere(1.0, 4, false), 1)]
+    {
+        let mut wide = 0;
+        for triangle in mesh.triangles() {
+            let [a, b, c] = triangle.map(|v| mesh.uv0[v as usize]);
+            // v runs down, so counter-clockwise on the surface is clockwise in texture space.
+            assert!((b - a).perp_dot(c - a) < 1e-6, "{a} {b} {c}");
+            let span = a.x.max(b.x).max(c.x) - a.x.min(b.x).min(c.x);
+            wide += usize::from(span > 0.5);
+        }
+        assert_eq!(wide, around_a_pole);
+    }
+}
+
+#[test]
+fn box_plane_cylinder_cone_and_torus() {
+    let cuboid = shapes::cuboid(Vec3::new(2.0, 3.0, 5.0), 4);
+    assert_eq!(topology(&cuboid), (98, 2, true)); // 6 n^2 + 2
+    assert!((area(&cuboid) - 62.0).abs() < 1e-5 && (volume(&cuboid) - 30.0).abs() < 1e-5);
+    assert!(normal_deviation(&cuboid) < 1e-3);
+
+    let plane = shapes::plane(4.0, 2.0, 8, 3);
+    assert_eq!((plane.triangle_count(), plane.positions.len()), (48, 36));
+    assert!((area(&plane) - 8.0).abs() < 1e-6 && normal_deviation(&plane) == 0.0);
+    assert_eq!(plane.normals[0], Vec3::Y);
+
+    // A prism over the inscribed n-gon of area n/2 sin(2 pi / n).
+    let n = 40.0;
+    let polygon = n / 2.0 * (TAU / n).sin();
+    let cylinder = shapes::cylinder(0.5, 2.0, 40);
+    assert_eq!(topology(&cylinder), (82, 2, true));
+    assert!((volume(&cylinder) - polygon * 0.25 * 2.0).abs() < 1e-5);
+    assert!((normal_deviation(&cylinder) - 180.0 / n).abs() < 1e-3);
+
+    let cone = shapes::cone(0.5, 2.0, 40);
+    assert_eq!(topology(&cone), (42, 2, true));
+    assert!((volume(&cone) - polygon * 0.25 * 2.0 / 3.0).abs() < 1e-5);
+    for (position, normal) in cone.positions.iter().zip(&cone.normals).filter(|(_, n)| n.y > -0.5) {
+        // The slope: the normal is perpendicular to the line to the apex.
+        let to_apex = Vec3::Y - *position;
+        assert!(normal.dot(to_apex).abs() < 1e-6 && (normal.y - 0.5 / 4.25f32.sqrt()).abs() < 1e-6);
+    }
+
+    // Pappus, for the inscribed torus with its two deficits below one percent each.
+    let torus = shapes::torus(2.0, 0.5, 64, 48);
+    assert_eq!(topology(&torus), (64 * 48, 0, true));
+    let exact = 2.0 * PI * PI * 2.0 * 0.25;
+    assert!(volume(&torus) < exact && volume(&torus) > exact * 0.99);
+}
+
+#[test]
+fn counts_out_of_range_are_clamped() {
+    assert_eq!(shapes::uv_sphere(1.0, 0, 0).triangle_count(), 6);
+    assert_eq!(shapes::plane(1.0, 1.0, 0, 0).triangle_count(), 2);
+    assert_eq!(shapes::cylinder(1.0, 1.0, 1).triangle_count(), 12);
+    assert_eq!(shapes::plane(1.0, 1.0, u32::MAX, 1).triangle_count(), 2 * shapes::MAX_SEGMENTS as usize);
+    // No extent: no triangle, and nothing that is not finite.
+    assert!(shapes::cone(0.0, 0.0, 8).normals.iter().all(|n| n.is_finite()));
+}
+
+#[test]
+fn averaged_normals() {
+    // A cube's corner has three faces, one to two triangles each; only the angle weight does not see the cut.
+    let cube = shapes::cuboid(Vec3::ONE, 1);
+    let bare = TriangleMesh { normals: Vec::new(), ..cube };
+    let smooth = |mesh: &TriangleMesh, weight| compute_smooth_normals(mesh, weight).unwrap().normals;
+    for (normal, position) in smooth(&bare, NormalWeight::Angle).iter().zip(&bare.positions) {
+        assert!((*normal - position.normalize()).length() < 1e-6);
+    }
+    let uniform = smooth(&bare, NormalWeight::Uniform);
+    assert!(uniform.iter().zip(&bare.positions).any(|(n, p)| (*n - p.normalize()).length() > 0.1));
+
+    // Two faces of areas 1/2 and 2 at a right angle along x: weights show in the ratio of the components.
+    let wedge = TriangleMesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z * 4.0],
+        indices: vec![0, 1, 2, 0, 3, 1],
+        ..TriangleMesh::default()
+    };
+    let by_area = Vec3::new(0.0, 4.0, 1.0).normalize();
+    assert!((smooth(&wedge, NormalWeight::Area)[0] - by_area).length() < 1e-7);
+    let half = Vec3::new(0.0, 1.0, 1.0).normalize();
+    assert!((smooth(&wedge, NormalWeight::Uniform)[0] - half).length() < 1e-7);
+    assert!((smooth(&wedge, NormalWeight::Angle)[0] - half).length() < 1e-7);
+    // At vertex 1 the angles are 45 degrees and atan 4.
+    let angles = Vec3::new(0.0, 4f32.atan(), std::f32::consts::FRAC_PI_4).normalize();
+    assert!((smooth(&wedge, NormalWeight::Angle)[1] - angles).length() < 1e-6);
+
+    // The sphere's averaged normals approach the sphere's.
+    let sphere = shapes::tetrahedral_sphere(1.0, 5, false);
+    for weight in [NormalWeight::Uniform, NormalWeight::Area, NormalWeight::Angle] {
+        let normals = smooth(&sphere, weight);
+        let worst = normals.iter().zip(&sphere.normals).map(|(n, s)| n.angle_between(*s)).fold(0.0, f32::max);
+        assert!(worst.to_degrees() < 3.0, "{weight:?}: {worst}");
+    }
+}
+
+#[test]
+fn normals_that_cannot_be_computed() {
+    // A face and its own back cancel: the first face decides. A lone sliver has none: zero.
+    let mesh = TriangleMesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NAN, Vec3::Z],
+        indices: vec![0, 1, 2, 0, 2, 1, 3, 4, 4],
+        ..TriangleMesh::default()
+    };
+    for weight in [NormalWeight::Uniform, NormalWeight::Area, NormalWeight::Angle] {
+        let normals = compute_smooth_normals(&mesh, weight).unwrap().normals;
+        assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::ZERO]);
+    }
+    let flat = compute_flat_normals(mesh.clone());
+    assert_eq!((flat.positions.len(), flat.normals[3], flat.normals[8]), (9, Vec3::NEG_Z, Vec3::ZERO));
+    assert_eq!(compute_flat_normals(flat.clone()).normals, flat.normals);
+    assert_eq!(flat_triangles(&flat).count(), 3);
+    // Sizes at both ends of f32 have normals: the cross product is taken in f64.
+    for size in [1e-30f32, 1e30] {
+        assert_eq!(face_normal(&[Vec3::ZERO, Vec3::X * size, Vec3::Y * size]), Some(Vec3::Z));
+    }
+}

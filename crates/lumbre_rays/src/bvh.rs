@@ -1,0 +1,101 @@
+//! The bounding volume hierarchy and its questions: the closest hit, any hit. Not the tree's layout (`build`).
+
+use glam::Vec3;
+
+use crate::build::WideTree;
+use crate::canonical_scale::CanonicalScale;
+use crate::ray_setup::RaySetup;
+use crate::{Hit, Ray};
+
+/// A hierarchy over triangles, immutable once built and shared freely between threads.
+///
+/// Scaling triangles and rays by a power of two leaves every answer bit-identical (distances scaled exactly).
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    tree: WideTree,
+    scale: CanonicalScale,
+    /// Canonical corners of the box around all triangles.
+    bounds: [Vec3; 2],
+    skipped: Vec<u32>,
+}
+
+impl Bvh {
+    /// Builds over counter-clockwise triangles in metres; a hit names a triangle by its place in this list.
+    ///
+    /// Triangles with a NaN or infinite coordinate or without area can be hit by no ray; they are left out
+    /// and listed by [`skipped`](Self::skipped). An empty list gives a hierarchy that nothing hits.
+    /// At most 2^29 triangles are taken; those after are listed as skipped.
+    pub fn build(triangles: &[[Vec3; 3]]) -> Self {
+        const MOST_TRIANGLES: usize = 1 << 29;
+        let (mut kept, mut skipped) = (Vec::with_capacity(triangles.len()), Vec::new());
+        let mut largest = 0.0f32;
+        for (index, triangle) in triangles.iter().enumerate() {
+            let index = u32::try_from(index).unwrap_or(u32::MAX);
+            if has_area(triangle) && kept.len() < MOST_TRIANGLES {
+                kept.push((index, *triangle));
+                largest = triangle.iter().fold(largest, |size, vertex| size.max(vertex.abs().max_element()));
+            } else {
+                skipped.push(index);
+            }
+        }
+        let scale = CanonicalScale::for_largest(largest);
+        let mut bounds = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        for (_, triangle) in &mut kept {
+            *triangle = triangle.map(|vertex| scale.canonical(vertex));
+            for &vertex in triangle.iter() {
+                bounds = [bounds[0].min(vertex), bounds[1].max(vertex)];
+            }
+        }
+        if kept.is_empty() {
+            bounds = [Vec3::ZERO; 2];
+        }
+        Self { tree: WideTree::build(&kept), scale, bounds, skipped }
+    }
+
+    /// Indices of the triangles that were left out, ascending.
+    pub fn skipped(&self) -> &[u32] {
+        &self.skipped
+    }
+
+    /// The two corners of the box around all triangles, in metres; both zero if there are none.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.bounds.map(|corner| corner * self.scale.to_world)
+    }
+
+    /// The nearest triangle within the ray's range; at equal distances the one first in the list.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_hit_filtered(ray, |_, _, _| true)
+    }
+
+    /// The nearest triangle for which `accept(triangle, u, v)` holds: alpha masks, one-sided surfaces.
+    ///
+    /// `accept` is asked in no particular order, and also for hits that prove not to be the nearest.
+    pub fn closest_hit_filtered(&self, ray: &Ray, accept: impl Fn(u32, f32, f32) -> bool) -> Option<Hit> {
+        self.trace::<false>(ray, accept)
+    }
+
+    /// Whether any triangle lies within the ray's range: shadow rays.
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        self.any_hit_filtered(ray, |_, _, _| true)
+    }
+
+    /// Whether any triangle for which `accept(triangle, u, v)` holds lies within the ray's range.
+    pub fn any_hit_filtered(&self, ray: &Ray, accept: impl Fn(u32, f32, f32) -> bool) -> bool {
+        self.trace::<true>(ray, accept).is_some()
+    }
+
+    #[inline]
+    fn trace<const ANY: bool>(&self, ray: &Ray, accept: impl Fn(u32, f32, f32) -> bool) -> Option<Hit> {
+        let setup = RaySetup::new(ray, self.scale.to_canonical, &self.bounds)?;
+        let hit = self.tree.trace::<ANY, _>(&setup, accept)?;
+        Some(Hit { distance: hit.distance * self.scale.to_world, ..hit })
+    }
+}
+
+/// Finite, and with a normal that is not exactly zero.
+fn has_area(triangle: &[Vec3; 3]) -> bool {
+    let [a, b, c] = triangle.map(|vertex| vertex.as_dvec3());
+    // In f64 the differences are exact or nearly so, and the products of f32 sizes neither overflow nor vanish.
+    let normal = (b - a).cross(c - a);
+    triangle.iter().all(|vertex| vertex.is_finite()) && normal.length_squared() > 0.0
+}
