@@ -1,0 +1,112 @@
+//! Compiling: from declarations to a plan, without a device. Each stage is a file of its own:
+//!
+//! ```text
+//! names ─► shapes ─► order ─► flow ─► retain ─► cull ─► merge ─► alias
+//! unique   formats   cycle    what a  what is   who is  one wgpu  memory
+//!          sizes     or sort  version unchanged needed  pass      in turns
+//!                             holds
+//! ```
+
+mod alias;
+mod content;
+mod cull;
+mod flow;
+mod history;
+mod merge;
+mod names;
+mod order;
+mod retain;
+mod shapes;
+mod usage;
+
+pub use history::History;
+pub(crate) use history::serves;
+
+use crate::declare::declaration::{Declarations, PassDeclaration};
+use crate::error::GraphResult;
+use crate::plan::{Plan, Status};
+
+/// Choices of how to compile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CompileOptions {
+    /// Make one wgpu pass of raster passes in a row that draw into the same attachments. Off, each has its own, and
+    /// so its own time where timestamps can not be taken inside passes.
+    pub merge: bool,
+    /// Keep all that is drawn so that [`FiniteProbe`](crate::FiniteProbe) can look at it after each pass. Merges
+    /// nothing.
+    pub probe: bool,
+}
+
+impl Default for CompileOptions {
+    fn default() -> Self {
+        Self { merge: true, probe: false }
+    }
+}
+
+/// Compiles a graph.
+pub(crate) fn compile(
+    declarations: &Declarations,
+    history: &History,
+    options: CompileOptions,
+) -> GraphResult<Plan> {
+    if let Some(first) = declarations.faults.first() {
+        return Err(Box::new(first.clone()));
+    }
+    names::check(declarations)?;
+    let mut shapes = usage::infer(declarations, options);
+    shapes::check(declarations)?;
+    let order = order::sort(declarations)?;
+    let flow = flow::Flow::new(declarations, &shapes, history);
+    flow.check_reads()?;
+    let retention = retain::find(&flow, &order, history);
+    let needs = cull::find(&flow, &retention)?;
+    let status = statuses(declarations, &retention, &needs);
+    let runs = |pass: usize| status[pass].runs();
+    let mut steps = merge::steps(&flow, &needs, &order, &runs, options.merge && !options.probe);
+    let memory = alias::allocate(&flow, &needs, &mut steps, &mut shapes, options);
+    let after = retain::after(&flow, &retention, history, &shapes, &runs);
+    Ok(Plan {
+        declarations: declarations.clone(),
+        options,
+        before: history.clone(),
+        after,
+        order,
+        status,
+        steps,
+        resources: memory.resources,
+        effective: flow.effective,
+        initial: flow.initial,
+        slots: memory.slots,
+        memory: memory.memory,
+    })
+}
+
+fn statuses(declarations: &Declarations, retention: &retain::Retention, needs: &cull::Needs) -> Vec<Status> {
+    let status = |(index, pass): (usize, &PassDeclaration)| {
+        if !pass.is_called_for() {
+            return Status::Skipped { reason: skip_reason(pass) };
+        }
+        match &needs.wanted[index] {
+            Some(_) if retention.unchanged[index] => Status::Unchanged {
+                reason: "same inputs as last frame, and what it wrote then is still there".into(),
+            },
+            Some(reason) => Status::Runs { reason: reason.clone() },
+            None => Status::Culled { reason: needs.cull_reason(declarations, index) },
+        }
+    };
+    declarations.passes.iter().enumerate().map(status).collect()
+}
+
+/// "the scene has no lightmapped mesh and no fog"
+pub(crate) fn skip_reason(pass: &PassDeclaration) -> String {
+    let absent: Vec<String> = pass
+        .calls_for
+        .iter()
+        .filter(|(there, _)| !there)
+        .map(|(_, what)| {
+            let bare = ["a ", "an ", "any ", "some "].iter().find_map(|article| what.strip_prefix(article));
+            format!("no {}", bare.unwrap_or(what))
+        })
+        .collect();
+    format!("the scene has {}", absent.join(" and "))
+}

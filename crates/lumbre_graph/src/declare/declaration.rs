@@ -1,0 +1,91 @@
+//! What was declared, as plain data that can be compared: if nothing differs from last frame, last frame's plan holds.
+
+use crate::access::{Access, Part};
+use crate::error::GraphError;
+use crate::resource::{Name, ResourceDeclaration};
+use crate::site::Site;
+
+/// What a pass records.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PassKind {
+    /// Draws, inside a render pass.
+    Raster,
+    /// Dispatches, inside a compute pass.
+    Compute,
+    /// Commands on the encoder itself: copies, or passes begun by hand.
+    Transfer,
+}
+
+impl PassKind {
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::Compute => "compute",
+            Self::Transfer => "transfer",
+        }
+    }
+}
+
+/// One use of one version of a resource by a pass.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AccessDeclaration {
+    pub resource: usize,
+    /// Version that the handle named: the one read, or the one written upon.
+    pub version: u32,
+    pub access: Access,
+    pub part: Option<Part>,
+    pub optional: bool,
+}
+
+impl AccessDeclaration {
+    /// The part this touches; `None` is all of it. An attachment is always a single part.
+    pub fn touched_part(&self) -> Option<Part> {
+        self.part.or_else(|| self.access.is_attachment().then(Part::default))
+    }
+
+    /// The version that this makes.
+    pub fn written(&self) -> Option<u32> {
+        self.access.writes().then_some(self.version + 1)
+    }
+}
+
+/// A declared pass, without what it runs.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PassDeclaration {
+    pub name: Name,
+    pub kind: PassKind,
+    pub accesses: Vec<AccessDeclaration>,
+    /// What the pass calls for, and whether it is there.
+    pub calls_for: Vec<(bool, Name)>,
+    pub side_effects: Vec<Name>,
+    pub fingerprint: Option<u64>,
+    pub after: Vec<Name>,
+    pub site: Site,
+}
+
+impl PassDeclaration {
+    pub fn is_called_for(&self) -> bool {
+        self.calls_for.iter().all(|(there, _)| *there)
+    }
+}
+
+/// A declared graph, without what its passes run.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Declarations {
+    pub label: Name,
+    pub resources: Vec<ResourceDeclaration>,
+    pub passes: Vec<PassDeclaration>,
+    /// Faults seen while declaring, in order.
+    pub faults: Vec<GraphError>,
+}
+
+impl Declarations {
+    /// The pass that makes `version` of `resource`; none makes version 0.
+    pub fn producer(&self, resource: usize, version: u32) -> Option<usize> {
+        let index = version.checked_sub(1)?;
+        self.resources[resource].writers.get(index as usize).copied()
+    }
+}

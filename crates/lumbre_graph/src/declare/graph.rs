@@ -1,0 +1,187 @@
+//! The graph of one frame, built anew each frame: resources, passes and what they run.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::compile::{self, CompileOptions, History};
+use crate::declare::declaration::{Declarations, PassDeclaration};
+use crate::declare::kind::{Compute, PassType, Raster, ResourceKind, Transfer};
+use crate::declare::pass::PassBuilder;
+use crate::error::{GraphError, GraphResult};
+use crate::handle::{BufferHandle, Handle, TextureHandle};
+use crate::plan::Plan;
+use crate::resource::{BufferDescriptor, Name, Origin, ResourceDeclaration, Shape, TextureDescriptor};
+use crate::run::context::Body;
+use crate::site::Site;
+
+static NEXT_GRAPH: AtomicU64 = AtomicU64::new(1);
+
+/// A graph of passes over textures and buffers.
+///
+/// `'a` is how long what the passes borrow lives; `User` is what [`Executor::execute`](crate::Executor::execute) lends
+/// to one pass after the other as `context.user`, for state that more than one of them changes.
+pub struct Graph<'a, User = ()> {
+    pub(crate) id: u64,
+    pub(crate) declarations: Declarations,
+    pub(crate) bodies: Vec<Option<Body<'a, User>>>,
+}
+
+impl<'a, User> Graph<'a, User> {
+    /// An empty graph. The label is for messages and debuggers.
+    #[must_use]
+    pub fn new(label: impl Into<Name>) -> Self {
+        Self {
+            id: NEXT_GRAPH.fetch_add(1, Ordering::Relaxed),
+            declarations: Declarations {
+                label: label.into(),
+                resources: Vec::new(),
+                passes: Vec::new(),
+                faults: Vec::new(),
+            },
+            bodies: Vec::new(),
+        }
+    }
+
+    /// A texture that lives for a part of this frame only.
+    #[track_caller]
+    pub fn texture(&mut self, name: impl Into<Name>, descriptor: TextureDescriptor) -> TextureHandle {
+        self.resource(name.into(), Shape::Texture(descriptor), Origin::Transient, Site::caller())
+    }
+
+    /// A buffer that lives for a part of this frame only.
+    #[track_caller]
+    pub fn buffer(&mut self, name: impl Into<Name>, descriptor: BufferDescriptor) -> BufferHandle {
+        self.resource(name.into(), Shape::Buffer(descriptor), Origin::Transient, Site::caller())
+    }
+
+    /// A texture that the executor keeps from frame to frame under its name. Version 0 is what last frame left.
+    #[track_caller]
+    pub fn retained_texture(
+        &mut self,
+        name: impl Into<Name>,
+        descriptor: TextureDescriptor,
+    ) -> TextureHandle {
+        self.resource(name.into(), Shape::Texture(descriptor), Origin::Retained, Site::caller())
+    }
+
+    /// A buffer that the executor keeps from frame to frame under its name. Version 0 is what last frame left.
+    #[track_caller]
+    pub fn retained_buffer(&mut self, name: impl Into<Name>, descriptor: BufferDescriptor) -> BufferHandle {
+        self.resource(name.into(), Shape::Buffer(descriptor), Origin::Retained, Site::caller())
+    }
+
+    /// A texture from outside, bound by its name in [`Imports`](crate::Imports) when the graph runs.
+    #[track_caller]
+    pub fn import_texture(&mut self, name: impl Into<Name>, descriptor: TextureDescriptor) -> TextureHandle {
+        self.resource(name.into(), Shape::Texture(descriptor), Origin::Imported, Site::caller())
+    }
+
+    /// A buffer from outside, bound by its name in [`Imports`](crate::Imports) when the graph runs. It may be larger
+    /// than described.
+    #[track_caller]
+    pub fn import_buffer(&mut self, name: impl Into<Name>, descriptor: BufferDescriptor) -> BufferHandle {
+        self.resource(name.into(), Shape::Buffer(descriptor), Origin::Imported, Site::caller())
+    }
+
+    /// Says what an imported resource holds, as a number that changes whenever its content does. Without it, passes
+    /// that read it are never [`Unchanged`](crate::Status::Unchanged).
+    #[track_caller]
+    pub fn fingerprint<K: ResourceKind>(&mut self, handle: &Handle<K>, content: u64) {
+        let site = Site::caller();
+        if let Some(index) = self.own("(fingerprint)".into(), site, handle) {
+            self.declarations.resources[index].fingerprint = Some(content);
+        }
+    }
+
+    /// Keeps this version until after the frame: its passes are not culled, and the executor hands it out by name.
+    #[track_caller]
+    pub fn export<K: ResourceKind>(&mut self, handle: &Handle<K>) {
+        let site = Site::caller();
+        if let Some(index) = self.own("(export)".into(), site, handle) {
+            self.declarations.resources[index].exported = Some(handle.version);
+        }
+    }
+
+    /// Begins a pass that draws.
+    #[track_caller]
+    pub fn raster_pass(&mut self, name: impl Into<Name>) -> PassBuilder<'_, 'a, Raster, User> {
+        self.pass(name.into(), Site::caller())
+    }
+
+    /// Begins a pass that dispatches compute shaders.
+    #[track_caller]
+    pub fn compute_pass(&mut self, name: impl Into<Name>) -> PassBuilder<'_, 'a, Compute, User> {
+        self.pass(name.into(), Site::caller())
+    }
+
+    /// Begins a pass that records onto the command encoder itself.
+    #[track_caller]
+    pub fn transfer_pass(&mut self, name: impl Into<Name>) -> PassBuilder<'_, 'a, Transfer, User> {
+        self.pass(name.into(), Site::caller())
+    }
+
+    /// Compiles as for a first frame. Pure: touches no device.
+    ///
+    /// # Errors
+    /// The first fault of the declaration, see [`GraphError`].
+    pub fn compile(&self) -> GraphResult<Plan> {
+        self.compile_with(&History::default(), CompileOptions::default())
+    }
+
+    /// Compiles knowing what earlier frames left. Pure: touches no device.
+    ///
+    /// # Errors
+    /// The first fault of the declaration, see [`GraphError`].
+    pub fn compile_with(&self, history: &History, options: CompileOptions) -> GraphResult<Plan> {
+        compile::compile(&self.declarations, history, options)
+    }
+
+    /// The index of a handle's resource, or a fault recorded if it is another graph's.
+    pub(crate) fn own<K: ResourceKind>(
+        &mut self,
+        pass: Name,
+        site: Site,
+        handle: &Handle<K>,
+    ) -> Option<usize> {
+        if handle.graph == self.id {
+            return Some(handle.resource as usize);
+        }
+        self.declarations.faults.push(GraphError::ForeignHandle {
+            pass,
+            site,
+            kind: K::WORD,
+            index: handle.resource,
+            foreign: handle.graph,
+        });
+        None
+    }
+
+    fn resource<K>(&mut self, name: Name, shape: Shape, origin: Origin, site: Site) -> Handle<K> {
+        // More than 2^32 resources would not fit into memory long before this.
+        let index = u32::try_from(self.declarations.resources.len()).unwrap_or(u32::MAX);
+        self.declarations.resources.push(ResourceDeclaration {
+            name,
+            shape,
+            origin,
+            writers: Vec::new(),
+            exported: None,
+            fingerprint: None,
+            site,
+        });
+        Handle::new(self.id, index)
+    }
+
+    fn pass<K: PassType>(&mut self, name: Name, site: Site) -> PassBuilder<'_, 'a, K, User> {
+        self.declarations.passes.push(PassDeclaration {
+            name,
+            kind: K::KIND,
+            accesses: Vec::new(),
+            calls_for: Vec::new(),
+            side_effects: Vec::new(),
+            fingerprint: None,
+            after: Vec::new(),
+            site,
+        });
+        self.bodies.push(None);
+        PassBuilder::new(self)
+    }
+}

@@ -1,0 +1,191 @@
+//! What can be wrong with a declared graph. Each error names the pass, the resource and where both were declared. What
+//! can go wrong while a graph runs is [`RunError`](crate::RunError).
+
+use crate::resource::Name;
+use crate::site::Site;
+
+/// A fault of a declared graph, found without a device.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "each variant's message says what its fields are")]
+pub enum GraphError {
+    /// A handle of another graph.
+    #[error(
+        "pass `{pass}` ({site}) uses a {kind} handle (resource {index}) that graph #{foreign} made, not this one: declare it here, or \
+         import it"
+    )]
+    ForeignHandle { pass: Name, site: Site, kind: &'static str, index: u32, foreign: u64 },
+
+    /// Two passes, or two resources, of one name.
+    #[error("two {kind} are named `{name}`: one declared at {first}, one at {second}; names must be unique")]
+    DuplicateName { kind: &'static str, name: Name, first: Site, second: Site },
+
+    /// Two passes write on top of the same version.
+    #[error(
+        "passes `{first}` ({first_site}) and `{second}` ({second_site}) both write version {version} of `{resource}`: the second holds a \
+         handle copied before the first wrote; pass it the handle that the first moved on"
+    )]
+    TwoWriters {
+        resource: Name,
+        version: u32,
+        first: Name,
+        first_site: Site,
+        second: Name,
+        second_site: Site,
+    },
+
+    /// A pass reads what nothing ever writes.
+    #[error(
+        "pass `{pass}` ({site}) reads `{resource}` (declared at {resource_site}) as {access}, but no pass writes it: add its producer, or \
+         import it"
+    )]
+    MissingProducer { pass: Name, site: Site, resource: Name, resource_site: Site, access: &'static str },
+
+    /// A pass reads a version older than the first write.
+    #[error(
+        "pass `{pass}` ({site}) reads `{resource}` as {access} before `{writer}` ({writer_site}) writes it: its handle was copied before that \
+         write; declare the pass after the writer, with the writer's handle"
+    )]
+    ReadBeforeWrite {
+        pass: Name,
+        site: Site,
+        resource: Name,
+        access: &'static str,
+        writer: Name,
+        writer_site: Site,
+    },
+
+    /// A pass that runs reads what only skipped passes would have written.
+    #[error(
+        "pass `{pass}` ({site}) reads `{resource}` as {access}, but every pass that writes it is skipped ({skipped}): read it as optional, call \
+         for the same in `{pass}`, or write it with LoadOp::ClearIfFirst in a pass that runs"
+    )]
+    ProducersSkipped { pass: Name, site: Site, resource: Name, access: &'static str, skipped: String },
+
+    /// Passes that wait for each other.
+    #[error("passes wait for each other: {}", display_cycle(.path))]
+    Cycle {
+        /// The passes in a circle; the last waits for the first.
+        path: Vec<CycleStep>,
+    },
+
+    /// `.after()` names no pass.
+    #[error("pass `{pass}` ({site}) is to run after `{name}`, which no pass is called{}", did_you_mean(.nearest))]
+    UnknownPass { pass: Name, site: Site, name: Name, nearest: Option<Name> },
+
+    /// A pass uses one resource in two ways that the GPU can not do at once.
+    #[error(
+        "pass `{pass}` ({site}) uses `{resource}` as {first} and as {second} at once: split the pass, or name separate parts"
+    )]
+    AccessConflict { pass: Name, site: Site, resource: Name, first: &'static str, second: &'static str },
+
+    /// A format that can not be used in this way.
+    #[error(
+        "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access}, which needs {expected}, but its format is {format:?}"
+    )]
+    FormatMismatch {
+        pass: Name,
+        site: Site,
+        resource: Name,
+        resource_site: Site,
+        access: &'static str,
+        format: wgpu::TextureFormat,
+        expected: String,
+    },
+
+    /// Attachments of different size.
+    #[error(
+        "pass `{pass}` ({site}) draws into `{first}` (declared at {first_site}) of {}x{} and `{second}` (declared at {second_site}) of {}x{} texels: \
+         attachments must have one size",
+        .first_size[0], .first_size[1], .second_size[0], .second_size[1]
+    )]
+    SizeMismatch {
+        pass: Name,
+        site: Site,
+        first: Name,
+        first_site: Site,
+        first_size: [u32; 2],
+        second: Name,
+        second_site: Site,
+        second_size: [u32; 2],
+    },
+
+    /// A sample count that can not be used in this way.
+    #[error(
+        "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access} with {count} samples per texel, but needs {expected}"
+    )]
+    SampleCountMismatch {
+        pass: Name,
+        site: Site,
+        resource: Name,
+        resource_site: Site,
+        access: &'static str,
+        count: u32,
+        expected: String,
+    },
+
+    /// An imported resource that does not allow what a pass does with it.
+    #[error(
+        "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access}, which needs usage {needs}, but it was imported with {declared}"
+    )]
+    UsageMismatch {
+        pass: Name,
+        site: Site,
+        resource: Name,
+        resource_site: Site,
+        access: &'static str,
+        needs: String,
+        declared: String,
+    },
+
+    /// A shape that no GPU object can have.
+    #[error("resource `{resource}` (declared at {site}): {reason}")]
+    InvalidShape { resource: Name, site: Site, reason: String },
+
+    /// A mip level or layer that the texture does not have.
+    #[error(
+        "pass `{pass}` ({site}) uses mip {mip}, layer {layer} of `{resource}`, which has {mips} mip level(s) and {layers} layer(s)"
+    )]
+    PartOutOfRange { pass: Name, site: Site, resource: Name, mip: u32, layer: u32, mips: u32, layers: u32 },
+
+    /// `.resolve()` or `.part()` with nothing before it that it could apply to.
+    #[error(
+        "pass `{pass}` ({site}): .{method}() applies to the {wanted} declared just before it, and there is none"
+    )]
+    NothingToModify { pass: Name, site: Site, method: &'static str, wanted: &'static str },
+
+    /// A raster pass without an attachment.
+    #[error("raster pass `{pass}` ({site}) draws into nothing: declare a colour or depth attachment")]
+    NoAttachment { pass: Name, site: Site },
+
+    /// An exported version that a later pass overwrites.
+    #[error(
+        "version {version} of `{resource}` is exported, but pass `{pass}` ({site}) writes over it: export the handle after that pass"
+    )]
+    ExportOverwritten { resource: Name, version: u32, pass: Name, site: Site },
+}
+
+/// What declaring and compiling answer with. Boxed: the errors carry many names, the way without one should be short.
+pub type GraphResult<T> = Result<T, Box<GraphError>>;
+
+/// One pass of a [`GraphError::Cycle`] and why the next one waits for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CycleStep {
+    /// The pass.
+    pub pass: Name,
+    /// Why the next pass of the circle runs after it.
+    pub because: String,
+}
+
+fn display_cycle(path: &[CycleStep]) -> String {
+    let mut text: String =
+        path.iter().map(|step| format!("`{}` -({})-> ", step.pass, step.because)).collect();
+    if let Some(first) = path.first() {
+        text.push_str(&format!("`{}`", first.pass));
+    }
+    text
+}
+
+pub(crate) fn did_you_mean(nearest: &Option<Name>) -> String {
+    nearest.as_ref().map_or(String::new(), |name| format!("; did you mean `{name}`?"))
+}

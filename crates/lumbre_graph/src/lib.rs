@@ -1,0 +1,72 @@
+//! A render graph that compiles without a device, explains itself and measures itself.
+//!
+//! ```text
+//!   Graph ── declare ──► compile ──────► Plan ──► explain: text, JSON, DOT
+//!   resources, passes,   pure, no device  │
+//!   what they call for                    ▼
+//!   and run                            Executor ──► wgpu ──► FrameReport
+//!                                      pool, retained,       times, invocations,
+//!                                      queries, probe        first NaN
+//! ```
+//!
+//! A pass reads through `&handle` and writes through `&mut handle`, which moves the handle on to a new version. It says
+//! what it *calls for*; without that it is skipped, and what it would have written stays as it was. What nothing reads
+//! is culled. What is retained and would come out the same is left. Passes that draw into the same attachments share one
+//! wgpu render pass, and transients share memory. The plan says all this, with the reasons.
+//!
+//! This crate knows nothing of lights, meshes or scenes.
+//!
+//! ```
+//! use lumbre_graph::{Graph, LoadOp, TextureDescriptor, wgpu};
+//! let mut graph: Graph = Graph::new("frame");
+//! let format = wgpu::TextureFormat::Rgba16Float;
+//! let mut hdr = graph.texture("hdr", TextureDescriptor::new_2d(640, 360, format));
+//! let mut screen = graph.import_texture("screen", TextureDescriptor::new_2d(640, 360, format));
+//! let black = LoadOp::ClearIfFirst(wgpu::Color::BLACK);
+//! graph.raster_pass("lightmap").calls_for(false, "a lightmapped mesh").color(&mut hdr, black).run(|_| Ok(()));
+//! graph.raster_pass("forward").color(&mut hdr, black).run(|context| {
+//!     context.pass.draw(0..3, 0..1);
+//!     Ok(())
+//! });
+//! graph.raster_pass("tone map").samples(&hdr).color(&mut screen, LoadOp::Clear(wgpu::Color::BLACK));
+//! let plan = graph.compile()?;
+//! assert_eq!(plan.running().collect::<Vec<_>>(), ["forward", "tone map"]);
+//! assert_eq!(plan.status("lightmap").unwrap().reason(), "the scene has no lightmapped mesh");
+//! # Ok::<(), Box<lumbre_graph::GraphError>>(())
+//! ```
+
+mod access;
+mod compile;
+mod declare;
+mod error;
+mod explain;
+mod handle;
+mod nearest;
+mod plan;
+mod resource;
+mod run;
+mod site;
+
+pub use wgpu;
+
+pub use access::{BufferRead, BufferWrite, LoadOp, Part, TextureRead, TextureWrite};
+pub use compile::{CompileOptions, History};
+pub use declare::declaration::PassKind;
+pub use declare::graph::Graph;
+pub use declare::kind::{Compute, PassType, Raster, ResourceKind, Transfer};
+pub use declare::pass::PassBuilder;
+pub use error::{CycleStep, GraphError, GraphResult};
+pub use explain::{Calling, Explanation, PassExplanation, ResourceExplanation, Use};
+pub use handle::{Buffer, BufferHandle, Handle, Texture, TextureHandle};
+pub use plan::{Memory, Plan, Status};
+pub use resource::{BufferDescriptor, Name, Origin, Shape, TextureDescriptor};
+pub use run::context::{
+    BodyError, BodyResult, ComputeContext, PassResources, RasterContext, TransferContext,
+};
+pub use run::error::RunError;
+pub use run::executor::{Executor, Frame};
+pub use run::imports::Imports;
+pub use run::pool::{KEEP_RETAINED_FRAMES, KEEP_TRANSIENT_FRAMES, PoolStatistics};
+pub use run::probe::FiniteProbe;
+pub use run::report::{FrameReport, GpuTime, Invocations, Measure, NonFinite, PassReport};
+pub use site::Site;

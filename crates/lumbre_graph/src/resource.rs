@@ -1,0 +1,188 @@
+//! What a resource is: its shape, where it comes from, and how many bytes it takes. Not the GPU object.
+
+use std::borrow::Cow;
+
+use crate::site::Site;
+
+/// A name of a pass or a resource. A literal costs no allocation.
+pub type Name = Cow<'static, str>;
+
+/// The shape of a texture. How it is used is not said here: the graph infers that from the passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TextureDescriptor {
+    /// Width and height in texels; depth in texels of a 3D texture, else the number of array layers.
+    pub size: wgpu::Extent3d,
+    /// Texel format.
+    pub format: wgpu::TextureFormat,
+    /// Samples per texel: 1, or 2, 4, 8, 16 for a multisampled texture.
+    pub sample_count: u32,
+    /// Number of mip levels, at least 1.
+    pub mip_level_count: u32,
+    /// 2D (also arrays and cubes) or 3D.
+    pub dimension: wgpu::TextureDimension,
+    /// Of a texture that the graph makes: usages to allow beyond the inferred ones. Of an imported one: the usages it
+    /// was made with, against which the passes are checked; empty means unknown until it is bound.
+    pub usage: wgpu::TextureUsages,
+}
+
+impl TextureDescriptor {
+    /// A 2D texture of one layer, one mip level and one sample.
+    #[must_use]
+    pub fn new_2d(width: u32, height: u32, format: wgpu::TextureFormat) -> Self {
+        Self {
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            format,
+            sample_count: 1,
+            mip_level_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            usage: wgpu::TextureUsages::empty(),
+        }
+    }
+
+    /// The same with this many samples per texel.
+    #[must_use]
+    pub fn samples(mut self, count: u32) -> Self {
+        self.sample_count = count;
+        self
+    }
+
+    /// The same with this many mip levels.
+    #[must_use]
+    pub fn mips(mut self, count: u32) -> Self {
+        self.mip_level_count = count;
+        self
+    }
+
+    /// The same with this many array layers.
+    #[must_use]
+    pub fn layers(mut self, count: u32) -> Self {
+        self.size.depth_or_array_layers = count;
+        self
+    }
+
+    /// The same with these usages besides the inferred ones (or, imported, with just these known).
+    #[must_use]
+    pub fn usage(mut self, usage: wgpu::TextureUsages) -> Self {
+        self.usage = usage;
+        self
+    }
+
+    /// Size in bytes, all mip levels, layers and samples counted, without the driver's padding.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (0..self.mip_level_count.min(32)).fold(0_u64, |sum, level| {
+            let texels = self.format.theoretical_memory_footprint(self.mip_size(level));
+            sum.saturating_add(texels.saturating_mul(u64::from(self.sample_count)))
+        })
+    }
+
+    /// Size of one mip level; layers are kept, the depth of a 3D texture shrinks.
+    #[must_use]
+    pub fn mip_size(&self, level: u32) -> wgpu::Extent3d {
+        let shrink = |length: u32| length.checked_shr(level).unwrap_or(0).max(1);
+        wgpu::Extent3d {
+            width: shrink(self.size.width),
+            height: shrink(self.size.height),
+            depth_or_array_layers: match self.dimension {
+                wgpu::TextureDimension::D3 => shrink(self.size.depth_or_array_layers),
+                _ => self.size.depth_or_array_layers,
+            },
+        }
+    }
+
+    /// Number of array layers (1 for a 3D texture).
+    #[must_use]
+    pub fn layer_count(&self) -> u32 {
+        if self.dimension == wgpu::TextureDimension::D3 { 1 } else { self.size.depth_or_array_layers }
+    }
+
+    /// Whether the texture has a single part, so that clearing an attachment overwrites all of it.
+    pub(crate) fn is_one_part(&self) -> bool {
+        self.mip_level_count == 1 && self.size.depth_or_array_layers == 1
+    }
+}
+
+/// The shape of a buffer. How it is used is inferred from the passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BufferDescriptor {
+    /// Size in bytes, a multiple of 4.
+    pub size: u64,
+    /// As [`TextureDescriptor::usage`].
+    pub usage: wgpu::BufferUsages,
+}
+
+impl BufferDescriptor {
+    /// A buffer of `size` bytes (a multiple of 4).
+    #[must_use]
+    pub fn new(size: u64) -> Self {
+        Self { size, usage: wgpu::BufferUsages::empty() }
+    }
+
+    /// The same with these usages besides the inferred ones (or, imported, with just these known).
+    #[must_use]
+    pub fn usage(mut self, usage: wgpu::BufferUsages) -> Self {
+        self.usage = usage;
+        self
+    }
+}
+
+/// Where a resource comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// The pool lends it for part of one frame; its memory serves others in the rest.
+    Transient,
+    /// The executor keeps it from frame to frame under its name.
+    Retained,
+    /// The caller binds it when the graph runs.
+    Imported,
+}
+
+/// The shape of a resource.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Shape {
+    /// A texture.
+    Texture(TextureDescriptor),
+    /// A buffer.
+    Buffer(BufferDescriptor),
+}
+
+impl Shape {
+    /// Size in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::Texture(texture) => texture.bytes(),
+            Self::Buffer(buffer) => buffer.size,
+        }
+    }
+
+    pub(crate) fn texture(&self) -> Option<&TextureDescriptor> {
+        match self {
+            Self::Texture(texture) => Some(texture),
+            Self::Buffer(_) => None,
+        }
+    }
+
+    /// The shape without usages: two resources that agree in it can share memory.
+    pub(crate) fn without_usage(&self) -> Self {
+        match *self {
+            Self::Texture(texture) => Self::Texture(texture.usage(wgpu::TextureUsages::empty())),
+            Self::Buffer(buffer) => Self::Buffer(buffer.usage(wgpu::BufferUsages::empty())),
+        }
+    }
+}
+
+/// A declared resource.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ResourceDeclaration {
+    pub name: Name,
+    pub shape: Shape,
+    pub origin: Origin,
+    /// Pass that made version `i + 1`.
+    pub writers: Vec<usize>,
+    pub exported: Option<u32>,
+    /// What is known of an imported resource's content, see `Graph::fingerprint`.
+    pub fingerprint: Option<u64>,
+    pub site: Site,
+}

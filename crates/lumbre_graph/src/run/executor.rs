@@ -1,0 +1,278 @@
+//! The executor: what outlives a frame. Memory, last frame's plan, what retained resources hold, measurements.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::compile::{CompileOptions, History};
+use crate::declare::graph::Graph;
+use crate::error::GraphResult;
+use crate::plan::Plan;
+use crate::resource::Origin;
+use crate::run::error::RunError;
+use crate::run::imports::Imports;
+use crate::run::measure::Ring;
+use crate::run::pool::{GpuObject, Pool, PoolStatistics};
+use crate::run::probe::FiniteProbe;
+use crate::run::record::{FrameResources, Recorder, looks};
+use crate::run::report::{FrameReport, Measure};
+
+/// Runs graphs, one per frame, on one device. After a lost device make a new one.
+#[derive(Default)]
+pub struct Executor {
+    pool: Pool,
+    history: History,
+    plan: Option<Arc<Plan>>,
+    measure: Measure,
+    keep_apart: bool,
+    probing: bool,
+    probe: Option<FiniteProbe>,
+    ring: Ring,
+    report: Option<FrameReport>,
+    exported: Vec<(crate::resource::Name, GpuObject)>,
+    frame: u64,
+}
+
+/// A frame that was handed to the GPU.
+#[derive(Debug)]
+pub struct Frame {
+    /// Its number, from 1; its [`FrameReport`] has the same.
+    pub number: u64,
+    /// What ran and why.
+    pub plan: Arc<Plan>,
+    /// For waiting until it is done.
+    pub submission: wgpu::SubmissionIndex,
+}
+
+impl Executor {
+    /// An executor that has run nothing yet, with [`Measure::TIMES`].
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What to measure from the next frame on.
+    pub fn set_measure(&mut self, measure: Measure) {
+        self.measure = measure;
+    }
+
+    /// Whether to merge raster passes that draw into the same attachments (on from the start).
+    pub fn set_merging(&mut self, merge: bool) {
+        self.keep_apart = !merge;
+    }
+
+    /// Whether to look for NaN and Inf after every pass. For tests and for hunting: it merges nothing and costs a
+    /// read of every texture.
+    pub fn enable_probe(&mut self, on: bool) {
+        self.probing = on;
+    }
+
+    /// What retained resources hold, for compiling a graph as [`execute`](Self::execute) would.
+    #[must_use]
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Counts of GPU memory.
+    #[must_use]
+    pub fn pool_statistics(&self) -> PoolStatistics {
+        self.pool.statistics()
+    }
+
+    /// The plan of a graph; last frame's if nothing in the declaration changed.
+    ///
+    /// # Errors
+    /// The first fault of the declaration.
+    pub fn plan<User>(&mut self, graph: &Graph<'_, User>) -> GraphResult<Arc<Plan>> {
+        let options = CompileOptions { merge: !self.keep_apart, probe: self.probing };
+        if let Some(plan) = &self.plan
+            && plan.options == options
+            && plan.declarations == graph.declarations
+            && plan.before == self.history
+        {
+            return Ok(Arc::clone(plan));
+        }
+        let plan = Arc::new(graph.compile_with(&self.history, options)?);
+        self.plan = Some(Arc::clone(&plan));
+        Ok(plan)
+    }
+
+    /// Compiles a graph, runs its passes and submits them. `user` is lent to one pass after the other.
+    ///
+    /// # Errors
+    /// Faults of the graph, imports that are missing or not as declared, errors of passes. Then nothing is submitted.
+    pub fn execute<User>(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        graph: Graph<'_, User>,
+        imports: &Imports,
+        user: &mut User,
+    ) -> Result<Frame, RunError> {
+        let start = self.measure.cpu.then(Instant::now);
+        self.collect(device, queue);
+        self.frame += 1;
+        let plan = self.plan(&graph)?;
+        let frame = FrameResources { plan: &plan, objects: self.objects(device, &plan, imports)? };
+        let passes = plan.steps.iter().map(|step| step.passes.len()).sum();
+        let queries = self.ring.begin(device, self.measure, passes, plan.steps.len());
+        if self.probing && self.ring.has_room() {
+            let count = plan.steps.iter().map(|step| looks(&plan, step).len()).sum();
+            self.probe.get_or_insert_with(|| FiniteProbe::new(device, count)).begin(device, queue, count);
+        }
+        let probe = self.probe.as_ref().filter(|_| self.probing && self.ring.has_room());
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some(&plan.declarations.label),
+        });
+        let mut recorder = Recorder {
+            device,
+            queue,
+            frame: &frame,
+            graph: graph.id,
+            bodies: graph.bodies,
+            queries,
+            probe,
+            time_cpu: self.measure.cpu,
+            user,
+        };
+        for group in 0..plan.steps.len() {
+            recorder.step(&mut encoder, group)?;
+        }
+        let mut queries = recorder.queries;
+        let results = probe.map(FiniteProbe::results);
+        let to_wait_for = queries.resolve(device, &mut encoder, results);
+        queries.report.frame = self.frame;
+        queries.report.probed = probe.is_some();
+        let submission = queue.submit([encoder.finish()]);
+        queries.report.cpu_ms = start.map(|start| start.elapsed().as_secs_f64() * 1e3);
+        if let Some(report) = self.ring.end(queries, to_wait_for) {
+            self.report = Some(report);
+        }
+        self.keep(&plan, frame.objects);
+        Ok(Frame { number: self.frame, plan, submission })
+    }
+
+    /// The newest report that has arrived; does not wait. In a window it is some frames old.
+    #[must_use]
+    pub fn latest_report(&self) -> Option<&FrameReport> {
+        self.report.as_ref()
+    }
+
+    /// Waits for the GPU to finish and answers with the last frame's report; `None` if no frame ran.
+    ///
+    /// # Errors
+    /// [`RunError::Wait`] if the device was lost.
+    pub fn timings_blocking(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+    ) -> Result<Option<&FrameReport>, RunError> {
+        device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| RunError::Wait(error.to_string()))?;
+        self.collect(device, queue);
+        Ok(self.report.as_ref())
+    }
+
+    /// A texture that the last frame exported.
+    #[must_use]
+    pub fn exported_texture(&self, name: &str) -> Option<&wgpu::Texture> {
+        self.exported.iter().find_map(|(held, object)| match object {
+            GpuObject::Texture(texture) if held == name => Some(&texture.texture),
+            _ => None,
+        })
+    }
+
+    /// A buffer that the last frame exported.
+    #[must_use]
+    pub fn exported_buffer(&self, name: &str) -> Option<&wgpu::Buffer> {
+        self.exported.iter().find_map(|(held, object)| match object {
+            GpuObject::Buffer(buffer) if held == name => Some(buffer),
+            _ => None,
+        })
+    }
+
+    fn collect(&mut self, device: &wgpu::Device, queue: &wgpu::Queue) {
+        if !self.ring.is_waiting() {
+            return;
+        }
+        // A lost device shows in the maps, whose callbacks then tell of failure.
+        let _ = device.poll(wgpu::PollType::Poll);
+        if let Some(report) = self.ring.collect(f64::from(queue.get_timestamp_period())) {
+            self.report = Some(report);
+        }
+    }
+
+    /// The GPU objects of all resources that this frame uses, with a view of every part that is used.
+    fn objects(
+        &mut self,
+        device: &wgpu::Device,
+        plan: &Plan,
+        imports: &Imports,
+    ) -> Result<Vec<Option<GpuObject>>, RunError> {
+        let declarations = &plan.declarations;
+        let mut objects: Vec<Option<GpuObject>> = vec![None; plan.resources.len()];
+        let mut parts = vec![Vec::new(); plan.resources.len()];
+        for declared in declarations.passes.iter().flat_map(|pass| &pass.accesses) {
+            if let Some(part) = declared.touched_part() {
+                parts[declared.resource].push(part);
+            }
+        }
+        if plan.options.probe {
+            for (resource, part) in plan.steps.iter().flat_map(|step| looks(plan, step)) {
+                parts[resource].push(part);
+            }
+        }
+        let prepare = |object: &mut GpuObject, resource: usize| {
+            if let (GpuObject::Texture(texture), Some(shape)) =
+                (&mut *object, plan.resources[resource].shape.texture())
+                && !shape.is_one_part()
+            {
+                for &part in &parts[resource] {
+                    texture.part(part);
+                }
+            }
+            object.clone()
+        };
+        for slot in &plan.slots {
+            let label = &declarations.resources[slot.resources[0]].name;
+            let object = self.pool.transient(device, label, &slot.shape, self.frame)?;
+            for &resource in &slot.resources {
+                objects[resource] = Some(prepare(object, resource));
+            }
+        }
+        for (index, declared) in declarations.resources.iter().enumerate() {
+            let shape = &plan.resources[index].shape;
+            match declared.origin {
+                Origin::Transient => {}
+                // Kept even if no pass uses it in this frame, since last frame's content may be wanted again.
+                Origin::Retained => {
+                    let (object, fresh) = self.pool.retained(device, &declared.name, shape, self.frame)?;
+                    objects[index] = Some(prepare(object, index));
+                    if fresh {
+                        self.history.retained.remove(&declared.name);
+                    }
+                }
+                Origin::Imported if plan.resources[index].lifetime.is_some() => {
+                    let mut object = imports.find(declarations, index, shape)?;
+                    objects[index] = Some(prepare(&mut object, index));
+                }
+                Origin::Imported => {}
+            }
+        }
+        Ok(objects)
+    }
+
+    /// After a frame was submitted: what is known now.
+    fn keep(&mut self, plan: &Plan, objects: Vec<Option<GpuObject>>) {
+        self.history = plan.after.clone();
+        for name in self.pool.trim(self.frame) {
+            self.history.retained.remove(&name);
+        }
+        self.exported.clear();
+        for (declared, object) in plan.declarations.resources.iter().zip(objects) {
+            if let (Some(_), Some(object)) = (declared.exported, object) {
+                self.exported.push((declared.name.clone(), object));
+            }
+        }
+    }
+}

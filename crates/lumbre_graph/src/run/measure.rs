@@ -1,0 +1,315 @@
+//! Queries and their way back. Results arrive some frames later through a ring of buffers, so that measuring never
+//! makes the CPU wait; whoever wants to wait can.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use crate::run::probe::{self, Probed};
+use crate::run::report::{FrameReport, GpuTime, Invocations, Measure};
+
+/// Frames whose results may be on their way at once. A frame beyond that is not measured on the GPU.
+const RING: usize = 4;
+
+/// What is counted, in the order in which the results lie in memory (that of the flags' bits).
+const STATISTICS: wgpu::PipelineStatisticsTypes = wgpu::PipelineStatisticsTypes::VERTEX_SHADER_INVOCATIONS
+    .union(wgpu::PipelineStatisticsTypes::FRAGMENT_SHADER_INVOCATIONS)
+    .union(wgpu::PipelineStatisticsTypes::COMPUTE_SHADER_INVOCATIONS);
+const STATISTICS_BYTES: u64 = 3 * 8;
+
+/// The queries of one frame, and what they belong to.
+pub(crate) struct FrameQueries {
+    pub timestamps: Option<wgpu::QuerySet>,
+    pub statistics: Option<wgpu::QuerySet>,
+    capacity: [u32; 2],
+    resolve: Option<wgpu::Buffer>,
+    readback: Option<wgpu::Buffer>,
+    /// Queries handed out in this frame.
+    used: [u32; 2],
+    /// Whether timestamps can be written inside passes, and on the encoder.
+    pub inside_passes: bool,
+    pub inside_encoders: bool,
+    /// Per pass of the report: first and last timestamp, and whose time that is.
+    pub spans: Vec<Option<(u32, u32, Scope)>>,
+    /// Per pass of the report: its statistics query.
+    pub counts: Vec<Option<u32>>,
+    pub probed: Vec<Probed>,
+    pub report: FrameReport,
+    state: Arc<AtomicU8>,
+}
+
+const WAITING: u8 = 0;
+const ARRIVED: u8 = 1;
+const FAILED: u8 = 2;
+
+/// Whose time lies between two timestamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scope {
+    Pass,
+    PartOfGroup,
+    Group,
+}
+
+impl FrameQueries {
+    fn empty() -> Self {
+        Self {
+            timestamps: None,
+            statistics: None,
+            capacity: [0; 2],
+            resolve: None,
+            readback: None,
+            used: [0; 2],
+            inside_passes: false,
+            inside_encoders: false,
+            spans: Vec::new(),
+            counts: Vec::new(),
+            probed: Vec::new(),
+            report: FrameReport::default(),
+            state: Arc::new(AtomicU8::new(WAITING)),
+        }
+    }
+
+    /// A timestamp to write, if there are any.
+    pub fn timestamp(&mut self) -> Option<u32> {
+        take(&mut self.used[0], self.capacity[0])
+    }
+
+    /// A statistics query to make, if there are any.
+    pub fn statistic(&mut self) -> Option<u32> {
+        take(&mut self.used[1], self.capacity[1])
+    }
+
+    fn prepare(&mut self, device: &wgpu::Device, measure: Measure, passes: u32, steps: u32) {
+        let features = device.features();
+        let has = |feature: wgpu::Features| features.contains(feature);
+        // Each step needs one more timestamp than it has passes.
+        let stamps = passes.saturating_add(steps);
+        let want = [
+            if measure.gpu && has(wgpu::Features::TIMESTAMP_QUERY) { stamps } else { 0 },
+            if measure.statistics && has(wgpu::Features::PIPELINE_STATISTICS_QUERY) { passes } else { 0 },
+        ];
+        let most = wgpu::QUERY_SET_MAX_QUERIES;
+        self.used = [0; 2];
+        self.inside_passes = has(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
+        self.inside_encoders = has(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
+        self.spans.clear();
+        self.counts.clear();
+        self.probed.clear();
+        self.report = FrameReport::default();
+        if measure.gpu && want[0] == 0 && passes > 0 {
+            self.report.notes.push("no GPU times: the device was made without TIMESTAMP_QUERY".into());
+        }
+        if measure.statistics && want[1] == 0 && passes > 0 {
+            self.report
+                .notes
+                .push("no invocation counts: the device was made without PIPELINE_STATISTICS_QUERY".into());
+        }
+        let types = [wgpu::QueryType::Timestamp, wgpu::QueryType::PipelineStatistics(STATISTICS)];
+        for (at, (set, ty)) in [&mut self.timestamps, &mut self.statistics].into_iter().zip(types).enumerate()
+        {
+            let count = want[at].min(most);
+            if want[at] > most {
+                self.report.notes.push(format!("only the first {most} queries of {} are made", want[at]));
+            }
+            if count == 0 {
+                *set = None;
+                self.capacity[at] = 0;
+            } else if self.capacity[at] < count || set.is_none() {
+                *set = Some(device.create_query_set(&wgpu::QuerySetDescriptor {
+                    label: Some("graph queries"),
+                    ty,
+                    count,
+                }));
+                self.capacity[at] = count;
+            }
+        }
+    }
+
+    /// Bytes of timestamps, statistics and probe results in the readback buffer, each on a boundary that a resolve
+    /// may begin at.
+    fn layout(&self) -> [u64; 3] {
+        let align = |bytes: u64| bytes.next_multiple_of(wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT);
+        [
+            align(u64::from(self.used[0]) * u64::from(wgpu::QUERY_SIZE)),
+            align(u64::from(self.used[1]) * STATISTICS_BYTES),
+            self.probed.len() as u64 * probe::STRIDE,
+        ]
+    }
+
+    /// Records the way back of all that was measured. Answers whether anything was.
+    pub fn resolve(
+        &mut self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        probe_results: Option<&wgpu::Buffer>,
+    ) -> bool {
+        let layout = self.layout();
+        let total: u64 = layout.iter().sum();
+        if total == 0 {
+            return false;
+        }
+        let grow = |held: &mut Option<wgpu::Buffer>, usage: wgpu::BufferUsages| {
+            if held.as_ref().is_none_or(|held| held.size() < total) {
+                *held = Some(device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("graph measurements"),
+                    size: total,
+                    usage,
+                    mapped_at_creation: false,
+                }));
+            }
+        };
+        grow(&mut self.resolve, wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC);
+        grow(&mut self.readback, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+        let (Some(resolve), Some(readback)) = (&self.resolve, &self.readback) else { return false };
+        let queries = layout[0] + layout[1];
+        if let Some(set) = self.timestamps.as_ref().filter(|_| self.used[0] > 0) {
+            encoder.resolve_query_set(set, 0..self.used[0], resolve, 0);
+        }
+        if let Some(set) = self.statistics.as_ref().filter(|_| self.used[1] > 0) {
+            encoder.resolve_query_set(set, 0..self.used[1], resolve, layout[0]);
+        }
+        if queries > 0 {
+            encoder.copy_buffer_to_buffer(resolve, 0, readback, 0, queries);
+        }
+        if let Some(results) = probe_results.filter(|_| layout[2] > 0) {
+            encoder.copy_buffer_to_buffer(results, 0, readback, queries, layout[2]);
+        }
+        true
+    }
+
+    /// After the submission: asks for the results.
+    fn send_for(&mut self) {
+        let state = Arc::new(AtomicU8::new(WAITING));
+        self.state = Arc::clone(&state);
+        if let Some(readback) = &self.readback {
+            readback.map_async(wgpu::MapMode::Read, .., move |result| {
+                state.store(if result.is_ok() { ARRIVED } else { FAILED }, Ordering::Release);
+            });
+        }
+    }
+
+    /// The report with what arrived.
+    fn read(&mut self, period: f64) -> FrameReport {
+        let mut report = std::mem::take(&mut self.report);
+        let layout = self.layout();
+        let Some(readback) = &self.readback else { return report };
+        if self.state.load(Ordering::Acquire) == FAILED {
+            report.notes.push("the measurements of this frame were lost on their way back".into());
+            return report;
+        }
+        match readback.get_mapped_range(..) {
+            Ok(bytes) => {
+                let stamps = words(&bytes[..layout[0] as usize]);
+                self.times(&mut report, &stamps, period);
+                let start = layout[0] as usize;
+                let counts = words(&bytes[start..start + layout[1] as usize]);
+                for (pass, query) in report.passes.iter_mut().zip(&self.counts) {
+                    let values = query.map(|query| &counts[query as usize * 3..][..3]);
+                    pass.invocations = values.map(|values| Invocations {
+                        vertex: values[0],
+                        fragment: values[1],
+                        compute: values[2],
+                    });
+                }
+                let start = start + layout[1] as usize;
+                report.non_finite = probe::first(&self.probed, &bytes[start..start + layout[2] as usize]);
+            }
+            Err(error) => report.notes.push(format!("the measurements could not be read: {error}")),
+        }
+        readback.unmap();
+        report
+    }
+
+    fn times(&self, report: &mut FrameReport, stamps: &[u64], period: f64) {
+        // A clock that was reset between two stamps gives no time rather than a huge one.
+        let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * period * 1e-6;
+        for (pass, span) in report.passes.iter_mut().zip(&self.spans) {
+            let Some((from, to, scope)) = *span else { continue };
+            let ms = ms(stamps[from as usize], stamps[to as usize]);
+            pass.gpu = match scope {
+                Scope::Pass => GpuTime::Pass { ms },
+                Scope::PartOfGroup => GpuTime::PartOfGroup { ms },
+                Scope::Group => GpuTime::Group { ms },
+            };
+        }
+        let spans = || self.spans.iter().flatten();
+        let first = spans().map(|&(from, ..)| stamps[from as usize]).min();
+        let last = spans().map(|&(_, to, _)| stamps[to as usize]).max();
+        report.gpu_ms = first.zip(last).map(|(first, last)| ms(first, last));
+    }
+}
+
+fn take(used: &mut u32, capacity: u32) -> Option<u32> {
+    let index = *used;
+    (index < capacity).then(|| {
+        *used += 1;
+        index
+    })
+}
+
+fn words(bytes: &[u8]) -> Vec<u64> {
+    bytes.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect()
+}
+
+/// Frames on their way.
+#[derive(Default)]
+pub(crate) struct Ring {
+    free: Vec<FrameQueries>,
+    /// Oldest first.
+    waiting: Vec<FrameQueries>,
+}
+
+impl Ring {
+    /// Queries for a frame. If too many are on their way they are without any.
+    pub fn begin(
+        &mut self,
+        device: &wgpu::Device,
+        measure: Measure,
+        passes: usize,
+        steps: usize,
+    ) -> FrameQueries {
+        let mut queries = self.free.pop().unwrap_or_else(FrameQueries::empty);
+        let full = self.waiting.len() >= RING;
+        let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let measure = if full { Measure { cpu: measure.cpu, ..Measure::OFF } } else { measure };
+        queries.prepare(device, measure, count(passes), count(steps));
+        if full {
+            queries.report.notes.push(format!("not measured: {RING} earlier frames are still on the GPU"));
+        }
+        queries
+    }
+
+    /// Sends for a frame's results after its submission, or answers with the report at once if it has none to wait for.
+    pub fn end(&mut self, mut queries: FrameQueries, to_wait_for: bool) -> Option<FrameReport> {
+        if to_wait_for {
+            queries.send_for();
+            self.waiting.push(queries);
+            return None;
+        }
+        let report = std::mem::take(&mut queries.report);
+        self.free.push(queries);
+        Some(report)
+    }
+
+    /// Whether any frame is on its way.
+    pub fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Whether a frame more may be probed.
+    pub fn has_room(&self) -> bool {
+        self.waiting.len() < RING
+    }
+
+    /// The newest report that arrived.
+    pub fn collect(&mut self, period: f64) -> Option<FrameReport> {
+        let mut newest = None;
+        while let Some(first) = self.waiting.first()
+            && first.state.load(Ordering::Acquire) != WAITING
+        {
+            let mut queries = self.waiting.remove(0);
+            newest = Some(queries.read(period));
+            self.free.push(queries);
+        }
+        newest
+    }
+}

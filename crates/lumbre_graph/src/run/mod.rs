@@ -1,0 +1,11 @@
+//! Running a compiled graph on wgpu: memory, commands, time. What runs and in which order is the plan's decision.
+
+pub(crate) mod context;
+pub(crate) mod error;
+pub(crate) mod executor;
+pub(crate) mod imports;
+pub(crate) mod measure;
+pub(crate) mod pool;
+pub(crate) mod probe;
+pub(crate) mod record;
+pub(crate) mod report;

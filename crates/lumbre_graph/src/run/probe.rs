@@ -1,0 +1,196 @@
+//! The finite-value probe: looks at every float texture after the pass that wrote it, and names the first pass and
+//! texel that hold NaN or Inf. It does not look into buffers or 3D textures, and formats that can hold neither value
+//! (normalized, integer, depth, shared exponent) are not looked at.
+
+use crate::access::Part;
+use crate::resource::{Name, TextureDescriptor};
+use crate::run::report::NonFinite;
+
+/// Bytes from one result to the next: the largest alignment that a device may ask of a storage buffer's offset.
+pub(crate) const STRIDE: u64 = 256;
+
+/// Bytes of one result: `Found` in finite_probe.wgsl.
+const RESULT_BYTES: u64 = 32;
+
+/// `first` of a result without find.
+const NONE: u32 = u32::MAX;
+
+/// One look at one part of a texture after one pass.
+#[derive(Clone, Debug)]
+pub(crate) struct Probed {
+    pub pass: Name,
+    pub resource: Name,
+    pub part: Part,
+    /// In texels, to make a column and a row of the index.
+    pub width: u32,
+}
+
+/// Whether a texture of this shape can hold NaN or Inf where the probe can see it.
+pub(crate) fn can_probe(texture: &TextureDescriptor) -> bool {
+    use wgpu::TextureFormat as Format;
+    let float = matches!(
+        texture.format,
+        Format::R16Float
+            | Format::Rg16Float
+            | Format::Rgba16Float
+            | Format::R32Float
+            | Format::Rg32Float
+            | Format::Rgba32Float
+            | Format::Rg11b10Ufloat
+    );
+    float && texture.dimension == wgpu::TextureDimension::D2
+}
+
+/// The find of the earliest look that has one.
+pub(crate) fn first(probed: &[Probed], bytes: &[u8]) -> Option<NonFinite> {
+    let word = |at: usize| {
+        let chunk = bytes.get(at..).and_then(<[u8]>::first_chunk::<4>);
+        chunk.map_or(NONE, |chunk| u32::from_le_bytes(*chunk))
+    };
+    probed.iter().enumerate().find_map(|(index, look)| {
+        let at = index * STRIDE as usize;
+        let texel = word(at);
+        (texel != NONE).then(|| NonFinite {
+            pass: look.pass.clone(),
+            resource: look.resource.clone(),
+            mip: look.part.mip,
+            layer: look.part.layer,
+            x: texel % look.width,
+            y: texel / look.width,
+            sample: word(at + 4),
+            value: std::array::from_fn(|channel| f32::from_bits(word(at + 16 + 4 * channel))),
+        })
+    })
+}
+
+struct Pipelines {
+    layout: wgpu::BindGroupLayout,
+    find: wgpu::ComputePipeline,
+    fetch: wgpu::ComputePipeline,
+}
+
+/// Records looks into textures. Made when first switched on.
+pub struct FiniteProbe {
+    single: Pipelines,
+    multisampled: Pipelines,
+    results: wgpu::Buffer,
+}
+
+impl FiniteProbe {
+    /// The probe's pipelines, with room for `looks` results.
+    pub(crate) fn new(device: &wgpu::Device, looks: usize) -> Self {
+        Self {
+            single: pipelines(device, "texture_2d<f32>", "1u", false),
+            multisampled: pipelines(device, "texture_multisampled_2d<f32>", "textureNumSamples(image)", true),
+            results: results(device, looks),
+        }
+    }
+
+    /// Makes room for `looks` results and empties them, before the frame's first pass runs.
+    pub(crate) fn begin(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, looks: usize) {
+        if self.results.size() < looks as u64 * STRIDE {
+            self.results = results(device, looks);
+        }
+        queue.write_buffer(&self.results, 0, &vec![0xff; looks * STRIDE as usize]);
+    }
+
+    pub(crate) fn results(&self) -> &wgpu::Buffer {
+        &self.results
+    }
+
+    /// Records look number `index` at a view of one part, of this size in texels.
+    pub(crate) fn look(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &wgpu::TextureView,
+        size: [u32; 2],
+        index: usize,
+    ) {
+        let multisampled = view.texture().sample_count() > 1;
+        let Pipelines { layout, find, fetch } = if multisampled { &self.multisampled } else { &self.single };
+        let found = wgpu::BufferBinding {
+            buffer: &self.results,
+            offset: index as u64 * STRIDE,
+            size: wgpu::BufferSize::new(RESULT_BYTES),
+        };
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("finite probe"),
+            layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(found) },
+            ],
+        });
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("finite probe"),
+            timestamp_writes: None,
+        });
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_pipeline(find);
+        pass.dispatch_workgroups(size[0].div_ceil(8), size[1].div_ceil(8), 1);
+        pass.set_pipeline(fetch);
+        pass.dispatch_workgroups(1, 1, 1);
+    }
+}
+
+fn results(device: &wgpu::Device, looks: usize) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("finite probe results"),
+        size: looks.max(1) as u64 * STRIDE,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+fn pipelines(device: &wgpu::Device, image: &str, samples: &str, multisampled: bool) -> Pipelines {
+    let source = include_str!("finite_probe.wgsl").replace("IMAGE", image).replace("SAMPLES", samples);
+    // The header's mention of the two words is replaced too, which a comment can bear.
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("finite probe"),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    });
+    let entry = |binding: u32, ty: wgpu::BindingType| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty,
+        count: None,
+    };
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("finite probe"),
+        entries: &[
+            entry(
+                0,
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled,
+                },
+            ),
+            entry(
+                1,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Storage { read_only: false },
+                    has_dynamic_offset: false,
+                    min_binding_size: wgpu::BufferSize::new(RESULT_BYTES),
+                },
+            ),
+        ],
+    });
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("finite probe"),
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: 0,
+    });
+    let pipeline = |entry_point: &str| {
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("finite probe"),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(entry_point),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        })
+    };
+    Pipelines { find: pipeline("find"), fetch: pipeline("fetch"), layout }
+}

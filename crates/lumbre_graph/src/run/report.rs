@@ -1,0 +1,132 @@
+//! What a frame measured: times, invocations, and the first value that is not finite. Data only.
+
+use crate::resource::Name;
+
+/// What to measure. Each has a cost; [`Measure::OFF`] has none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Measure {
+    /// Time that recording each pass takes on the CPU.
+    pub cpu: bool,
+    /// Time that each pass takes on the GPU, where the device has `TIMESTAMP_QUERY`.
+    pub gpu: bool,
+    /// Vertex, fragment and compute invocations, where the device has `PIPELINE_STATISTICS_QUERY`.
+    pub statistics: bool,
+}
+
+impl Measure {
+    /// Nothing.
+    pub const OFF: Self = Self { cpu: false, gpu: false, statistics: false };
+    /// Times only.
+    pub const TIMES: Self = Self { cpu: true, gpu: true, statistics: false };
+    /// Everything.
+    pub const ALL: Self = Self { cpu: true, gpu: true, statistics: true };
+}
+
+impl Default for Measure {
+    fn default() -> Self {
+        Self::TIMES
+    }
+}
+
+/// Time on the GPU.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(tag = "scope", rename_all = "snake_case")]
+pub enum GpuTime {
+    /// Not asked for, or the device can not tell.
+    NotMeasured,
+    /// Of this pass alone.
+    Pass {
+        /// Milliseconds.
+        ms: f64,
+    },
+    /// Of a part of a render pass shared with others. On tile-based GPUs and software rasterizers, which draw all of
+    /// a render pass tile by tile, this says little; to compare such passes switch merging off
+    /// ([`Executor::set_merging`](crate::Executor::set_merging)).
+    PartOfGroup {
+        /// Milliseconds.
+        ms: f64,
+    },
+    /// Of the whole group of merged passes, the same for each of them: the device has no
+    /// `TIMESTAMP_QUERY_INSIDE_PASSES`.
+    Group {
+        /// Milliseconds.
+        ms: f64,
+    },
+}
+
+impl GpuTime {
+    /// Milliseconds, whatever they are of.
+    #[must_use]
+    pub fn ms(self) -> Option<f64> {
+        match self {
+            Self::NotMeasured => None,
+            Self::Pass { ms } | Self::PartOfGroup { ms } | Self::Group { ms } => Some(ms),
+        }
+    }
+}
+
+/// Shader invocations of one pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Invocations {
+    /// Of the vertex stage.
+    pub vertex: u64,
+    /// Of the fragment stage.
+    pub fragment: u64,
+    /// Of the compute stage.
+    pub compute: u64,
+}
+
+/// What was measured of one pass.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct PassReport {
+    /// The pass.
+    pub name: Name,
+    /// The wgpu pass of the frame it was in, from 0. Passes of the same group were merged.
+    pub group: usize,
+    /// Milliseconds that recording it took on the CPU.
+    pub cpu_ms: Option<f64>,
+    /// Time on the GPU.
+    pub gpu: GpuTime,
+    /// Shader invocations.
+    pub invocations: Option<Invocations>,
+}
+
+/// The first value of a frame that is NaN or infinite.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct NonFinite {
+    /// The first pass after which it was there.
+    pub pass: Name,
+    /// The texture that it is in.
+    pub resource: Name,
+    /// Mip level.
+    pub mip: u32,
+    /// Array layer.
+    pub layer: u32,
+    /// Column of the first such texel in reading order, from the left.
+    pub x: u32,
+    /// Row, from the top.
+    pub y: u32,
+    /// Sample within the texel, 0 unless multisampled.
+    pub sample: u32,
+    /// The texel, for looking at. (JSON has no NaN; they are `null` there.)
+    pub value: [f32; 4],
+}
+
+/// What a frame measured, all of the same frame.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct FrameReport {
+    /// The frame, counted from 1 by the executor.
+    pub frame: u64,
+    /// Milliseconds of the whole of `execute` on the CPU.
+    pub cpu_ms: Option<f64>,
+    /// Milliseconds from the first pass's begin to the last one's end on the GPU.
+    pub gpu_ms: Option<f64>,
+    /// The passes that ran, in order.
+    pub passes: Vec<PassReport>,
+    /// The first value that is not finite, if the probe was on and found one.
+    pub non_finite: Option<NonFinite>,
+    /// Whether the probe was on.
+    pub probed: bool,
+    /// What could not be measured, and why.
+    pub notes: Vec<String>,
+}
