@@ -1,0 +1,20 @@
+//! How large a scene is. Not what is in it.
+
+use bevy_ecs::prelude::*;
+
+use crate::{Bounds, GlobalTransform, Hidden, Mesh};
+
+/// The box around every mesh that is not hidden, in the world. Global transforms must be up to date.
+pub fn scene_bounds(world: &mut World) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    let mut query = world.query_filtered::<(&Mesh, &GlobalTransform), Without<Hidden>>();
+    for (mesh, transform) in query.iter(world) {
+        // Vertices that no triangle uses are not seen.
+        for &index in &mesh.0.indices {
+            if let Some(position) = mesh.0.positions.get(index as usize) {
+                bounds.include(transform.0.transform_point3(position.as_dvec3()));
+            }
+        }
+    }
+    bounds
+}

@@ -1,0 +1,308 @@
+//! What a World calls for: the numbers that decide which passes and shader variants exist. Not those decisions.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, Shading};
+use serde::Serialize;
+
+use crate::{Camera, DynamicObject, Hidden, Lightmap, MaterialTextures, Mesh, SceneSettings, StaticObject};
+
+/// Counts of what is in a World. Lights that are off and meshes that are hidden count only as such.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Census {
+    /// Lights that are on, and all that follow but `lights_off` are among them.
+    pub lights: usize,
+    /// Lights that are off.
+    pub lights_off: usize,
+    /// Ambient lights.
+    pub ambient_lights: usize,
+    /// Directional lights.
+    pub directional_lights: usize,
+    /// Point lights without a cone.
+    pub point_lights: usize,
+    /// Point and directional lights with a cone.
+    pub spot_lights: usize,
+    /// Baked whole.
+    pub static_lights: usize,
+    /// Baked but for their direct light.
+    pub mixed_lights: usize,
+    /// Not baked.
+    pub dynamic_lights: usize,
+    /// Lights that ask for a shadow.
+    pub shadow_lights: usize,
+    /// Whether there is global ambient light.
+    pub global_ambient: bool,
+    /// Entities with a mesh that is shown.
+    pub meshes: usize,
+    /// Different meshes among them.
+    pub distinct_meshes: usize,
+    /// Triangles of all shown meshes.
+    pub triangles: usize,
+    /// Meshes that are hidden.
+    pub hidden: usize,
+    /// Meshes that the baker lights.
+    pub static_objects: usize,
+    /// Meshes that move.
+    pub dynamic_objects: usize,
+    /// Meshes with a lightmap.
+    pub lightmapped: usize,
+    /// Lightmap images.
+    pub lightmap_images: usize,
+    /// Meshes with a base colour texture.
+    pub base_color_textures: usize,
+    /// Meshes with an emissive texture.
+    pub emissive_textures: usize,
+    /// Meshes with a metallic-roughness texture.
+    pub metallic_roughness_textures: usize,
+    /// Texture images.
+    pub texture_images: usize,
+    /// Meshes with vertex colours.
+    pub vertex_colors: usize,
+    /// Meshes that are cut out by alpha.
+    pub alpha_mask: usize,
+    /// Meshes that are blended.
+    pub alpha_blend: usize,
+    /// Meshes whose back is drawn.
+    pub two_sided: usize,
+    /// Two-sided meshes with a material of its own on the back.
+    pub back_materials: usize,
+    /// Meshes that take no light.
+    pub unlit: usize,
+    /// Meshes that emit light.
+    pub emissive: usize,
+    /// Meshes with a highlight.
+    pub specular: usize,
+    /// Meshes that mirror.
+    pub mirrors: usize,
+    /// Meshes that light passes through.
+    pub transmission: usize,
+    /// Meshes shaded per face.
+    pub flat: usize,
+    /// Meshes shaded per vertex.
+    pub gouraud: usize,
+    /// Meshes shaded per fragment.
+    pub phong: usize,
+    /// Whether there is fog.
+    pub fog: bool,
+    /// Cameras.
+    pub cameras: usize,
+}
+
+/// One effect, whether the scene calls for it, and why.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct CensusLine {
+    /// The effect.
+    pub effect: &'static str,
+    /// Whether the scene calls for it.
+    pub called_for: bool,
+    /// How many things call for it.
+    pub count: usize,
+    /// Why, or why not.
+    pub reason: String,
+}
+
+impl Census {
+    /// Counts what is in a World.
+    pub fn of(world: &mut World) -> Self {
+        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let mut census = Self {
+            fog: settings.fog.is_some(),
+            global_ambient: settings.ambient != Vec3::ZERO,
+            cameras: world.query::<&Camera>().iter(world).count(),
+            ..Self::default()
+        };
+        for light in world.query::<&Light>().iter(world) {
+            census.count_light(light);
+        }
+        census.count_meshes(world, &settings);
+        census
+    }
+
+    fn count_light(&mut self, light: &Light) {
+        if !light.enabled {
+            self.lights_off += 1;
+            return;
+        }
+        self.lights += 1;
+        *match (light.kind, light.spot) {
+            (LightKind::Ambient, _) => &mut self.ambient_lights,
+            (_, Some(cone)) if !cone.is_everywhere() => &mut self.spot_lights,
+            (LightKind::Directional, _) => &mut self.directional_lights,
+            (LightKind::Point, _) => &mut self.point_lights,
+        } += 1;
+        *match light.bake {
+            BakeMode::Static => &mut self.static_lights,
+            BakeMode::Mixed => &mut self.mixed_lights,
+            BakeMode::Dynamic => &mut self.dynamic_lights,
+        } += 1;
+        self.shadow_lights += usize::from(light.shadow && light.kind != LightKind::Ambient);
+    }
+
+    fn count_meshes(&mut self, world: &mut World, settings: &SceneSettings) {
+        let mut meshes = HashSet::new();
+        let mut lightmaps = HashSet::new();
+        let mut images = HashSet::new();
+        let mut query = world.query::<(
+            (&Mesh, &Material, Has<Hidden>, Has<StaticObject>, Has<DynamicObject>),
+            (Option<&MaterialTextures>, Option<&Lightmap>, Option<&Shading>),
+        )>();
+        for ((mesh, material, hidden, fixed, moves), (textures, lightmap, shading)) in query.iter(world) {
+            if hidden {
+                self.hidden += 1;
+                continue;
+            }
+            self.meshes += 1;
+            self.triangles += mesh.0.triangle_count();
+            meshes.insert(Arc::as_ptr(&mesh.0));
+            self.static_objects += usize::from(fixed && !moves);
+            self.dynamic_objects += usize::from(moves);
+            self.vertex_colors += usize::from(!mesh.0.colors.is_empty());
+            if let Some(lightmap) = lightmap.filter(|_| !mesh.0.uv1.is_empty()) {
+                self.lightmapped += 1;
+                lightmaps.insert(Arc::as_ptr(&lightmap.image));
+            }
+            if let Some(textures) = textures {
+                let roughness = textures.metallic_roughness.as_ref().map(|slot| &slot.texture);
+                for (count, texture) in [
+                    (&mut self.base_color_textures, textures.base_color.as_ref()),
+                    (&mut self.emissive_textures, textures.emissive.as_ref()),
+                    (&mut self.metallic_roughness_textures, roughness),
+                ] {
+                    if let Some(texture) = texture {
+                        *count += 1;
+                        images.insert(Arc::as_ptr(&texture.image));
+                    }
+                }
+            }
+            self.count_material(material, settings);
+            if !material.unlit {
+                *match shading.copied().unwrap_or(settings.shading) {
+                    Shading::Flat => &mut self.flat,
+                    Shading::Gouraud => &mut self.gouraud,
+                    Shading::Phong => &mut self.phong,
+                } += 1;
+            }
+        }
+        self.distinct_meshes = meshes.len();
+        self.lightmap_images = lightmaps.len();
+        self.texture_images = images.len();
+    }
+
+    fn count_material(&mut self, material: &Material, settings: &SceneSettings) {
+        let two_sided = material.double_sided && settings.two_sided;
+        let back = material.back.as_ref().filter(|_| two_sided);
+        let either = |of: fn(&lumbre_optics::Surface) -> Vec3| {
+            of(&material.front) != Vec3::ZERO || back.is_some_and(|back| of(back) != Vec3::ZERO)
+        };
+        self.alpha_mask += usize::from(matches!(material.alpha_mode, AlphaMode::Mask { .. }));
+        self.alpha_blend += usize::from(material.alpha_mode == AlphaMode::Blend);
+        self.two_sided += usize::from(two_sided);
+        self.back_materials += usize::from(back.is_some());
+        self.unlit += usize::from(material.unlit);
+        self.emissive += usize::from(either(|surface| surface.emission));
+        self.specular += usize::from(!material.unlit && either(|surface| surface.specular));
+        self.mirrors += usize::from(material.mirror != Vec3::ZERO);
+        self.transmission += usize::from(material.transmission != Vec3::ZERO);
+    }
+
+    /// Every effect in the order in which a frame is made, called for or not.
+    pub fn lines(&self) -> Vec<CensusLine> {
+        let line = |effect, count: usize, singular: &str, plural: &str, none: &str| CensusLine {
+            effect,
+            called_for: count > 0,
+            count,
+            reason: match count {
+                0 => none.to_owned(),
+                1 => format!("1 {singular}"),
+                count => format!("{count} {plural}"),
+            },
+        };
+        let mesh = |effect, count, what: &str, none: &str| {
+            line(effect, count, &format!("mesh {what}"), &format!("meshes {what}"), none)
+        };
+        let light = |effect, count, kind: &str| {
+            let off = if self.lights_off > 0 {
+                format!(" ({} lights are off)", self.lights_off)
+            } else {
+                String::new()
+            };
+            let none = format!("no {kind} light is on{off}");
+            line(effect, count, &format!("{kind} light"), &format!("{kind} lights"), &none)
+        };
+        let textured =
+            self.base_color_textures.max(self.emissive_textures).max(self.metallic_roughness_textures);
+        let scene = |effect, on: bool, yes: &str, no: &str| CensusLine {
+            effect,
+            called_for: on,
+            count: usize::from(on),
+            reason: (if on { yes } else { no }).to_owned(),
+        };
+        vec![
+            mesh("meshes", self.meshes, "to draw", "no mesh is shown"),
+            mesh("flat shading", self.flat, "shaded per face", "no lit mesh asks for it"),
+            mesh("Gouraud shading", self.gouraud, "shaded per vertex", "no lit mesh asks for it"),
+            mesh("Phong shading", self.phong, "shaded per fragment", "no lit mesh asks for it"),
+            scene(
+                "global ambient",
+                self.global_ambient,
+                "the scene's ambient light is not black",
+                "the scene's ambient light is black",
+            ),
+            light("ambient lights", self.ambient_lights, "ambient"),
+            light("directional lights", self.directional_lights, "directional"),
+            light("point lights", self.point_lights, "point"),
+            light("spot lights", self.spot_lights, "spot"),
+            light("dynamic lights", self.dynamic_lights, "dynamic"),
+            light("mixed lights", self.mixed_lights, "mixed"),
+            light("static lights", self.static_lights, "static"),
+            line(
+                "shadows",
+                self.shadow_lights,
+                "light asks for one",
+                "lights ask for one",
+                "no light that is on asks for one",
+            ),
+            mesh("specular", self.specular, "with a highlight", "every specular coefficient is 0"),
+            mesh("emission", self.emissive, "that emits", "no material emits"),
+            mesh("lightmaps", self.lightmapped, "with a lightmap", "no mesh has a lightmap"),
+            mesh("textures", textured, "with a textured material", "no material has a texture"),
+            mesh("base colour textures", self.base_color_textures, "with one", "no material has one"),
+            mesh("emissive textures", self.emissive_textures, "with one", "no material has one"),
+            mesh(
+                "metallic-roughness textures",
+                self.metallic_roughness_textures,
+                "with one",
+                "no material has one",
+            ),
+            mesh("vertex colours", self.vertex_colors, "with COLOR_0", "no mesh has COLOR_0"),
+            mesh("alpha mask", self.alpha_mask, "cut out by alpha", "no material is masked"),
+            mesh("alpha blending", self.alpha_blend, "blended", "no material is blended"),
+            mesh(
+                "two-sided",
+                self.two_sided,
+                "lit from both sides",
+                "no surface is lit from both sides",
+            ),
+            mesh(
+                "back materials",
+                self.back_materials,
+                "with a material on the back",
+                "no visible back has a material of its own",
+            ),
+            mesh("unlit", self.unlit, "that takes no light", "every material takes light"),
+            mesh("mirrors", self.mirrors, "that mirrors", "every mirror coefficient is 0"),
+            mesh(
+                "transmission",
+                self.transmission,
+                "that light passes through",
+                "every transmission coefficient is 0",
+            ),
+            scene("fog", self.fog, "the scene has fog", "the scene has no fog"),
+            mesh("dynamic objects", self.dynamic_objects, "that moves", "nothing moves"),
+            mesh("static objects", self.static_objects, "for the baker", "no mesh is static"),
+        ]
+    }
+}

@@ -1,0 +1,162 @@
+//! What an entity can be, beside the lights and materials of `lumbre_optics`: a mesh, a camera, a lightmapped surface.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::DVec3;
+use lumbre_mesh::TriangleMesh;
+
+use crate::{Image, LightmapImage, TextureReference, Transform};
+
+/// The geometry of an entity. Entities that share the `Arc` share the GPU's copy.
+/// To change a mesh, put another `Arc` in its place.
+#[derive(Component, Clone, Debug)]
+#[require(Transform, lumbre_optics::Material)]
+pub struct Mesh(pub Arc<TriangleMesh>);
+
+/// Textures that modulate an entity's `Material`. An entity without this component has none, and no texture code runs for it.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct MaterialTextures {
+    /// Multiplies ambient, diffuse and alpha (sRGB).
+    pub base_color: Option<TextureReference>,
+    /// Multiplies emission (sRGB).
+    pub emissive: Option<TextureReference>,
+    /// Green is roughness, blue is metallic (linear); present only for glTF materials without Phong coefficients.
+    pub metallic_roughness: Option<MetallicRoughnessTexture>,
+}
+
+/// A metallic-roughness texture with the factors that the per-texel mapping to Phong needs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MetallicRoughnessTexture {
+    /// The texture.
+    pub texture: TextureReference,
+    /// Base colour factor, linear RGB.
+    pub base_color: glam::Vec3,
+    /// Factor of the blue channel, [0, 1].
+    pub metallic: f32,
+    /// Factor of the green channel, [0, 1].
+    pub roughness: f32,
+}
+
+/// An entity whose indirect (and static direct) light comes from a baked texture through the mesh's `uv1`.
+#[derive(Component, Clone, Debug)]
+pub struct Lightmap {
+    /// E/π per texel, shared by the entities of one map.
+    pub image: Arc<LightmapImage>,
+}
+
+/// Says that an entity never moves: the baker lights it. Set by the importer on every mesh that is not under a
+/// [`DynamicObject`].
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StaticObject;
+
+/// An entity that moves in the game: the baker leaves it (and what hangs below it) out.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DynamicObject;
+
+/// Hides the mesh of an entity.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hidden;
+
+/// The `extras` of a glTF node: data of the application, kept from import to export.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct Extras(pub serde_json::Value);
+
+/// One primitive of a glTF mesh; a child of the node's entity. On export the primitives of a node become one mesh again.
+#[derive(Component, Clone, Debug, PartialEq, Eq)]
+pub struct Primitive {
+    /// Place in the mesh's list of primitives.
+    pub index: usize,
+    /// Name of the glTF mesh, or the node's.
+    pub mesh: Arc<str>,
+    /// Name of the glTF material, empty without one.
+    pub material: Arc<str>,
+}
+
+/// The lens of a camera; it looks along its entity's -Z with +Y up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// A pinhole.
+    Perspective {
+        /// Vertical field of view in radians, in (0, π).
+        vertical_fov: f64,
+        /// Width by height; the target's if absent.
+        aspect: Option<f64>,
+        /// Near plane in metres, greater than 0. There is no far plane (reversed-Z, infinite); `far` is kept for export only.
+        near: f64,
+        /// Far distance as the file gave it, if it did.
+        far: Option<f64>,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Half width in metres.
+        half_width: f64,
+        /// Half height in metres.
+        half_height: f64,
+        /// Near plane in metres.
+        near: f64,
+        /// Far plane in metres.
+        far: f64,
+    },
+}
+
+/// A camera.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[require(Transform)]
+pub struct Camera {
+    /// The lens.
+    pub projection: Projection,
+    /// Factor from radiance to display values, greater than 0.
+    pub exposure: f32,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        let projection = Projection::Perspective { vertical_fov: 0.9, aspect: None, near: 0.05, far: None };
+        Self { projection, exposure: 1.0 }
+    }
+}
+
+/// The camera that frames are drawn from, if there are several. The first one otherwise.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ActiveCamera;
+
+/// An axis-aligned box in the world, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub min: DVec3,
+    /// Largest corner.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// Holds nothing; grows from here.
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// Grows to hold a point; points that are not finite are ignored.
+    pub fn include(&mut self, point: DVec3) {
+        if point.is_finite() {
+            self.min = self.min.min(point);
+            self.max = self.max.max(point);
+        }
+    }
+
+    /// Whether it holds nothing.
+    pub fn is_empty(&self) -> bool {
+        !(self.min.cmple(self.max).all())
+    }
+
+    /// Its middle; the origin if it is empty.
+    pub fn center(&self) -> DVec3 {
+        if self.is_empty() { DVec3::ZERO } else { 0.5 * self.min + 0.5 * self.max }
+    }
+
+    /// Half its diagonal in metres; 0 if it is empty.
+    pub fn radius(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { 0.5 * (self.max - self.min).length() }
+    }
+}
+
+/// An image that several components may share.
+pub type SharedImage = Arc<Image>;

@@ -1,0 +1,210 @@
+//! A camera for files without one: from outside, into the open side of a room. Not a camera path.
+//!
+//! Among the six views along the axes the one is chosen from which most of the scene is seen. Parallel rays on a regular grid enter the box
+//! around the scene at its near face; how deep they go until they meet the first triangle, as a part of the box's depth, is averaged over the
+//! grid, rays that meet nothing aside. A closed side stops them at once (0), the open side of a room lets them through to its back wall
+//! (nearly 1), and a single object stops them halfway from every side. Views from a side win over those from above or below unless these see
+//! much more, and among equals the first of +Z, +X, -X, -Z, +Y, -Y wins: +Z is what glTF calls the front.
+
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DVec2, DVec3};
+use lumbre_optics::Material;
+
+use crate::{Bounds, Camera, GlobalTransform, Hidden, Mesh, Projection, Transform, scene_bounds};
+
+/// Rays along each side of the grid: enough to see a door, few enough that large meshes take no time.
+const GRID: usize = 24;
+/// Vertical field of view in radians.
+const VERTICAL_FOV: f64 = 0.7;
+/// Air around the scene.
+const MARGIN: f64 = 1.05;
+/// How much deeper a view has to see than those before it in the list to be preferred: a view that is merely a little better
+/// is no reason to leave the front.
+const ADVANTAGE: f64 = 0.1;
+/// The same for views from above and below.
+const VERTICAL_ADVANTAGE: f64 = 0.4;
+
+/// The viewing directions in the order of preference; the camera stands on the other side.
+const DIRECTIONS: [DVec3; 6] = [DVec3::NEG_Z, DVec3::NEG_X, DVec3::X, DVec3::Z, DVec3::NEG_Y, DVec3::Y];
+
+/// A camera that frames the scene at a width by height of `aspect`. Global transforms must be up to date.
+///
+/// An empty scene gives a camera at (0, 0, 5) that looks at the origin.
+pub fn default_camera(world: &mut World, aspect: f64) -> (Transform, Camera) {
+    let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
+    let bounds = scene_bounds(world);
+    if bounds.is_empty() {
+        return (Transform::from_xyz(0.0, 0.0, 5.0), Camera::default());
+    }
+    let mut best = (DIRECTIONS[0], f64::NEG_INFINITY);
+    for (direction, depth) in DIRECTIONS.iter().zip(depths(world, &bounds)) {
+        let advantage = if direction.y == 0.0 { ADVANTAGE } else { VERTICAL_ADVANTAGE };
+        if depth > best.1 + advantage {
+            best = (*direction, depth);
+        }
+    }
+    frame(&bounds, best.0, aspect)
+}
+
+fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) {
+    let up = if direction.y == 0.0 { DVec3::Y } else { DVec3::NEG_Z };
+    let half = 0.5 * (bounds.max - bounds.min);
+    let right = direction.cross(up);
+    let extent = |axis: DVec3| half.dot(axis.abs());
+    let tangent = (0.5 * VERTICAL_FOV).tan();
+    // The near face is the larger in the picture. A scene without extent is looked at from where it can be seen.
+    let needed = (extent(up) / tangent).max(extent(right) / (tangent * aspect)) * MARGIN;
+    let size = bounds.radius().max(1e-3);
+    let distance = (needed + extent(direction)).max(1.1 * extent(direction) + 0.01 * size).max(size);
+    let center = bounds.center();
+    let transform = Transform::from_translation(center - direction * distance).looking_at(center, up);
+    let near = (1e-3 * size).min(0.05).max(1e-6 * size);
+    let projection = Projection::Perspective { vertical_fov: VERTICAL_FOV, aspect: None, near, far: None };
+    (transform, Camera { projection, exposure: 1.0 })
+}
+
+/// The mean depth that the first hits have from each direction, 0 to 1.
+fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
+    let size = (bounds.max - bounds.min).max(DVec3::splat(f64::MIN_POSITIVE));
+    // The box as [0, 1]³, so that one grid serves all directions.
+    let unit = DAffine3::from_scale(size.recip()) * DAffine3::from_translation(-bounds.min);
+    let mut first = vec![[f64::INFINITY; GRID * GRID]; 6];
+    let mut query = world.query_filtered::<(&Mesh, &GlobalTransform, Option<&Material>), Without<Hidden>>();
+    for (mesh, transform, material) in query.iter(world) {
+        let to_unit = unit * transform.0;
+        let mirrored = to_unit.matrix3.determinant() < 0.0;
+        let double_sided = material.is_some_and(|material| material.double_sided);
+        let position =
+            |index: u32| mesh.0.positions.get(index as usize).map(|p| to_unit.transform_point3(p.as_dvec3()));
+        for corners in mesh.0.triangles() {
+            let [Some(a), Some(mut b), Some(mut c)] = corners.map(position) else { continue };
+            if mirrored {
+                (b, c) = (c, b);
+            }
+            let normal = (b - a).cross(c - a);
+            for (direction, depths) in DIRECTIONS.iter().zip(&mut first) {
+                // Back faces that are not drawn block nothing: rooms are often modelled so.
+                if double_sided || normal.dot(*direction) < 0.0 {
+                    splat([a, b, c], *direction, depths);
+                }
+            }
+        }
+    }
+    std::array::from_fn(|view| {
+        let hits: Vec<f64> = first[view].iter().copied().filter(|depth| depth.is_finite()).collect();
+        if hits.is_empty() { 0.0 } else { hits.iter().sum::<f64>() / hits.len() as f64 }
+    })
+}
+
+/// Lowers the depth of every grid ray that a triangle in the unit cube stops.
+fn splat(corners: [DVec3; 3], direction: DVec3, depths: &mut [f64; GRID * GRID]) {
+    let axis = direction.abs().max_position();
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let flat = corners.map(|corner| DVec2::new(corner[u], corner[v]));
+    let depth = corners.map(|corner| if direction[axis] > 0.0 { corner[axis] } else { 1.0 - corner[axis] });
+    let area = (flat[1] - flat[0]).perp_dot(flat[2] - flat[0]);
+    // Seen edge on, or not a number.
+    if area.is_nan() || area == 0.0 {
+        return;
+    }
+    let low = flat[0].min(flat[1]).min(flat[2]);
+    let high = flat[0].max(flat[1]).max(flat[2]);
+    let cell = |value: f64| (value * GRID as f64 - 0.5).clamp(-1.0, GRID as f64);
+    let range = |low: f64, high: f64| {
+        (cell(low).ceil().max(0.0) as usize)..(cell(high).floor() + 1.0).clamp(0.0, GRID as f64) as usize
+    };
+    for row in range(low.y, high.y) {
+        for column in range(low.x, high.x) {
+            let point = (DVec2::new(column as f64, row as f64) + 0.5) / GRID as f64;
+            let weight = |i: usize| (flat[(i + 1) % 3] - point).perp_dot(flat[(i + 2) % 3] - point) / area;
+            let weights = [weight(0), weight(1), weight(2)];
+            if weights.iter().all(|&weight| weight >= 0.0) {
+                let here = weights[0] * depth[0] + weights[1] * depth[1] + weights[2] * depth[2];
+                let nearest = &mut depths[row * GRID + column];
+                *nearest = nearest.min(here);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use lumbre_mesh::TriangleMesh;
+
+    use super::*;
+    use crate::update_transforms;
+
+    /// The walls of a unit cube as a double-sided mesh, but for the one in direction `open`.
+    fn room(open: Option<DVec3>) -> World {
+        let mut mesh = TriangleMesh::default();
+        for direction in DIRECTIONS {
+            if Some(direction) == open {
+                continue;
+            }
+            let side = direction.any_orthonormal_vector();
+            let other = direction.cross(side);
+            let start = mesh.positions.len() as u32;
+            for (s, t) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+                mesh.positions.push((0.5 * (direction + s * side + t * other)).as_vec3());
+            }
+            mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|corner| corner + start));
+        }
+        let mut world = World::new();
+        world.spawn((Mesh(Arc::new(mesh)), Material { double_sided: true, ..Material::default() }));
+        update_transforms(&mut world);
+        world
+    }
+
+    #[test]
+    fn looks_into_the_open_side() {
+        for open in DIRECTIONS {
+            let mut world = room(Some(open));
+            let (transform, _) = default_camera(&mut world, 1.5);
+            let place = transform.translation.normalize();
+            assert!(place.dot(open) > 0.999, "open towards {open}, camera at {place}");
+            assert!((transform.rotation * DVec3::NEG_Z).dot(-open) > 0.999);
+        }
+    }
+
+    #[test]
+    fn a_closed_thing_is_seen_from_the_front() {
+        let (transform, _) = default_camera(&mut room(None), 1.0);
+        assert!(transform.translation.z > 1.0 && transform.translation.x.abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_whole_box_is_in_the_picture() {
+        for aspect in [0.3, 1.0, 3.0] {
+            let (transform, camera) = default_camera(&mut room(Some(DVec3::Z)), aspect);
+            let Projection::Perspective { vertical_fov, near, .. } = camera.projection else {
+                panic!("not a perspective")
+            };
+            let view = transform.affine().inverse();
+            for corner in 0..8 {
+                let sign = |bit: u32| if corner >> bit & 1 == 1 { 0.5 } else { -0.5 };
+                let point = view.transform_point3(DVec3::new(sign(0), sign(1), sign(2)));
+                let tangent = (0.5 * vertical_fov).tan();
+                assert!(-point.z > near);
+                assert!(point.y.abs() < -point.z * tangent && point.x.abs() < -point.z * tangent * aspect);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_or_a_point_still_gives_a_camera() {
+        let (transform, _) = default_camera(&mut World::new(), f64::NAN);
+        assert!(transform.affine().is_finite());
+        let mut world = World::new();
+        let mesh = TriangleMesh {
+            positions: vec![glam::Vec3::ONE],
+            indices: vec![0, 0, 0],
+            ..TriangleMesh::default()
+        };
+        world.spawn(Mesh(Arc::new(mesh)));
+        update_transforms(&mut world);
+        let (transform, _) = default_camera(&mut world, 1.0);
+        assert!(transform.affine().is_finite());
+    }
+}

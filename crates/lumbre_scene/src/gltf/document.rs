@@ -1,0 +1,382 @@
+//! The JSON of a glTF 2.0 file as plain data, indices and numbers unchecked. Not its buffers, and not what it means.
+//!
+//! Written here rather than taken from the `gltf` crate, which panics on some malformed files and keeps numbers as f32.
+//! Every list is read element by element, so that an error names the element.
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use super::error::LoadProblem;
+
+/// Extension objects by name.
+pub(crate) type Extensions = Map<String, Value>;
+
+#[derive(Deserialize, Debug, Default)]
+pub(crate) struct Scene {
+    #[serde(default)]
+    pub nodes: Vec<usize>,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug, Default)]
+pub(crate) struct Node {
+    pub name: Option<String>,
+    #[serde(default)]
+    pub children: Vec<usize>,
+    pub mesh: Option<usize>,
+    pub camera: Option<usize>,
+    pub skin: Option<usize>,
+    pub matrix: Option<[f64; 16]>,
+    pub translation: Option<[f64; 3]>,
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+    #[serde(default)]
+    pub extensions: Extensions,
+    pub extras: Option<Value>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Mesh {
+    pub name: Option<String>,
+    #[serde(default)]
+    pub primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Primitive {
+    pub attributes: Map<String, Value>,
+    pub indices: Option<usize>,
+    pub material: Option<usize>,
+    pub mode: Option<u32>,
+    pub targets: Option<Value>,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Accessor {
+    pub buffer_view: Option<usize>,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub component_type: u32,
+    #[serde(default)]
+    pub normalized: bool,
+    pub count: u64,
+    #[serde(rename = "type")]
+    pub shape: String,
+    pub sparse: Option<Sparse>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Sparse {
+    pub count: u64,
+    pub indices: SparseIndices,
+    pub values: SparseValues,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct SparseIndices {
+    pub buffer_view: usize,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub component_type: u32,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct SparseValues {
+    pub buffer_view: usize,
+    #[serde(default)]
+    pub byte_offset: u64,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct BufferView {
+    pub buffer: usize,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: Option<u64>,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Buffer {
+    pub uri: Option<String>,
+    pub byte_length: u64,
+}
+
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Material {
+    pub name: Option<String>,
+    #[serde(default)]
+    pub pbr_metallic_roughness: MetallicRoughness,
+    pub normal_texture: Option<Value>,
+    pub occlusion_texture: Option<Value>,
+    pub emissive_texture: Option<TextureInfo>,
+    pub emissive_factor: Option<[f64; 3]>,
+    pub alpha_mode: Option<String>,
+    pub alpha_cutoff: Option<f64>,
+    #[serde(default)]
+    pub double_sided: bool,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct MetallicRoughness {
+    pub base_color_factor: Option<[f64; 4]>,
+    pub base_color_texture: Option<TextureInfo>,
+    pub metallic_factor: Option<f64>,
+    pub roughness_factor: Option<f64>,
+    pub metallic_roughness_texture: Option<TextureInfo>,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct TextureInfo {
+    pub index: usize,
+    #[serde(default)]
+    pub tex_coord: u32,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Texture {
+    pub sampler: Option<usize>,
+    pub source: Option<usize>,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Image {
+    pub name: Option<String>,
+    pub uri: Option<String>,
+    pub buffer_view: Option<usize>,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Sampler {
+    pub mag_filter: Option<u32>,
+    pub min_filter: Option<u32>,
+    pub wrap_s: Option<u32>,
+    pub wrap_t: Option<u32>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Camera {
+    pub name: Option<String>,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub perspective: Option<Perspective>,
+    pub orthographic: Option<Orthographic>,
+}
+
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Perspective {
+    pub aspect_ratio: Option<f64>,
+    pub yfov: f64,
+    pub znear: f64,
+    pub zfar: Option<f64>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Orthographic {
+    pub xmag: f64,
+    pub ymag: f64,
+    pub znear: f64,
+    pub zfar: f64,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Animation {
+    #[serde(default)]
+    pub channels: Vec<Channel>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Channel {
+    pub target: Target,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct Target {
+    pub node: Option<usize>,
+}
+
+/// `KHR_lights_punctual.lights[i]`.
+#[derive(Deserialize, Debug)]
+pub(crate) struct PunctualLight {
+    pub name: Option<String>,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub color: Option<[f64; 3]>,
+    pub intensity: Option<f64>,
+    pub range: Option<f64>,
+    pub spot: Option<PunctualSpot>,
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct PunctualSpot {
+    pub inner_cone_angle: Option<f64>,
+    pub outer_cone_angle: Option<f64>,
+}
+
+/// A whole file.
+#[derive(Debug)]
+pub(crate) struct Document {
+    pub scene: Option<usize>,
+    pub scenes: Vec<Scene>,
+    pub nodes: Vec<Node>,
+    pub meshes: Vec<Mesh>,
+    pub accessors: Vec<Accessor>,
+    pub buffer_views: Vec<BufferView>,
+    pub buffers: Vec<Buffer>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub images: Vec<Image>,
+    pub samplers: Vec<Sampler>,
+    pub cameras: Vec<Camera>,
+    pub animations: Vec<Animation>,
+    pub skins: usize,
+    pub lights: Vec<PunctualLight>,
+    pub extensions_used: Vec<String>,
+    pub extensions_required: Vec<String>,
+}
+
+impl Document {
+    /// Reads the JSON text of a file; checks types and the version, not indices or ranges.
+    pub(crate) fn parse(json: &[u8]) -> Result<Self, LoadProblem> {
+        let at = |place: &str| {
+            let place = place.to_owned();
+            move |source| LoadProblem::Json { place, source }
+        };
+        let mut root: Map<String, Value> = serde_json::from_slice(json).map_err(at("JSON"))?;
+        let version = root.get("asset").and_then(|asset| asset.get("version")).and_then(Value::as_str);
+        if version.is_none_or(|version| version.split('.').next() != Some("2")) {
+            let version =
+                version.map_or_else(|| "unstated (no asset.version)".to_owned(), |v| shortened(v).to_owned());
+            return Err(LoadProblem::Version { version });
+        }
+        let mut lights = Vec::new();
+        if let Some(Value::Object(extensions)) = root.get_mut("extensions")
+            && let Some(Value::Object(punctual)) = extensions.get_mut("KHR_lights_punctual")
+        {
+            lights = list(punctual, "lights", "KHR_lights_punctual.lights")?;
+        }
+        let scene = root.remove("scene").map(serde_json::from_value).transpose().map_err(at("scene"))?;
+        Ok(Self {
+            scene,
+            scenes: list(&mut root, "scenes", "scenes")?,
+            nodes: list(&mut root, "nodes", "nodes")?,
+            meshes: list(&mut root, "meshes", "meshes")?,
+            accessors: list(&mut root, "accessors", "accessors")?,
+            buffer_views: list(&mut root, "bufferViews", "bufferViews")?,
+            buffers: list(&mut root, "buffers", "buffers")?,
+            materials: list(&mut root, "materials", "materials")?,
+            textures: list(&mut root, "textures", "textures")?,
+            images: list(&mut root, "images", "images")?,
+            samplers: list(&mut root, "samplers", "samplers")?,
+            cameras: list(&mut root, "cameras", "cameras")?,
+            animations: list(&mut root, "animations", "animations")?,
+            skins: list::<Value>(&mut root, "skins", "skins")?.len(),
+            lights,
+            extensions_used: list(&mut root, "extensionsUsed", "extensionsUsed")?,
+            extensions_required: list(&mut root, "extensionsRequired", "extensionsRequired")?,
+        })
+    }
+
+    /// `nodes[3] (lamp)`, for messages.
+    pub(crate) fn node_place(&self, node: usize) -> String {
+        place("nodes", node, self.nodes.get(node).and_then(|node| node.name.as_deref()))
+    }
+
+    /// `meshes[3] (crate)`, for messages.
+    pub(crate) fn mesh_place(&self, mesh: usize) -> String {
+        place("meshes", mesh, self.meshes.get(mesh).and_then(|mesh| mesh.name.as_deref()))
+    }
+
+    /// `materials[3] (rust)`, for messages.
+    pub(crate) fn material_place(&self, material: usize) -> String {
+        place(
+            "materials",
+            material,
+            self.materials.get(material).and_then(|material| material.name.as_deref()),
+        )
+    }
+}
+
+/// The beginning of a text from a file, short enough for a message.
+pub(crate) fn shortened(text: &str) -> &str {
+    match text.char_indices().nth(80) {
+        Some((end, _)) => &text[..end],
+        None => text,
+    }
+}
+
+fn place(list: &str, index: usize, name: Option<&str>) -> String {
+    match name {
+        Some(name) => format!("{list}[{index}] ({})", shortened(name)),
+        None => format!("{list}[{index}]"),
+    }
+}
+
+fn list<T: DeserializeOwned>(
+    object: &mut Map<String, Value>,
+    key: &str,
+    place: &str,
+) -> Result<Vec<T>, LoadProblem> {
+    let Some(value) = object.remove(key) else { return Ok(Vec::new()) };
+    let elements: Vec<Value> = serde_json::from_value(value)
+        .map_err(|source| LoadProblem::Json { place: place.to_owned(), source })?;
+    let parsed = elements.into_iter().enumerate().map(|(index, element)| {
+        serde_json::from_value(element)
+            .map_err(|source| LoadProblem::Json { place: format!("{place}[{index}]"), source })
+    });
+    parsed.collect()
+}
+
+/// The extension `name` of an object, if it has one.
+pub(crate) fn extension<T: DeserializeOwned>(
+    extensions: &Extensions,
+    name: &str,
+    place: &str,
+) -> Result<Option<T>, LoadProblem> {
+    let Some(value) = extensions.get(name) else { return Ok(None) };
+    // By reference: no copy of a tree that may be large.
+    T::deserialize(value)
+        .map(Some)
+        .map_err(|source| LoadProblem::Json { place: format!("{place}.extensions.{name}"), source })
+}
+
+/// The element that an index points at, or an error that names the field holding the index.
+pub(crate) fn element<'a, T>(
+    list: &'a [T],
+    name: &'static str,
+    index: usize,
+    place: impl FnOnce() -> String,
+) -> Result<&'a T, LoadProblem> {
+    list.get(index).ok_or_else(|| LoadProblem::Reference {
+        place: place(),
+        list: name,
+        index,
+        count: list.len(),
+    })
+}

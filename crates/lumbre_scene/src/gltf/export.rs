@@ -1,0 +1,297 @@
+//! Saving: a World as a .glb, or a .gltf with a .bin, and its lightmaps as OpenEXR images beside it.
+
+use std::collections::{HashMap, HashSet};
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use lumbre_mesh::MeshError;
+use lumbre_optics::{FogError, LightError, MaterialError};
+use serde_json::{Map, Value, json};
+
+use super::error::Note;
+use super::export_files::Files;
+use super::export_nodes::Nodes;
+use super::{container, export_scene, uri};
+use crate::{LightmapEncoding, LightmapImage};
+
+/// What saving wrote.
+#[derive(Clone, Debug, Default)]
+pub struct SaveReport {
+    /// Every file, the glTF itself last.
+    pub files: Vec<PathBuf>,
+    /// Bytes of the glTF file and its .bin.
+    pub bytes: u64,
+    /// What could not be expressed and was left out.
+    pub notes: Vec<Note>,
+}
+
+/// Why a World cannot be saved.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SaveError {
+    /// The name ends in neither .glb nor .gltf.
+    #[error("{} ends in neither .glb nor .gltf; name the output with one of them", path.display())]
+    Extension {
+        /// The name.
+        path: PathBuf,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}: {source}; check the folder, its permissions and the space left", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A mesh is not valid.
+    #[error("{place}: {source}")]
+    Mesh {
+        /// The entity.
+        place: String,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+    /// A number is NaN or infinite, which JSON cannot hold.
+    #[error("{place}: {field} holds a number that is NaN or infinite; correct it before saving")]
+    NotFinite {
+        /// The entity.
+        place: String,
+        /// The component.
+        field: String,
+    },
+    /// A light that could not be loaded again.
+    #[error("{place}: {source}")]
+    Light {
+        /// The entity.
+        place: String,
+        /// What is wrong with it.
+        source: LightError,
+    },
+    /// A material that could not be loaded again.
+    #[error("{place}: {source}")]
+    Material {
+        /// The entity.
+        place: String,
+        /// What is wrong with it.
+        source: MaterialError,
+    },
+    /// A fog that could not be loaded again.
+    #[error("scene: {source}")]
+    Fog {
+        /// What is wrong with it.
+        source: FogError,
+    },
+    /// An image cannot be encoded.
+    #[error("{place}: the image {image:?} cannot be written: {problem}; correct it before saving")]
+    Image {
+        /// The entity.
+        place: String,
+        /// The image.
+        image: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The JSON cannot be written.
+    #[error("cannot write the JSON: {source}")]
+    Json {
+        /// What the writer said.
+        source: serde_json::Error,
+    },
+    /// More than a .glb can hold.
+    #[error("{} would exceed the 4 GiB that a .glb can hold; save as .gltf", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Saves every entity with a `Transform`, the scene's settings and the lightmaps.
+///
+/// The format is chosen by the extension of `path`. Textures are embedded as PNG; lightmaps lie beside as `<stem>.<node>.exr`. Files are
+/// written under temporary names first and renamed when all are complete, the glTF last.
+///
+/// # Errors
+/// [`SaveError`] with the place and the remedy. Nothing half-written is left behind.
+pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    let binary = match extension.as_deref() {
+        Some("glb") => true,
+        Some("gltf") => false,
+        _ => return Err(SaveError::Extension { path: path.to_owned() }),
+    };
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut lightmaps = LightmapFiles::new(stem.clone());
+    let nodes = Nodes::collect(world, &mut lightmaps)?;
+    let scene = export_scene::settings(world)?;
+
+    let mut files = Files::default();
+    for (name, image) in &lightmaps.images {
+        files.write(&path.with_file_name(name), &open_exr(image)?)?;
+    }
+    let bin_name = format!("{stem}.bin");
+    let (json, data, notes) = document(nodes, scene, (!binary).then_some(bin_name.as_str()));
+    let mut bytes = data.len() as u64;
+    if binary {
+        let text = serde_json::to_vec(&json).map_err(|source| SaveError::Json { source })?;
+        let file =
+            container::join(&text, &data).ok_or_else(|| SaveError::TooLarge { path: path.to_owned() })?;
+        bytes = file.len() as u64;
+        files.write(path, &file)?;
+    } else {
+        if !data.is_empty() {
+            files.write(&path.with_file_name(&bin_name), &data)?;
+        }
+        let mut text = serde_json::to_vec_pretty(&json).map_err(|source| SaveError::Json { source })?;
+        text.push(b'\n');
+        bytes += text.len() as u64;
+        files.write(path, &text)?;
+    }
+    Ok(SaveReport { files: files.commit()?, bytes, notes })
+}
+
+/// The JSON and the binary data of a file.
+fn document(nodes: Nodes, scene: Option<Value>, bin_name: Option<&str>) -> (Value, Vec<u8>, Vec<Note>) {
+    let Nodes { nodes, roots, meshes, materials, lights, cameras, data, notes } = nodes;
+    let mut root = Map::new();
+    let version = env!("CARGO_PKG_VERSION");
+    root.insert("asset".to_owned(), json!({"version": "2.0", "generator": format!("Lumbre {version}")}));
+    root.insert("scene".to_owned(), json!(0));
+    let mut scenes = Map::new();
+    if !roots.is_empty() {
+        scenes.insert("nodes".to_owned(), json!(roots));
+    }
+    if let Some(scene) = scene {
+        scenes.insert("extensions".to_owned(), json!({"LUMBRE_scene": scene}));
+    }
+    root.insert("scenes".to_owned(), json!([scenes]));
+    if !data.binary.is_empty() {
+        let mut buffer = json!({"byteLength": data.binary.len()});
+        if let Some(name) = bin_name {
+            buffer["uri"] = uri::percent_encoded(name).into();
+        }
+        root.insert("buffers".to_owned(), json!([buffer]));
+    }
+    if !lights.is_empty() {
+        root.insert("extensions".to_owned(), json!({"KHR_lights_punctual": {"lights": lights}}));
+    }
+    for (name, list) in [
+        ("nodes", nodes),
+        ("meshes", meshes),
+        ("materials", materials),
+        ("cameras", cameras),
+        ("accessors", data.accessors),
+        ("bufferViews", data.buffer_views),
+        ("images", data.images),
+        ("samplers", data.samplers),
+        ("textures", data.textures),
+    ] {
+        // The specification allows no empty lists.
+        if !list.is_empty() {
+            root.insert(name.to_owned(), list.into());
+        }
+    }
+    let root = Value::Object(root);
+    let mut used = HashSet::new();
+    extensions_in(&root, &mut used);
+    let mut used: Vec<_> = used.into_iter().collect();
+    used.sort_unstable();
+    let mut root = root;
+    if !used.is_empty() {
+        root["extensionsUsed"] = json!(used);
+    }
+    (root, data.binary, notes)
+}
+
+/// The names of all extensions below a value, the application's own data (`extras`) aside.
+fn extensions_in(value: &Value, used: &mut HashSet<String>) {
+    match value {
+        Value::Object(object) => {
+            if let Some(Value::Object(extensions)) = object.get("extensions") {
+                used.extend(extensions.keys().cloned());
+            }
+            object
+                .iter()
+                .filter(|(key, _)| *key != "extras")
+                .for_each(|(_, value)| extensions_in(value, used));
+        }
+        Value::Array(list) => list.iter().for_each(|value| extensions_in(value, used)),
+        _ => {}
+    }
+}
+
+/// Lightmap images to be written, each once, under names that do not collide.
+pub(crate) struct LightmapFiles {
+    stem: String,
+    known: HashMap<*const LightmapImage, usize>,
+    images: Vec<(String, Arc<LightmapImage>)>,
+    names: HashSet<String>,
+}
+
+impl LightmapFiles {
+    fn new(stem: String) -> Self {
+        Self { stem, known: HashMap::new(), images: Vec::new(), names: HashSet::new() }
+    }
+
+    /// The extension object for a node that shows an image.
+    pub(crate) fn reference(
+        &mut self,
+        image: &Arc<LightmapImage>,
+        node: Option<&str>,
+        index: usize,
+    ) -> Value {
+        let known = *self.known.entry(Arc::as_ptr(image)).or_insert_with(|| {
+            let number = index.to_string();
+            // Names become file names: only what every file system takes.
+            let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
+            let label: String =
+                node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
+            let stem = &self.stem;
+            let candidates = std::iter::once(format!("{stem}.{label}.exr"))
+                .chain((index..).map(|number| format!("{stem}.{label}.{number}.exr")));
+            // Case counts on some file systems only.
+            let name = candidates
+                .into_iter()
+                .find(|name| self.names.insert(name.to_lowercase()))
+                .unwrap_or_default();
+            self.images.push((name, image.clone()));
+            self.images.len() - 1
+        });
+        let encoding = match image.encoding {
+            LightmapEncoding::Rgb32Float => "rgb32f",
+            LightmapEncoding::Rgb16Float => "rgb16f",
+            LightmapEncoding::Rgb9E5 => "rgb9e5",
+        };
+        json!({"image": uri::percent_encoded(&self.images[known].0), "texCoord": 1, "encoding": encoding})
+    }
+}
+
+/// An OpenEXR file of three f32 channels.
+fn open_exr(image: &LightmapImage) -> Result<Vec<u8>, SaveError> {
+    let failed = |problem: String| SaveError::Image {
+        place: "lightmap".to_owned(),
+        image: image.name.clone(),
+        problem,
+    };
+    let texels = u64::from(image.width) * u64::from(image.height);
+    if texels == 0 || image.texels.len() as u64 != texels {
+        return Err(failed(format!(
+            "{} texels are not {} x {}",
+            image.texels.len(),
+            image.width,
+            image.height
+        )));
+    }
+    if image.texels.iter().any(|texel| !texel.is_finite()) {
+        return Err(failed("a texel is NaN or infinite".to_owned()));
+    }
+    let bytes: Vec<u8> =
+        image.texels.iter().flat_map(|texel| texel.to_array()).flat_map(f32::to_ne_bytes).collect();
+    let mut file = Cursor::new(Vec::new());
+    let encoder = image::codecs::openexr::OpenExrEncoder::new(&mut file);
+    let format = image::ExtendedColorType::Rgb32F;
+    image::ImageEncoder::write_image(encoder, &bytes, image.width, image.height, format)
+        .map_err(|error| failed(error.to_string()))?;
+    Ok(file.into_inner())
+}

@@ -1,0 +1,174 @@
+//! The JSON of the LUMBRE_* extensions, as read and as written. Not what the keys mean: that is `import_*` and `export_*`.
+//!
+//! Every key is optional. Beside the ones that the format describes there are three for what a World holds and glTF
+//! has no place for: `LUMBRE_lights_phong.kind` ("ambient"), `LUMBRE_object`, `LUMBRE_camera`.
+
+use serde::{Deserialize, Serialize};
+
+type Color = [f64; 3];
+
+/// `materials[i].extensions.LUMBRE_materials_phong`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct PhongMaterial {
+    #[serde(flatten)]
+    pub front: PhongSurface,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub back: Option<PhongSurface>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mirror: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transmission: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ior: Option<f64>,
+}
+
+/// The coefficients of one side.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct PhongSurface {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub emission: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shininess: Option<f64>,
+}
+
+/// `KHR_lights_punctual.lights[i].extensions.LUMBRE_lights_phong`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct PhongLight {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attenuation: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attenuation_clamp: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spot: Option<PhongSpot>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub enabled: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shadow: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bake: Option<String>,
+}
+
+/// OpenGL's cone, or with `inner` and `outer` the one of KHR_lights_punctual (for a directional light, which has no cone there).
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct PhongSpot {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cutoff: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exponent: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inner: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outer: Option<f64>,
+}
+
+/// `scenes[i].extensions.LUMBRE_scene`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct SceneExtension {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub background: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub local_viewer: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub two_sided: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reflection: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shading: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fog: Option<FogExtension>,
+}
+
+/// `LUMBRE_scene.fog`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct FogExtension {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub color: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub near_weight: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub far_weight: Option<f64>,
+}
+
+/// `nodes[i].extensions.LUMBRE_shading`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct ShadingExtension {
+    pub technique: Option<String>,
+}
+
+/// `nodes[i].extensions.LUMBRE_lightmap`.
+#[derive(Deserialize, Serialize, Clone, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct LightmapExtension {
+    pub image: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tex_coord: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoding: Option<String>,
+}
+
+/// `nodes[i].extensions.LUMBRE_object`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct ObjectExtension {
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub dynamic: bool,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub hidden: bool,
+}
+
+/// `nodes[i].extensions.LUMBRE_camera`, beside the node's `camera`.
+#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+pub(crate) struct CameraExtension {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<f64>,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub active: bool,
+}
+
+/// KHR_materials_emissive_strength.
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct EmissiveStrength {
+    pub emissive_strength: Option<f64>,
+}
+
+/// KHR_texture_transform.
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct TextureTransform {
+    pub offset: Option<[f64; 2]>,
+    pub rotation: Option<f64>,
+    pub scale: Option<[f64; 2]>,
+    pub tex_coord: Option<u32>,
+}
+
+/// `nodes[i].extensions.KHR_lights_punctual`.
+#[derive(Deserialize, Debug)]
+pub(crate) struct LightReference {
+    pub light: usize,
+}

@@ -1,0 +1,145 @@
+//! The trees that a file's nodes form, checked: no cycles, one parent each. Not the entities made from them.
+
+use glam::{DAffine3, DMat4, DQuat, DVec3};
+
+use super::document::{Document, Node, element};
+use super::error::{LoadProblem, Notes};
+use crate::Transform;
+
+/// The nodes of the scene that is shown.
+pub(crate) struct Hierarchy {
+    /// Node indices, every parent before its children.
+    pub order: Vec<usize>,
+    /// The parent of each node of the file, if it has one.
+    pub parents: Vec<Option<usize>>,
+    /// The scene, if the file has any.
+    pub scene: Option<usize>,
+}
+
+/// Checks all nodes of a file and lists those of its default scene (all, if it has no scenes).
+pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierarchy, LoadProblem> {
+    let count = document.nodes.len();
+    let name = |node: usize| document.nodes[node].name.clone().unwrap_or_default();
+    let twice = |node: usize, first: String, second: String| LoadProblem::TwoParents {
+        node,
+        name: name(node),
+        first,
+        second,
+    };
+    let mut parents: Vec<Option<usize>> = vec![None; count];
+    for (index, node) in document.nodes.iter().enumerate() {
+        for &child in &node.children {
+            element(&document.nodes, "nodes", child, || format!("nodes[{index}].children"))?;
+            if child == index {
+                return Err(LoadProblem::Cycle { node: child, name: name(child) });
+            }
+            if let Some(first) = parents[child].replace(index) {
+                return Err(twice(
+                    child,
+                    format!("nodes[{first}].children"),
+                    format!("nodes[{index}].children"),
+                ));
+            }
+        }
+    }
+    let below = |roots: &[usize], reached: &mut Vec<bool>| {
+        let mut order = Vec::new();
+        let mut stack: Vec<usize> = roots.iter().rev().copied().collect();
+        while let Some(node) = stack.pop() {
+            if !std::mem::replace(&mut reached[node], true) {
+                order.push(node);
+                stack.extend(document.nodes[node].children.iter().rev());
+            }
+        }
+        order
+    };
+    let roots: Vec<usize> = (0..count).filter(|&node| parents[node].is_none()).collect();
+    let mut reached = vec![false; count];
+    let everything = below(&roots, &mut reached);
+    // With one parent each, what no root leads to goes round in a circle.
+    if let Some(node) = reached.iter().position(|&reached| !reached) {
+        return Err(LoadProblem::Cycle { node, name: name(node) });
+    }
+    let scene = match document.scene {
+        Some(scene) => {
+            element(&document.scenes, "scenes", scene, || "scene".to_owned())?;
+            Some(scene)
+        }
+        None => (!document.scenes.is_empty()).then_some(0),
+    };
+    let order = match scene {
+        None => everything,
+        Some(scene) => {
+            let place = format!("scenes[{scene}].nodes");
+            let listed = &document.scenes[scene].nodes;
+            let mut seen = vec![false; count];
+            for &node in listed {
+                element(&document.nodes, "nodes", node, || place.clone())?;
+                if let Some(parent) = parents[node] {
+                    return Err(twice(node, format!("nodes[{parent}].children"), place));
+                }
+                if std::mem::replace(&mut seen[node], true) {
+                    return Err(twice(node, place.clone(), place));
+                }
+            }
+            below(listed, &mut vec![false; count])
+        }
+    };
+    if order.len() < count {
+        notes.add(
+            "nodes",
+            format!("{} of {count} are not in the scene that is shown; left out", count - order.len()),
+        );
+    }
+    Ok(Hierarchy { order, parents, scene })
+}
+
+/// The local transform of a node.
+pub(crate) fn transform(node: &Node, place: &str, notes: &mut Notes) -> Result<Transform, LoadProblem> {
+    let refused = |field: &str, value: String, expected: &str| LoadProblem::Value {
+        place: place.to_owned(),
+        field: field.to_owned(),
+        value,
+        expected: expected.to_owned(),
+    };
+    if let Some(matrix) = node.matrix {
+        let matrix = DMat4::from_cols_array(&matrix);
+        let rounding = 1e-6;
+        let last_row = matrix.row(3);
+        if !matrix.is_finite() || !last_row.abs_diff_eq(glam::DVec4::W, rounding) {
+            return Err(refused(
+                "matrix",
+                matrix.to_string(),
+                "use finite numbers with 0, 0, 0, 1 in the last row",
+            ));
+        }
+        let (transform, faithful) = Transform::from_affine(DAffine3::from_mat4(matrix));
+        if !faithful {
+            notes.add(place, "its matrix shears, which a translation, rotation and scale cannot express; the shear is dropped");
+        }
+        return Ok(transform);
+    }
+    let vector = |field: &str, value: Option<[f64; 3]>, default: DVec3| {
+        let value = value.map_or(default, DVec3::from_array);
+        if representable(value) {
+            Ok(value)
+        } else {
+            Err(refused(field, value.to_string(), "use numbers below 1e30"))
+        }
+    };
+    let translation = vector("translation", node.translation, DVec3::ZERO)?;
+    let scale = vector("scale", node.scale, DVec3::ONE)?;
+    let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let length = rotation.length();
+    if !(length.is_finite() && length > 1e-6) {
+        return Err(refused("rotation", rotation.to_string(), "use a unit quaternion [x, y, z, w]"));
+    }
+    // Unit already, to what f32 can hold: keep its digits.
+    let rotation = if (length - 1.0).abs() < 1e-12 { rotation } else { rotation / length };
+    Ok(Transform { translation, rotation, scale })
+}
+
+/// Chains of such transforms stay finite in f64.
+fn representable(value: DVec3) -> bool {
+    value.is_finite() && value.abs().max_element() < 1e30
+}

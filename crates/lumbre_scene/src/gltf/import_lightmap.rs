@@ -1,0 +1,111 @@
+//! LUMBRE_lightmap: reads the OpenEXR image beside a baked file. Not the making of lightmaps.
+
+use std::collections::HashMap;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::Vec3;
+use image::{ImageDecoder, codecs::openexr::OpenExrDecoder};
+
+use super::document::shortened;
+use super::error::LoadProblem;
+use super::extensions::LightmapExtension;
+use super::limits::{Budget, LoadLimits};
+use super::uri;
+use crate::{Lightmap, LightmapEncoding, LightmapImage};
+
+/// Most texels per byte of an OpenEXR file: zlib expands at most 1032 times, and a texel of three halves has six bytes.
+const MOST_TEXELS_PER_BYTE: u64 = 1032 / 6;
+
+/// The lightmaps of a file, each image read once.
+#[derive(Default)]
+pub(crate) struct Lightmaps {
+    read: HashMap<(String, LightmapEncoding), Arc<LightmapImage>>,
+}
+
+impl Lightmaps {
+    /// The lightmap of a node.
+    pub(crate) fn lightmap(
+        &mut self,
+        source: &LightmapExtension,
+        place: &str,
+        base: Option<&Path>,
+        limits: &LoadLimits,
+        budget: &mut Budget,
+    ) -> Result<Lightmap, LoadProblem> {
+        let wrong = |field: &str, value: String, expected: &str| LoadProblem::Value {
+            place: place.to_owned(),
+            field: format!("LUMBRE_lightmap.{field}"),
+            value,
+            expected: expected.to_owned(),
+        };
+        if let Some(tex_coord) = source.tex_coord.filter(|&tex_coord| tex_coord != 1) {
+            return Err(wrong("texCoord", tex_coord.to_string(), "only 1 is supported; bake the file again"));
+        }
+        let encoding = match source.encoding.as_deref() {
+            Some("rgb32f") => LightmapEncoding::Rgb32Float,
+            Some("rgb16f") | None => LightmapEncoding::Rgb16Float,
+            Some("rgb9e5") => LightmapEncoding::Rgb9E5,
+            Some(other) => {
+                return Err(wrong(
+                    "encoding",
+                    format!("{:?}", shortened(other)),
+                    "use rgb32f, rgb16f or rgb9e5",
+                ));
+            }
+        };
+        let key = (source.image.clone(), encoding);
+        if let Some(image) = self.read.get(&key) {
+            return Ok(Lightmap { image: image.clone() });
+        }
+        let place = format!("{place}: lightmap {}", shortened(&source.image));
+        let bytes = uri::fetch(&source.image, base, &place)?;
+        let name =
+            uri::relative(&source.image).map(|path| path.to_string_lossy().into_owned()).unwrap_or_default();
+        let image = Arc::new(decode(&bytes, name, encoding, &place, limits, budget)?);
+        self.read.insert(key, image.clone());
+        Ok(Lightmap { image })
+    }
+}
+
+fn decode(
+    bytes: &[u8],
+    name: String,
+    encoding: LightmapEncoding,
+    place: &str,
+    limits: &LoadLimits,
+    budget: &mut Budget,
+) -> Result<LightmapImage, LoadProblem> {
+    let refused = |problem: String| LoadProblem::Image { place: place.to_owned(), problem };
+    let undecodable =
+        |error: image::ImageError| refused(format!("cannot be decoded as OpenEXR: {error}; bake again"));
+    let decoder =
+        OpenExrDecoder::with_alpha_preference(Cursor::new(bytes), Some(false)).map_err(undecodable)?;
+    let (width, height) = decoder.dimensions();
+    let texels = u64::from(width) * u64::from(height);
+    let possible = MOST_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64);
+    if texels == 0 || texels > possible || width.max(height) > limits.image_side {
+        let (side, length) = (limits.image_side, bytes.len());
+        return Err(refused(format!(
+            "claims {width} x {height} texels in {length} bytes; at most {side} per side are allowed, and what the bytes can hold"
+        )));
+    }
+    // Twice: as bytes and as texels.
+    budget.charge(texels, 24, || place.to_owned())?;
+    let mut buffer = vec![0; texels as usize * 12];
+    decoder.read_image(&mut buffer).map_err(undecodable)?;
+    let float = |bytes: &[u8]| f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+    let texels: Vec<Vec3> = buffer
+        .chunks_exact(12)
+        .map(|texel| Vec3::new(float(&texel[..4]), float(&texel[4..8]), float(&texel[8..])))
+        .collect();
+    if let Some(at) = texels.iter().position(|texel| !texel.is_finite()) {
+        return Err(refused(format!(
+            "texel {} of row {} is NaN or infinite; bake again",
+            at as u32 % width,
+            at as u32 / width
+        )));
+    }
+    Ok(LightmapImage { name, width, height, texels, encoding })
+}

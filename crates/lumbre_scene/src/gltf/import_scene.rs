@@ -1,0 +1,134 @@
+//! LUMBRE_scene and cameras: what holds for a whole scene, and the lenses it is seen through.
+
+use std::f64::consts::PI;
+
+use glam::Vec3;
+use lumbre_optics::{Fog, FogMode, ReflectionModel, Shading};
+
+use super::document::{Document, extension, shortened};
+use super::error::LoadProblem;
+use super::extensions::{FogExtension, SceneExtension};
+use super::value::{color, number};
+use crate::{Projection, SceneSettings};
+
+/// The settings of a scene; the defaults for keys that are missing.
+pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSettings, LoadProblem> {
+    let place = format!("scenes[{scene}]");
+    let mut settings = SceneSettings::default();
+    let Some(source) = document.scenes.get(scene) else { return Ok(settings) };
+    let Some(found) = extension::<SceneExtension>(&source.extensions, "LUMBRE_scene", &place)? else {
+        return Ok(settings);
+    };
+    for (field, source, target) in [
+        ("ambient", found.ambient, &mut settings.ambient),
+        ("background", found.background, &mut settings.background),
+    ] {
+        let value = source.map_or(*target, color);
+        if !value.is_finite() || value.min_element() < 0.0 {
+            return Err(LoadProblem::Value {
+                place,
+                field: format!("LUMBRE_scene.{field}"),
+                value: value.to_string(),
+                expected: "use finite numbers that are at least 0".to_owned(),
+            });
+        }
+        *target = value;
+    }
+    settings.local_viewer = found.local_viewer.unwrap_or(settings.local_viewer);
+    settings.two_sided = found.two_sided.unwrap_or(settings.two_sided);
+    if let Some(name) = &found.reflection {
+        settings.reflection = ReflectionModel::from_name(name).ok_or_else(|| {
+            let names = ReflectionModel::ALL.iter().map(|model| model.name());
+            unknown(&place, "LUMBRE_scene.reflection", name, names)
+        })?;
+    }
+    if let Some(name) = &found.shading {
+        settings.shading = shading(name, &place, "LUMBRE_scene.shading")?;
+    }
+    if let Some(source) = &found.fog {
+        let fog = fog(source, &place)?;
+        fog.validate(&place).map_err(|source| LoadProblem::Fog { place, source })?;
+        settings.fog = Some(fog);
+    }
+    Ok(settings)
+}
+
+/// The shading technique with a name.
+pub(crate) fn shading(name: &str, place: &str, field: &str) -> Result<Shading, LoadProblem> {
+    Shading::from_name(name)
+        .ok_or_else(|| unknown(place, field, name, Shading::ALL.iter().map(|technique| technique.name())))
+}
+
+fn unknown(place: &str, field: &str, value: &str, names: impl Iterator<Item = &'static str>) -> LoadProblem {
+    LoadProblem::Value {
+        place: place.to_owned(),
+        field: field.to_owned(),
+        value: format!("{:?}", shortened(value)),
+        expected: format!("use one of {}", names.collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// OpenGL's defaults (start 0, end 1, density 1) for keys that are missing.
+fn fog(source: &FogExtension, place: &str) -> Result<Fog, LoadProblem> {
+    let (start, end) = (number(source.start, 0.0), number(source.end, 1.0));
+    let density = number(source.density, 1.0);
+    let mode = match source.mode.as_deref() {
+        Some("linear") => FogMode::Linear { start, end },
+        Some("exp") | None => FogMode::Exponential { density },
+        Some("exp2") => FogMode::ExponentialSquared { density },
+        Some("depth-cue") => {
+            let (near_weight, far_weight) = (number(source.near_weight, 1.0), number(source.far_weight, 0.0));
+            FogMode::DepthCue { start, end, near_weight, far_weight }
+        }
+        Some(other) => {
+            let names = ["linear", "exp", "exp2", "depth-cue"].into_iter();
+            return Err(unknown(place, "LUMBRE_scene.fog.mode", other, names));
+        }
+    };
+    Ok(Fog { mode, color: source.color.map_or(Vec3::ZERO, color) })
+}
+
+/// The lens of `cameras[index]`, which must exist.
+pub(crate) fn projection(document: &Document, index: usize) -> Result<Projection, LoadProblem> {
+    let camera = &document.cameras[index];
+    let place = match &camera.name {
+        Some(name) => format!("cameras[{index}] ({})", shortened(name)),
+        None => format!("cameras[{index}]"),
+    };
+    let check = |good: bool, field: &str, value: f64, expected: &str| {
+        if good && value.is_finite() {
+            return Ok(());
+        }
+        let (field, value, expected) = (field.to_owned(), value.to_string(), expected.to_owned());
+        Err(LoadProblem::Value { place: place.clone(), field, value, expected })
+    };
+    match (camera.kind.as_str(), &camera.perspective, &camera.orthographic) {
+        ("perspective", Some(lens), _) => {
+            check(lens.yfov > 0.0 && lens.yfov < PI, "yfov", lens.yfov, "use radians above 0 and below π")?;
+            check(lens.znear > 0.0, "znear", lens.znear, "use a distance above 0")?;
+            if let Some(aspect) = lens.aspect_ratio {
+                check(aspect > 0.0, "aspectRatio", aspect, "use a ratio above 0, or leave it out")?;
+            }
+            if let Some(far) = lens.zfar {
+                check(far > lens.znear, "zfar", far, "use a distance beyond znear, or leave it out")?;
+            }
+            let (vertical_fov, aspect) = (lens.yfov, lens.aspect_ratio);
+            Ok(Projection::Perspective { vertical_fov, aspect, near: lens.znear, far: lens.zfar })
+        }
+        ("orthographic", _, Some(lens)) => {
+            check(lens.xmag != 0.0, "xmag", lens.xmag, "use half the width that is seen")?;
+            check(lens.ymag != 0.0, "ymag", lens.ymag, "use half the height that is seen")?;
+            check(lens.znear >= 0.0, "znear", lens.znear, "use a distance of at least 0")?;
+            check(lens.zfar > lens.znear, "zfar", lens.zfar, "use a distance beyond znear")?;
+            // Negative magnitudes mirror; the specification only advises against them.
+            let (half_width, half_height) = (lens.xmag.abs(), lens.ymag.abs());
+            Ok(Projection::Orthographic { half_width, half_height, near: lens.znear, far: lens.zfar })
+        }
+        (kind, _, _) => Err(LoadProblem::Value {
+            place,
+            field: "type".to_owned(),
+            value: format!("{:?}", shortened(kind)),
+            expected: "use perspective or orthographic, with an object of that name beside it".to_owned(),
+        }),
+    }
+}

@@ -1,0 +1,48 @@
+//! How large a decoded scene may become. Not what it holds.
+
+use super::error::LoadProblem;
+
+/// Bounds on what loading allocates, so that a small file cannot fill the memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoadLimits {
+    /// Bytes of decoded vertices and indices in all; by default 64 MiB and 64 times the file with its buffers.
+    pub decoded_bytes: Option<u64>,
+    /// Width and height of an image in texels; by default 16384.
+    pub image_side: u32,
+    /// Bytes of decoded images in all; by default 32 GiB. An image is also refused before it is decoded if it claims more texels than its
+    /// bytes can hold.
+    pub image_bytes: u64,
+}
+
+impl Default for LoadLimits {
+    fn default() -> Self {
+        Self { decoded_bytes: None, image_side: 16_384, image_bytes: 32 << 30 }
+    }
+}
+
+/// What is left of a limit.
+pub(crate) struct Budget {
+    used: u64,
+    limit: u64,
+}
+
+impl Budget {
+    pub(crate) fn new(limit: u64) -> Self {
+        Self { used: 0, limit }
+    }
+
+    /// Takes `count` elements of `size` bytes from the budget, before they are allocated.
+    pub(crate) fn charge(
+        &mut self,
+        count: u64,
+        size: usize,
+        what: impl FnOnce() -> String,
+    ) -> Result<(), LoadProblem> {
+        let needed = count.saturating_mul(size as u64).saturating_add(self.used);
+        if needed > self.limit {
+            return Err(LoadProblem::TooLarge { what: what(), needed, limit: self.limit });
+        }
+        self.used = needed;
+        Ok(())
+    }
+}

@@ -1,0 +1,50 @@
+//! glTF 2.0 files: reading one into a World, and writing a World as one. Not baking, not drawing.
+//!
+//! Everything that a file says is checked and decoded before the World is touched, and everything that is written lies under its final
+//! name whole or not at all.
+
+mod accessor;
+mod container;
+mod document;
+mod error;
+mod export;
+mod export_data;
+mod export_files;
+mod export_light;
+mod export_material;
+mod export_nodes;
+mod export_scene;
+mod extensions;
+mod hierarchy;
+mod import;
+mod import_image;
+mod import_light;
+mod import_lightmap;
+mod import_material;
+mod import_mesh;
+mod import_scene;
+mod limits;
+mod prepared;
+mod uri;
+mod value;
+
+pub use error::{LoadError, LoadProblem, Note};
+pub use export::{SaveError, SaveReport, save};
+pub use import::{LoadReport, load, load_slice, load_slice_within};
+pub use limits::LoadLimits;
+
+/// Extensions that a file may require.
+pub const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "LUMBRE_camera",
+    "LUMBRE_lightmap",
+    "LUMBRE_lights_phong",
+    "LUMBRE_materials_phong",
+    "LUMBRE_object",
+    "LUMBRE_scene",
+    "LUMBRE_shading",
+];

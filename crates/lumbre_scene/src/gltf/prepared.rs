@@ -1,0 +1,290 @@
+//! A decoded file, every value checked: what is left is to spawn it.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{Light, Material, Shading};
+
+use super::accessor::Buffers;
+use super::document::{self, Document, element, extension};
+use super::error::{LoadProblem, Notes};
+use super::extensions::{
+    CameraExtension, LightReference, LightmapExtension, ObjectExtension, ShadingExtension,
+};
+use super::hierarchy::{Hierarchy, hierarchy, transform};
+use super::import_image::Images;
+use super::import_lightmap::Lightmaps;
+use super::limits::{Budget, LoadLimits};
+use super::value::number;
+use super::{import_light, import_material, import_mesh, import_scene};
+use crate::{Camera, Lightmap, MaterialTextures, Primitive, SceneSettings, Transform};
+
+/// A primitive of a mesh with its material.
+pub(crate) struct PreparedPrimitive {
+    pub label: Primitive,
+    pub mesh: Arc<TriangleMesh>,
+    pub material: Material,
+    pub textures: MaterialTextures,
+}
+
+/// A node with what hangs on it.
+pub(crate) struct PreparedNode {
+    /// Index in the file.
+    pub index: usize,
+    pub parent: Option<usize>,
+    pub name: Option<String>,
+    pub transform: Transform,
+    pub mesh: Option<usize>,
+    pub light: Option<Light>,
+    pub camera: Option<Camera>,
+    pub active_camera: bool,
+    pub shading: Option<Shading>,
+    pub lightmap: Option<Lightmap>,
+    pub dynamic: bool,
+    pub hidden: bool,
+    pub extras: Option<serde_json::Value>,
+}
+
+/// A whole scene.
+pub(crate) struct Prepared {
+    /// Every parent before its children.
+    pub nodes: Vec<PreparedNode>,
+    /// Primitives of each mesh that is used.
+    pub meshes: BTreeMap<usize, Vec<PreparedPrimitive>>,
+    pub settings: SceneSettings,
+    /// Length of the file's list of nodes.
+    pub node_count: usize,
+}
+
+/// Decodes a document.
+pub(crate) fn prepare(
+    document: &Document,
+    buffers: &Buffers<'_>,
+    base: Option<&Path>,
+    limits: LoadLimits,
+    mut budget: Budget,
+    notes: &mut Notes,
+) -> Result<Prepared, LoadProblem> {
+    note_extensions(document, notes);
+    let Hierarchy { order, parents, scene } = hierarchy(document, notes)?;
+    let settings = import_scene::settings(document, scene.unwrap_or(0))?;
+    let dynamic = dynamic_nodes(document, &order, &parents, notes)?;
+
+    let decoded = vec![None; document.images.len()];
+    let image_budget = Budget::new(limits.image_bytes);
+    let mut images = Images { buffers, base, limits, budget: image_budget, decoded };
+    // Also those that nothing uses: what is wrong with them should be known before it matters.
+    let mut materials = Vec::new();
+    for (index, source) in document.materials.iter().enumerate() {
+        materials.push(import_material::material(
+            source,
+            &document.material_place(index),
+            &mut images,
+            notes,
+        )?);
+    }
+    let mut lights = Vec::new();
+    for (index, source) in document.lights.iter().enumerate() {
+        let place = match &source.name {
+            Some(name) => format!("lights[{index}] ({})", document::shortened(name)),
+            None => format!("lights[{index}]"),
+        };
+        lights.push(import_light::light(source, &place)?);
+    }
+
+    let mut meshes = BTreeMap::new();
+    let mut geometries = Geometries::new();
+    let mut lightmaps = Lightmaps::default();
+    let mut nodes = Vec::new();
+    for index in order {
+        let node = &document.nodes[index];
+        let place = document.node_place(index);
+        if let Some(mesh) = node.mesh {
+            element(&document.meshes, "meshes", mesh, || format!("{place}.mesh"))?;
+            if let Entry::Vacant(entry) = meshes.entry(mesh) {
+                let mut source =
+                    Source { document, buffers, materials: &materials, budget: &mut budget, notes };
+                entry.insert(source.primitives(mesh, node.name.as_deref(), &mut geometries)?);
+            }
+        }
+        let light = match extension::<LightReference>(&node.extensions, "KHR_lights_punctual", &place)? {
+            Some(LightReference { light }) => {
+                let field = || format!("{place}.extensions.KHR_lights_punctual.light");
+                Some(element(&lights, "lights", light, field)?.clone())
+            }
+            None => None,
+        };
+        let lens =
+            extension::<CameraExtension>(&node.extensions, "LUMBRE_camera", &place)?.unwrap_or_default();
+        let camera = match node.camera {
+            Some(camera) => {
+                element(&document.cameras, "cameras", camera, || format!("{place}.camera"))?;
+                let exposure = number(lens.exposure, 1.0);
+                if !(exposure.is_finite() && exposure > 0.0) {
+                    return Err(LoadProblem::Value {
+                        place,
+                        field: "LUMBRE_camera.exposure".to_owned(),
+                        value: exposure.to_string(),
+                        expected: "use a factor above 0".to_owned(),
+                    });
+                }
+                Some(Camera { projection: import_scene::projection(document, camera)?, exposure })
+            }
+            None => None,
+        };
+        let shading = extension::<ShadingExtension>(&node.extensions, "LUMBRE_shading", &place)?
+            .and_then(|shading| shading.technique)
+            .map(|name| import_scene::shading(&name, &place, "LUMBRE_shading.technique"))
+            .transpose()?;
+        let lightmap = match extension::<LightmapExtension>(&node.extensions, "LUMBRE_lightmap", &place)? {
+            Some(source) => Some(lightmaps.lightmap(&source, &place, base, &limits, &mut images.budget)?),
+            None => None,
+        };
+        if let Some(primitives) = lightmap.as_ref().and(node.mesh).and_then(|mesh| meshes.get(&mesh))
+            && primitives.iter().any(|primitive| primitive.mesh.uv1.is_empty())
+        {
+            notes.add(
+                &place,
+                "has a lightmap, but its mesh has no TEXCOORD_1; the lightmap is not shown there",
+            );
+        }
+        if node.skin.is_some() {
+            notes.add(&place, "skins are not supported; the mesh is shown as it was modelled");
+        }
+        let hidden = extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &place)?
+            .unwrap_or_default()
+            .hidden;
+        nodes.push(PreparedNode {
+            index,
+            parent: parents[index],
+            name: node.name.clone(),
+            transform: transform(node, &place, notes)?,
+            mesh: node.mesh,
+            light,
+            camera,
+            active_camera: node.camera.is_some() && lens.active,
+            shading,
+            lightmap,
+            dynamic: dynamic.contains(&index),
+            hidden,
+            extras: node.extras.clone(),
+        });
+    }
+    Ok(Prepared { nodes, meshes, settings, node_count: document.nodes.len() })
+}
+
+/// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.
+/// `None` for those that make no triangles.
+type Geometries = HashMap<String, Option<Arc<TriangleMesh>>>;
+
+/// What primitives are read from.
+struct Source<'a> {
+    document: &'a Document,
+    buffers: &'a Buffers<'a>,
+    materials: &'a [(Material, MaterialTextures)],
+    budget: &'a mut Budget,
+    notes: &'a mut Notes,
+}
+
+impl Source<'_> {
+    fn primitives(
+        &mut self,
+        mesh: usize,
+        node_name: Option<&str>,
+        geometries: &mut Geometries,
+    ) -> Result<Vec<PreparedPrimitive>, LoadProblem> {
+        let source = &self.document.meshes[mesh];
+        let place = self.document.mesh_place(mesh);
+        let name: Arc<str> = source.name.as_deref().or(node_name).unwrap_or_default().into();
+        let mut prepared = Vec::new();
+        for (index, primitive) in source.primitives.iter().enumerate() {
+            let (material, textures, material_name) = match primitive.material {
+                Some(material) => {
+                    let field = || format!("{place}.primitives[{index}].material");
+                    let (found, textures) = element(self.materials, "materials", material, field)?;
+                    let name = self.document.materials[material].name.as_deref();
+                    (found.clone(), textures.clone(), name.unwrap_or_default())
+                }
+                None => {
+                    self.notes.add(&place, "has no material; a matt grey stands in");
+                    (Material::default(), MaterialTextures::default(), "")
+                }
+            };
+            let key =
+                serde_json::json!([primitive.attributes, primitive.indices, primitive.mode]).to_string();
+            let triangles = match geometries.get(&key) {
+                Some(known) => known.clone(),
+                None => {
+                    let (budget, notes) = (&mut *self.budget, &mut *self.notes);
+                    let read =
+                        import_mesh::triangle_mesh(self.buffers, primitive, index, &place, budget, notes)?;
+                    geometries.entry(key).or_insert(read.map(Arc::new)).clone()
+                }
+            };
+            let Some(triangles) = triangles else { continue };
+            let label = Primitive { index, mesh: name.clone(), material: material_name.into() };
+            let textures = usable(textures, &triangles, &place, self.notes);
+            prepared.push(PreparedPrimitive { label, mesh: triangles, material, textures });
+        }
+        Ok(prepared)
+    }
+}
+
+/// The textures whose coordinates the mesh has.
+fn usable(
+    mut textures: MaterialTextures,
+    mesh: &TriangleMesh,
+    place: &str,
+    notes: &mut Notes,
+) -> MaterialTextures {
+    let missing = |tex_coord: u32| if tex_coord == 0 { mesh.uv0.is_empty() } else { mesh.uv1.is_empty() };
+    let before = textures.clone();
+    textures.base_color = textures.base_color.filter(|texture| !missing(texture.tex_coord));
+    textures.emissive = textures.emissive.filter(|texture| !missing(texture.tex_coord));
+    textures.metallic_roughness = textures.metallic_roughness.filter(|slot| !missing(slot.texture.tex_coord));
+    if textures != before {
+        notes.add(place, "has a textured material but not the texture coordinates it asks for; those textures are left out");
+    }
+    textures
+}
+
+/// Nodes that an animation moves or that say so, and all below them.
+fn dynamic_nodes(
+    document: &Document,
+    order: &[usize],
+    parents: &[Option<usize>],
+    notes: &mut Notes,
+) -> Result<HashSet<usize>, LoadProblem> {
+    let mut dynamic = HashSet::new();
+    for (index, animation) in document.animations.iter().enumerate() {
+        notes.add(format!("animations[{index}]"), "animations are not played; their nodes count as dynamic");
+        for node in animation.channels.iter().filter_map(|channel| channel.target.node) {
+            element(&document.nodes, "nodes", node, || format!("animations[{index}].channels"))?;
+            dynamic.insert(node);
+        }
+    }
+    for &index in order {
+        let node = &document.nodes[index];
+        let object =
+            extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &document.node_place(index))?;
+        let inherited = parents[index].is_some_and(|parent| dynamic.contains(&parent));
+        if inherited || object.is_some_and(|object| object.dynamic) {
+            dynamic.insert(index);
+        }
+    }
+    Ok(dynamic)
+}
+
+fn note_extensions(document: &Document, notes: &mut Notes) {
+    for name in &document.extensions_used {
+        if !super::SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
+            notes.add(format!("extension {}", document::shortened(name)), "not supported; ignored");
+        }
+    }
+    if document.skins > 0 {
+        notes.add("skins", "not supported; ignored");
+    }
+}

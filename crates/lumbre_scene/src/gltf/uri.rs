@@ -1,0 +1,190 @@
+//! URIs of buffers and images: data URIs, and files beside the glTF file. Nothing else is followed.
+
+use std::path::{Path, PathBuf};
+
+use super::document::shortened;
+use super::error::LoadProblem;
+
+/// The bytes that a URI stands for: inline, or a file below `base`.
+pub(crate) fn fetch(uri: &str, base: Option<&Path>, place: &str) -> Result<Vec<u8>, LoadProblem> {
+    let refused = |problem: &str| LoadProblem::Uri {
+        place: place.to_owned(),
+        uri: shortened(uri).to_owned(),
+        problem: problem.to_owned(),
+    };
+    if let Some(data) = uri.strip_prefix("data:") {
+        let Some((kind, payload)) = data.split_once(',') else {
+            return Err(refused("has no comma before its data; embed the bytes as data:…;base64,…"));
+        };
+        return if kind.ends_with(";base64") {
+            decode_base64(payload.as_bytes())
+                .ok_or_else(|| refused("is not valid base64; export the file again"))
+        } else {
+            percent_decoded(payload)
+                .ok_or_else(|| refused("has a broken percent escape; export the file again"))
+        };
+    }
+    let path = relative(uri).map_err(refused)?;
+    let Some(base) = base else {
+        return Err(refused(
+            "names a file, but the glTF came without a folder; load it by path, or embed the data",
+        ));
+    };
+    read(&base.join(path))
+}
+
+/// A whole file, if it is an ordinary one.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadProblem> {
+    let failed = |source| LoadProblem::Read { path: path.to_owned(), source };
+    let metadata = std::fs::metadata(path).map_err(failed)?;
+    if !metadata.is_file() {
+        // A pipe or device would never end.
+        return Err(failed(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not an ordinary file")));
+    }
+    std::fs::read(path).map_err(failed)
+}
+
+/// The relative path that a URI reference names; the reason if it must not be followed.
+pub(crate) fn relative(uri: &str) -> Result<PathBuf, &'static str> {
+    let escape = "leaves the folder of the glTF file; put the file beside it and name it relatively";
+    let scheme = uri.split(['/', '?', '#']).next().is_some_and(|start| start.contains(':'));
+    if scheme {
+        return Err(
+            "has a scheme that is not followed; download the file and name it relatively, or embed it",
+        );
+    }
+    let Some(decoded) = percent_decoded(uri).and_then(|bytes| String::from_utf8(bytes).ok()) else {
+        return Err("has a broken percent escape; escape special characters as %XX in UTF-8");
+    };
+    if decoded.is_empty() || decoded.contains('\0') {
+        return Err("names no file; name one relatively, or embed the data");
+    }
+    if decoded.starts_with(['/', '\\']) {
+        return Err("is an absolute path; put the file beside the glTF file and name it relatively");
+    }
+    let mut path = PathBuf::new();
+    for part in decoded.split(['/', '\\']) {
+        match part {
+            "" | "." => {}
+            ".." => return Err(escape),
+            // `C:` would start anew on Windows.
+            part if part.contains(':') => return Err(escape),
+            part => path.push(part),
+        }
+    }
+    if path.as_os_str().is_empty() {
+        Err("names no file; name one relatively, or embed the data")
+    } else {
+        Ok(path)
+    }
+}
+
+fn percent_decoded(text: &str) -> Option<Vec<u8>> {
+    let mut bytes = text.bytes();
+    let mut decoded = Vec::new();
+    while let Some(byte) = bytes.next() {
+        if byte == b'%' {
+            let digit = |byte: u8| char::from(byte).to_digit(16);
+            let (high, low) = (digit(bytes.next()?)?, digit(bytes.next()?)?);
+            decoded.push((high * 16 + low) as u8);
+        } else {
+            decoded.push(byte);
+        }
+    }
+    Some(decoded)
+}
+
+/// A file name as a URI reference: everything but unreserved characters is escaped (RFC 3986).
+pub(crate) fn percent_encoded(name: &str) -> String {
+    name.bytes().fold(String::new(), |mut encoded, byte| {
+        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
+            encoded.push(char::from(byte));
+        } else {
+            encoded.push_str(&format!("%{byte:02X}"));
+        }
+        encoded
+    })
+}
+
+/// RFC 4648 base64, with or without padding.
+fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
+    let end = text.len() - text.iter().rev().take_while(|&&byte| byte == b'=').count().min(2);
+    let mut decoded = Vec::new();
+    for group in text[..end].chunks(4) {
+        let mut bits = 0u32;
+        for &byte in group {
+            let value = match byte {
+                b'A'..=b'Z' => byte - b'A',
+                b'a'..=b'z' => byte - b'a' + 26,
+                b'0'..=b'9' => byte - b'0' + 52,
+                b'+' | b'-' => 62,
+                b'/' | b'_' => 63,
+                _ => return None,
+            };
+            bits = bits << 6 | u32::from(value);
+        }
+        bits <<= 6 * (4 - group.len());
+        let count = match group.len() {
+            4 => 3,
+            3 => 2,
+            2 => 1,
+            _ => return None,
+        };
+        decoded.extend_from_slice(&bits.to_be_bytes()[1..1 + count]);
+    }
+    Some(decoded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vectors_of_rfc_4648() {
+        let vectors = [
+            ("", ""),
+            ("Zg==", "f"),
+            ("Zm8=", "fo"),
+            ("Zm9v", "foo"),
+            ("Zm9vYg", "foob"),
+            ("Zm9vYmFy", "foobar"),
+        ];
+        for (encoded, plain) in vectors {
+            assert_eq!(decode_base64(encoded.as_bytes()).unwrap(), plain.as_bytes());
+        }
+        assert_eq!(decode_base64(b"A"), None);
+        assert_eq!(decode_base64(b"Zg=\n"), None);
+    }
+
+    #[test]
+    fn only_files_beside_are_named() {
+        assert_eq!(relative("a%20b/c.bin").unwrap(), Path::new("a b/c.bin"));
+        assert_eq!(relative("./c.bin").unwrap(), Path::new("c.bin"));
+        for refused in [
+            "../c.bin",
+            "a/../../c",
+            "%2e%2e/c",
+            "a\\..\\c",
+            "/etc/c",
+            "\\c",
+            "http://x/c",
+            "file:c",
+            "C:\\c",
+            "",
+            "%",
+            "%zz",
+            "%00",
+        ] {
+            assert!(relative(refused).is_err(), "{refused}");
+        }
+        assert_eq!(relative(&percent_encoded("ä b%.exr")).unwrap(), Path::new("ä b%.exr"));
+    }
+
+    #[test]
+    fn data_uris() {
+        assert_eq!(fetch("data:application/octet-stream;base64,Zm9v", None, "x").unwrap(), b"foo");
+        assert_eq!(fetch("data:,a%20b", None, "x").unwrap(), b"a b");
+        assert!(fetch("data:;base64", None, "x").is_err());
+        assert!(fetch("x.bin", None, "x").is_err());
+    }
+}

@@ -1,0 +1,11 @@
+//! Numbers of the JSON (f64) as the f32 that components hold. Too large ones become infinite, and are refused where they are used.
+
+use glam::Vec3;
+
+pub(crate) fn color(value: [f64; 3]) -> Vec3 {
+    Vec3::from_array(value.map(|channel| channel as f32))
+}
+
+pub(crate) fn number(value: Option<f64>, default: f32) -> f32 {
+    value.map_or(default, |value| value as f32)
+}

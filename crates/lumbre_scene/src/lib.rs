@@ -1,0 +1,62 @@
+//! Scenes: components, transform hierarchy, glTF in and out, and the census. No GPU, no lighting equations.
+//!
+//! ```text
+//!  .glb, .gltf ──► load ──► World ──► save ──► .glb, .gltf (+ .bin, lightmaps as .exr)
+//!                             │
+//!         node: Name, Transform, GlobalTransform, [Light], [Camera], [Extras]
+//!           ├─ primitive: Mesh, Material, Primitive, [MaterialTextures], [Lightmap], [Shading],
+//!           │             StaticObject or DynamicObject
+//!           └─ node below ...
+//!                             │
+//!                             ├──► propagate_transforms ──► GlobalTransform
+//!                             ├──► scene_bounds, default_camera
+//!                             └──► Census: what the scene calls for, and what it does not
+//! ```
+//!
+//! Everything that a file says is checked before the World is touched; what is wrong with it is a [`LoadError`] that names the place, what
+//! was repaired or left out a [`Note`].
+//!
+//! ```
+//! use bevy_ecs::prelude::*;
+//! use lumbre_scene::{Census, Light, Name, Transform, load_slice, save, update_transforms};
+//!
+//! let mut world = World::new();
+//! world.spawn((Name::new("lamp"), Transform::from_xyz(0.0, 2.5, 0.0), Light::point(glam::Vec3::ONE)));
+//! let path = std::env::temp_dir().join("lumbre_scene_example.glb");
+//! save(&mut world, &path)?;
+//!
+//! let mut again = World::new();
+//! let report = load_slice(&mut again, &std::fs::read(&path)?, "example.glb", None)?;
+//! assert_eq!(report.nodes.len(), 1);
+//! assert_eq!(Census::of(&mut again).point_lights, 1);
+//! # update_transforms(&mut again);
+//! # std::fs::remove_file(path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bounds;
+mod census;
+mod components;
+mod default_camera;
+mod gltf;
+mod image;
+mod settings;
+mod transform;
+
+pub use bevy_ecs::hierarchy::{ChildOf, Children};
+pub use bevy_ecs::name::Name;
+pub use bounds::scene_bounds;
+pub use census::{Census, CensusLine};
+pub use components::{
+    ActiveCamera, Bounds, Camera, DynamicObject, Extras, Hidden, Lightmap, MaterialTextures, Mesh,
+    MetallicRoughnessTexture, Primitive, Projection, SharedImage, StaticObject,
+};
+pub use default_camera::default_camera;
+pub use gltf::{
+    LoadError, LoadLimits, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS, SaveError, SaveReport, load,
+    load_slice, load_slice_within, save,
+};
+pub use image::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};
+pub use lumbre_optics::{Light, Material, Shading};
+pub use settings::SceneSettings;
+pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};

@@ -1,0 +1,40 @@
+//! What holds for a whole scene: the `LUMBRE_scene` extension as a resource.
+
+use bevy_ecs::resource::Resource;
+use glam::Vec3;
+use lumbre_optics::{Fog, ReflectionModel, Shading};
+
+/// Scene-wide choices.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub struct SceneSettings {
+    /// Global ambient light I_a, linear RGB.
+    pub ambient: Vec3,
+    /// Background, linear RGB.
+    pub background: Vec3,
+    /// The viewer is at the eye (true) or infinitely far along +Z of the camera (false).
+    pub local_viewer: bool,
+    /// Double-sided surfaces seen from behind are lit with the reversed normal and the back material (glTF's rule, and
+    /// what a file gets that does not say). Without it they are lit as if seen from the front (OpenGL without
+    /// `LIGHT_MODEL_TWO_SIDE`).
+    pub two_sided: bool,
+    /// The specular model.
+    pub reflection: ReflectionModel,
+    /// The shading of objects that do not choose their own.
+    pub shading: Shading,
+    /// Fog, if any.
+    pub fog: Option<Fog>,
+}
+
+impl Default for SceneSettings {
+    fn default() -> Self {
+        Self {
+            ambient: Vec3::ZERO,
+            background: Vec3::ZERO,
+            local_viewer: true,
+            two_sided: true,
+            reflection: ReflectionModel::Phong,
+            shading: Shading::Phong,
+            fog: None,
+        }
+    }
+}
