@@ -1,0 +1,138 @@
+//! What a frame draws, in which order, with which pipelines: culling, variants, sorting, batches. Not how they reach the GPU.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::DVec3;
+use lumbre_scene::SceneSettings;
+
+use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects};
+use crate::mesh_buffers::MeshKey;
+use crate::pipelines::PipelineKey;
+use crate::shader::Feature;
+use crate::texture_sets::TextureSet;
+
+/// Instances of one mesh in one pipeline.
+#[derive(Debug)]
+pub(crate) struct Batch {
+    pub pipeline: PipelineKey,
+    pub mesh: MeshKey,
+    pub texture_set: Option<Arc<TextureSet>>,
+    pub lightmap: Option<Arc<wgpu::BindGroup>>,
+    /// Into the draw list.
+    pub instances: Range<u32>,
+}
+
+/// The draws of a frame, by pass.
+#[derive(Debug, Default)]
+pub(crate) struct Draws {
+    pub lightmapped: Vec<Batch>,
+    pub opaque: Vec<Batch>,
+    pub transparent: Vec<Batch>,
+    /// From instance to slot.
+    pub list: Vec<u32>,
+    /// Objects outside the view.
+    pub outside: usize,
+}
+
+struct Visible<'a> {
+    pass: LitPass,
+    slot: usize,
+    distance: f64,
+    object: &'a Object,
+    pipeline: PipelineKey,
+}
+
+impl Draws {
+    /// The draws of what `view` sees.
+    pub fn new(
+        objects: &Objects,
+        view: &CameraView,
+        settings: &SceneSettings,
+        frame: &FrameFeatures,
+        format: wgpu::TextureFormat,
+        samples: u32,
+    ) -> Self {
+        let mut draws = Self::default();
+        let planes = view.frustum(objects.origin);
+        let inside = |object: &Object| {
+            let center = (object.center - objects.origin).extend(1.0);
+            planes.iter().all(|plane| plane.dot(center) >= -object.radius)
+        };
+        let mut visible: Vec<Visible> = Vec::new();
+        for (slot, object) in objects.iter() {
+            if !inside(object) {
+                draws.outside += 1;
+                continue;
+            }
+            let traits = &object.traits;
+            let pass = traits.pass(frame.lightmaps);
+            let pipeline = PipelineKey {
+                variant: traits.variant(settings, frame),
+                format,
+                samples,
+                mirrored: object.mirrored,
+                double_sided: traits.double_sided,
+                blend: pass == LitPass::Transparent,
+            };
+            visible.push(Visible { pass, slot, distance: distance(object, view.eye), object, pipeline });
+        }
+        // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
+        visible.sort_by(|a, b| {
+            let order = a.distance.total_cmp(&b.distance);
+            let order = if a.pass == LitPass::Transparent { order.reverse() } else { order };
+            a.pass.cmp(&b.pass).then(order).then(a.slot.cmp(&b.slot))
+        });
+        for seen in visible {
+            draws.push(&seen);
+        }
+        draws
+    }
+
+    /// Adds an instance, to the last batch if it fits.
+    fn push(&mut self, seen: &Visible) {
+        let instance = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
+        self.list.push(u32::try_from(seen.slot).unwrap_or(u32::MAX));
+        let batches = match seen.pass {
+            LitPass::Lightmap => &mut self.lightmapped,
+            LitPass::Forward => &mut self.opaque,
+            LitPass::Transparent => &mut self.transparent,
+        };
+        let lightmap = seen.object.lightmap.as_ref().filter(|_| seen.pipeline.variant.has(Feature::Lightmap));
+        let fits = |batch: &Batch| {
+            batch.pipeline == seen.pipeline
+                && batch.mesh == seen.object.mesh
+                && same(batch.texture_set.as_ref(), seen.object.texture_set.as_ref())
+                && same(batch.lightmap.as_ref(), lightmap)
+                && batch.instances.end == instance
+        };
+        match batches.last_mut() {
+            Some(last) if fits(last) => last.instances.end += 1,
+            _ => batches.push(Batch {
+                pipeline: seen.pipeline,
+                mesh: seen.object.mesh,
+                texture_set: seen.object.texture_set.clone(),
+                lightmap: lightmap.cloned(),
+                instances: instance..instance + 1,
+            }),
+        }
+    }
+
+    /// Every batch, in the order of the passes.
+    pub fn batches(&self) -> impl Iterator<Item = &Batch> {
+        self.lightmapped.iter().chain(&self.opaque).chain(&self.transparent)
+    }
+}
+
+fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
+    match (a, b) {
+        (None, None) => true,
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        _ => false,
+    }
+}
+
+/// From the eye to the nearest point of the bounding sphere.
+fn distance(object: &Object, eye: DVec3) -> f64 {
+    ((object.center - eye).length() - object.radius).max(0.0)
+}

@@ -1,0 +1,96 @@
+//! What can go wrong between a World and a frame.
+
+/// Why there is no frame.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// No driver offers a device.
+    #[error(
+        "no graphics device: install a Vulkan driver (Debian and Ubuntu: `apt-get install mesa-vulkan-drivers`, which also \
+         draws without a GPU) ({source})"
+    )]
+    NoAdapter {
+        /// What wgpu tried.
+        source: wgpu::RequestAdapterError,
+    },
+    /// WGPU_ADAPTER_NAME names none.
+    #[error(
+        "no graphics device is named like `{name}` (WGPU_ADAPTER_NAME); unset it to take the default one"
+    )]
+    NoAdapterNamed {
+        /// The name asked for.
+        name: String,
+    },
+    /// The device could not be opened.
+    #[error("the graphics device could not be opened: {0}")]
+    Device(#[from] wgpu::RequestDeviceError),
+    /// The device is gone (driver reset, unplugged): a new `Gpu` and `Renderer` are needed.
+    #[error("the graphics device is lost; create a new Gpu and Renderer")]
+    DeviceLost,
+    /// A window's surface could not be made.
+    #[error("the window gives no surface to draw on: {0}")]
+    Surface(#[from] wgpu::CreateSurfaceError),
+    /// The surface and the device do not fit together.
+    #[error("the graphics device `{adapter}` cannot present to this window")]
+    SurfaceUnsupported {
+        /// The adapter's name.
+        adapter: String,
+    },
+    /// No camera to draw from.
+    #[error("the World has no Camera: spawn one with `Camera::default()` and a Transform")]
+    NoCamera,
+    /// The entity asked for is no camera.
+    #[error("entity {entity} has no Camera and GlobalTransform")]
+    NotACamera {
+        /// The entity.
+        entity: bevy_ecs::entity::Entity,
+    },
+    /// A camera's numbers make no picture.
+    #[error("camera {entity}: {field} is {value}; it must be {wanted}")]
+    BadCamera {
+        /// The entity.
+        entity: bevy_ecs::entity::Entity,
+        /// The field of `Projection` or the transform.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its range.
+        wanted: &'static str,
+    },
+    /// Larger than the device's textures.
+    #[error("a frame of {width}x{height} is beyond this device's {limit} texels; ask for a smaller one")]
+    TargetTooLarge {
+        /// Width in texels.
+        width: u32,
+        /// Height in texels.
+        height: u32,
+        /// The device's limit for either side.
+        limit: u32,
+    },
+    /// More than a storage buffer holds.
+    #[error("{what}: {bytes} bytes are beyond this device's storage buffers of {limit}; have fewer of them")]
+    BufferTooLarge {
+        /// What was to be stored.
+        what: &'static str,
+        /// Bytes needed.
+        bytes: u64,
+        /// Bytes there are.
+        limit: u64,
+    },
+    /// A shader variant does not compile: a fault of ours, not of the scene.
+    #[error("shader variant [{variant}]: {message}")]
+    Shader {
+        /// The features of the variant.
+        variant: String,
+        /// The compiler's words.
+        message: String,
+    },
+    /// The render graph refuses.
+    #[error(transparent)]
+    Graph(#[from] Box<lumbre_graph::GraphError>),
+    /// The render graph fails while it runs.
+    #[error(transparent)]
+    Run(#[from] lumbre_graph::RunError),
+    /// Reading back failed.
+    #[error("reading the frame back failed: {0}")]
+    ReadBack(String),
+}

@@ -1,0 +1,90 @@
+//! What a scene calls for and what it does not, without a device: the census, the passes with their reasons, the shader variants.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use bevy_ecs::prelude::*;
+use lumbre_graph::{Explanation, TextureDescriptor};
+use lumbre_optics::{Material, Shading};
+use lumbre_scene::{Census, Hidden, Lightmap, MaterialTextures, Mesh, SceneSettings};
+
+use crate::extract::{FrameFeatures, LightSet, Traits};
+use crate::frame_graph::{FramePlan, declare};
+use crate::{Display, FrameOptions, RenderError};
+
+/// A scene's frame, explained.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct SceneExplanation {
+    /// What there is, and what there is none of.
+    pub census: Census,
+    /// The passes and resources of a frame.
+    pub frame: Explanation,
+    /// Each shader variant in use with the number of objects it draws.
+    pub variants: BTreeMap<String, usize>,
+}
+
+/// Explains the frame that these options would draw of `world`, in a target of this size.
+///
+/// # Errors
+/// Faults of the graph.
+pub fn explain(
+    world: &mut World,
+    options: &FrameOptions,
+    width: u32,
+    height: u32,
+) -> Result<SceneExplanation, RenderError> {
+    let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+    let mut lights = LightSet::of(world);
+    if !options.lightmaps {
+        lights.dynamic = lights.all;
+    }
+    let features = FrameFeatures {
+        shading: options.shading,
+        reflection: options.reflection.unwrap_or(settings.reflection),
+        lightmaps: options.lightmaps,
+        clamp: options.display == Display::Clamp,
+        lights,
+    };
+    let mut query = world.query_filtered::<(
+        &Mesh,
+        &Material,
+        Option<&MaterialTextures>,
+        Has<Lightmap>,
+        Option<&Shading>,
+    ), Without<Hidden>>();
+    let traits: Vec<Traits> = query
+        .iter(world)
+        .map(|(mesh, material, maps, lightmap, shading)| {
+            Traits::new(material, maps, &mesh.0, lightmap, shading.copied())
+        })
+        .collect();
+    let mut variants = BTreeMap::new();
+    for object in &traits {
+        *variants.entry(object.variant(&settings, &features).to_string()).or_insert(0) += 1;
+    }
+    let plan = FramePlan::new(&traits, options);
+    let target = TextureDescriptor::new_2d(width, height, wgpu::TextureFormat::Rgba8Unorm);
+    let frame = declare(&plan, target, None, None).compile()?.explain();
+    Ok(SceneExplanation { census: Census::of(world), frame, variants })
+}
+
+impl SceneExplanation {
+    /// For people.
+    pub fn to_text(&self) -> String {
+        let mut text = String::from("The scene\n");
+        for line in self.census.lines() {
+            let mark = if line.called_for { '+' } else { '-' };
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "  {mark} {}: {}", line.effect, line.reason);
+        }
+        text.push_str("\nThe frame\n");
+        for line in self.frame.to_text().lines() {
+            let _ = writeln!(text, "  {line}");
+        }
+        text.push_str("\nShader variants\n");
+        for (variant, count) in &self.variants {
+            let _ = writeln!(text, "  {count} x {variant}");
+        }
+        text
+    }
+}

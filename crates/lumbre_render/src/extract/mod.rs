@@ -1,0 +1,11 @@
+//! From the World to the GPU: what changed since the last frame, and nothing else. What is drawn of it is decided in `draws`.
+
+mod camera;
+mod lights;
+mod objects;
+mod traits;
+
+pub(crate) use camera::{CameraView, find_camera};
+pub(crate) use lights::{LightSet, extract_lights};
+pub(crate) use objects::{Object, Objects};
+pub(crate) use traits::{FrameFeatures, LitPass, Traits};

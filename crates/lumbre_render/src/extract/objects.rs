@@ -1,0 +1,212 @@
+//! Objects of a frame: entities with a mesh, one slot each in the GPU's buffers. A slot is written again only when a component
+//! of its entity changed.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::WorldId;
+use glam::DVec3;
+use lumbre_optics::{Material, Shading};
+use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh};
+
+use super::Traits;
+use crate::Gpu;
+use crate::growable_buffer::GrowableBuffer;
+use crate::layout::{MaterialData, ObjectData};
+use crate::mesh_buffers::{MeshBuffers, MeshKey};
+use crate::texture_sets::{TextureSet, TextureSets};
+use crate::textures::Textures;
+
+/// What the draws need to know of one object.
+#[derive(Debug)]
+pub(crate) struct Object {
+    pub mesh: MeshKey,
+    pub texture_set: Option<Arc<TextureSet>>,
+    pub lightmap: Option<Arc<wgpu::BindGroup>>,
+    pub traits: Traits,
+    pub mirrored: bool,
+    /// Bounding sphere in the world.
+    pub center: DVec3,
+    pub radius: f64,
+    seen: u64,
+}
+
+type ObjectQuery<'w, 's> = Query<
+    'w,
+    's,
+    (
+        Entity,
+        Ref<'static, Mesh>,
+        Ref<'static, Material>,
+        Ref<'static, GlobalTransform>,
+        Option<Ref<'static, MaterialTextures>>,
+        Option<Ref<'static, Lightmap>>,
+        Option<&'static Shading>,
+    ),
+    Without<Hidden>,
+>;
+
+/// All objects, and their GPU buffers.
+pub(crate) struct Objects {
+    state: Option<(WorldId, SystemState<ObjectQuery<'static, 'static>>)>,
+    slots: HashMap<Entity, usize>,
+    /// By slot; `None` is free.
+    pub objects: Vec<Option<Object>>,
+    free: Vec<usize>,
+    pub transforms: GrowableBuffer<ObjectData>,
+    pub materials: GrowableBuffer<MaterialData>,
+    frame: u64,
+    /// Where frame space has its origin in the world.
+    pub origin: DVec3,
+}
+
+/// Farther from the origin of frame space than this, in metres, the origin moves to the camera: at 512 m f32 still tells 0.03 mm apart.
+const ORIGIN_REACH: f64 = 512.0;
+
+impl Objects {
+    pub fn new() -> Self {
+        Self {
+            state: None,
+            slots: HashMap::new(),
+            objects: Vec::new(),
+            free: Vec::new(),
+            transforms: GrowableBuffer::new("objects"),
+            materials: GrowableBuffer::new("materials"),
+            frame: 0,
+            origin: DVec3::ZERO,
+        }
+    }
+
+    /// Brings the slots up to date for a frame seen from `eye`.
+    pub fn extract(
+        &mut self,
+        world: &mut World,
+        gpu: &Gpu,
+        meshes: &mut MeshBuffers,
+        textures: &mut Textures,
+        sets: &mut TextureSets,
+        eye: DVec3,
+    ) {
+        self.frame += 1;
+        if self.state.as_ref().is_none_or(|(id, _)| *id != world.id()) {
+            // Another World: nothing of the old one is left.
+            *self = Self { frame: self.frame, ..Self::new() };
+            self.state = Some((world.id(), SystemState::new(world)));
+        }
+        let moved = (eye - self.origin).length() > ORIGIN_REACH;
+        if moved {
+            self.origin = eye;
+        }
+        let Some((id, mut state)) = self.state.take() else { return };
+        if let Ok(query) = state.get(world) {
+            let found = query.iter().filter(|found| found.3.0.is_finite());
+            for (entity, mesh, material, transform, maps, lightmap, shading) in found {
+                let (slot, new) = self.slot(entity);
+                let remeshed = new || mesh.is_changed();
+                let transformed = new || moved || transform.is_changed();
+                let maps_changed = maps.as_ref().is_some_and(Ref::is_changed);
+                let map_changed = lightmap.as_ref().is_some_and(Ref::is_changed);
+                let maps = maps.map(Ref::into_inner);
+                let lightmap = lightmap.map(Ref::into_inner);
+                let traits = Traits::new(&material, maps, &mesh.0, lightmap.is_some(), shading.copied());
+                let mut object = match self.objects[slot].take() {
+                    Some(object) => object,
+                    None => Object::new(meshes.insert(&mesh.0), traits),
+                };
+                // A component that was removed leaves no change behind: compare presence too.
+                let rematerialized = new
+                    || material.is_changed()
+                    || maps_changed
+                    || object.traits.texture_mask != traits.texture_mask;
+                if remeshed {
+                    object.mesh = meshes.insert(&mesh.0);
+                }
+                if transformed {
+                    self.transforms.set(slot, ObjectData::new(&transform, self.origin));
+                }
+                if transformed || remeshed {
+                    object.bound(meshes, &transform);
+                }
+                if rematerialized {
+                    self.materials.set(slot, MaterialData::new(&material, maps));
+                    object.texture_set = maps.and_then(|maps| sets.set(gpu, textures, maps));
+                }
+                if new || map_changed || object.lightmap.is_some() != lightmap.is_some() {
+                    object.lightmap = lightmap.map(|map| sets.lightmap(gpu, textures, map));
+                }
+                object.traits = traits;
+                object.seen = self.frame;
+                self.objects[slot] = Some(object);
+            }
+        }
+        self.state = Some((id, state));
+        self.release(meshes, textures, sets);
+    }
+
+    fn slot(&mut self, entity: Entity) -> (usize, bool) {
+        if let Some(&slot) = self.slots.get(&entity) {
+            return (slot, false);
+        }
+        let slot = self.free.pop().unwrap_or_else(|| {
+            self.objects.push(None);
+            self.objects.len() - 1
+        });
+        self.slots.insert(entity, slot);
+        (slot, true)
+    }
+
+    /// Frees the slots of entities that are gone, and what only they used.
+    fn release(&mut self, meshes: &mut MeshBuffers, textures: &mut Textures, sets: &mut TextureSets) {
+        let (frame, objects, free) = (self.frame, &mut self.objects, &mut self.free);
+        let before = self.slots.len();
+        self.slots.retain(|_, slot| {
+            let alive = objects[*slot].as_ref().is_some_and(|object| object.seen == frame);
+            if !alive {
+                objects[*slot] = None;
+                free.push(*slot);
+            }
+            alive
+        });
+        if self.slots.len() != before {
+            sets.sweep();
+            textures.sweep();
+            meshes.sweep();
+        }
+    }
+
+    /// Objects with their slots.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &Object)> {
+        self.objects.iter().enumerate().filter_map(|(slot, object)| Some((slot, object.as_ref()?)))
+    }
+}
+
+impl Object {
+    fn new(mesh: MeshKey, traits: Traits) -> Self {
+        Self {
+            mesh,
+            texture_set: None,
+            lightmap: None,
+            traits,
+            mirrored: false,
+            center: DVec3::ZERO,
+            radius: 0.0,
+            seen: 0,
+        }
+    }
+
+    fn bound(&mut self, meshes: &MeshBuffers, transform: &GlobalTransform) {
+        self.mirrored = transform.mirrors();
+        let matrix = transform.0.matrix3;
+        // The Frobenius norm is at least the largest stretch.
+        let stretch = (matrix.x_axis.length_squared()
+            + matrix.y_axis.length_squared()
+            + matrix.z_axis.length_squared())
+        .sqrt();
+        if let Some(mesh) = meshes.get(self.mesh) {
+            self.center = transform.0.transform_point3(mesh.center);
+            self.radius = stretch * mesh.radius;
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What one object's components say that matters for shader variants and passes. Needs no device, so that a scene can be explained
+//! without one.
+
+use glam::Vec3;
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{AlphaMode, FogMode, Material, Shading, Surface};
+use lumbre_scene::{MaterialTextures, SceneSettings};
+
+use super::LightSet;
+use crate::shader::{Feature, Variant};
+use crate::texture_sets;
+
+/// The census of one object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Traits {
+    /// Which material textures there are.
+    pub texture_mask: u8,
+    pub uv0: bool,
+    pub uv1: bool,
+    pub vertex_color: bool,
+    pub alpha_mode: AlphaMode,
+    pub double_sided: bool,
+    pub unlit: bool,
+    /// Whether any light makes a highlight on it.
+    pub specular: bool,
+    /// Whether a highlight may be sharper than plain powers can tell.
+    pub sharp: bool,
+    pub lightmapped: bool,
+    pub shading: Option<Shading>,
+}
+
+/// What all variants of a frame have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FrameFeatures {
+    pub shading: Option<Shading>,
+    pub reflection: lumbre_optics::ReflectionModel,
+    pub lightmaps: bool,
+    pub clamp: bool,
+    pub lights: LightSet,
+}
+
+/// The pass that draws an object; in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum LitPass {
+    Lightmap,
+    Forward,
+    Transparent,
+}
+
+impl Traits {
+    pub fn new(
+        material: &Material,
+        maps: Option<&MaterialTextures>,
+        mesh: &TriangleMesh,
+        lightmapped: bool,
+        shading: Option<Shading>,
+    ) -> Self {
+        let (uv0, uv1) = maps.map_or((false, false), texture_sets::coordinate_sets);
+        let back = material.back.as_ref().map_or(Vec3::ZERO, |back| back.specular);
+        Self {
+            texture_mask: maps.map_or(0, texture_sets::mask),
+            uv0,
+            uv1,
+            vertex_color: !mesh.colors.is_empty(),
+            alpha_mode: material.alpha_mode,
+            double_sided: material.double_sided,
+            unlit: material.unlit,
+            specular: material.front.specular != Vec3::ZERO
+                || back != Vec3::ZERO
+                || maps.is_some_and(|maps| maps.metallic_roughness.is_some()),
+            sharp: material.front.has_sharp_highlight()
+                || material.back.as_ref().is_some_and(Surface::has_sharp_highlight)
+                || maps.is_some_and(|maps| maps.metallic_roughness.is_some()),
+            lightmapped: lightmapped && !mesh.uv1.is_empty(),
+            shading,
+        }
+    }
+
+    /// Whether its light comes from a lightmap in such a frame.
+    fn uses_lightmap(&self, lightmaps: bool) -> bool {
+        lightmaps && self.lightmapped && !self.unlit
+    }
+
+    /// The pass that draws it.
+    pub fn pass(&self, lightmaps: bool) -> LitPass {
+        match (self.alpha_mode, self.uses_lightmap(lightmaps)) {
+            (AlphaMode::Blend, _) => LitPass::Transparent,
+            (_, true) => LitPass::Lightmap,
+            (_, false) => LitPass::Forward,
+        }
+    }
+
+    /// The features that it calls for in such a frame.
+    pub fn variant(&self, settings: &SceneSettings, frame: &FrameFeatures) -> Variant {
+        let shading = frame.shading.or(self.shading).unwrap_or(settings.shading);
+        let mut variant = Variant::new(shading, frame.reflection);
+        let lit = !self.unlit;
+        let lightmapped = self.uses_lightmap(frame.lightmaps);
+        for (feature, bound) in texture_sets::features(self.texture_mask) {
+            variant.set(feature, bound);
+        }
+        variant.set(Feature::Uv0, self.uv0);
+        variant.set(Feature::Uv1, self.uv1 || lightmapped);
+        variant.set(Feature::VertexColor, self.vertex_color);
+        variant.set(Feature::Alpha, self.alpha_mode != AlphaMode::Opaque);
+        variant.set(Feature::AlphaMask, matches!(self.alpha_mode, AlphaMode::Mask { .. }));
+        variant.set(Feature::Lightmap, lightmapped);
+        variant.set(Feature::TwoSided, self.double_sided && settings.two_sided);
+        variant.set(Feature::Lit, lit);
+        let LightSet { dynamic, all, directional, point, spot, .. } = frame.lights;
+        variant.set(Feature::DynamicLights, dynamic > 0);
+        // Of a baked light only the highlight is left, if the material has one.
+        variant.set(Feature::StaticLights, all > dynamic && (!lightmapped || self.specular));
+        variant.set(Feature::DirectionalLights, directional);
+        variant.set(Feature::PointLights, point);
+        variant.set(Feature::SpotLights, spot);
+        variant.set(Feature::SharpHighlights, self.sharp);
+        variant.set(Feature::LocalViewer, settings.local_viewer);
+        if let Some(fog) = &settings.fog {
+            variant.set(Feature::Fog, true);
+            let feature = match fog.mode {
+                FogMode::Linear { .. } => Feature::FogLinear,
+                FogMode::Exponential { .. } => Feature::FogExponential,
+                FogMode::ExponentialSquared { .. } => Feature::FogExponentialSquared,
+                FogMode::DepthCue { .. } => Feature::FogDepthCue,
+            };
+            variant.set(feature, true);
+        }
+        let per_vertex = lit && shading != Shading::Phong;
+        variant.set(Feature::Clamp, frame.clamp);
+        variant.set(Feature::ClampVertices, frame.clamp && per_vertex);
+        variant.set(Feature::Modulated, per_vertex && variant.has(Feature::BaseColorTexture));
+        variant.reduced()
+    }
+}

@@ -1,0 +1,111 @@
+//! A storage buffer that mirrors a Vec and uploads only what changed.
+
+use std::ops::Range;
+
+use bytemuck::Pod;
+
+use crate::{Gpu, RenderError};
+
+/// A mirrored storage buffer.
+#[derive(Debug)]
+pub(crate) struct GrowableBuffer<T> {
+    label: &'static str,
+    pub values: Vec<T>,
+    dirty: Vec<Range<usize>>,
+    buffer: Option<wgpu::Buffer>,
+    capacity: usize,
+}
+
+impl<T: Pod + PartialEq> GrowableBuffer<T> {
+    pub fn new(label: &'static str) -> Self {
+        Self { label, values: Vec::new(), dirty: Vec::new(), buffer: None, capacity: 0 }
+    }
+
+    /// Sets one value and remembers it for the next upload.
+    pub fn set(&mut self, index: usize, value: T) {
+        if index >= self.values.len() {
+            self.values.resize(index + 1, T::zeroed());
+        }
+        self.values[index] = value;
+        match self.dirty.last_mut() {
+            Some(last) if last.end == index => last.end += 1,
+            Some(last) if last.contains(&index) => {}
+            _ => self.dirty.push(index..index + 1),
+        }
+    }
+
+    /// Replaces all values; those that are equal to the old ones are not uploaded again.
+    pub fn replace(&mut self, values: impl IntoIterator<Item = T>) {
+        let mut count = 0;
+        for value in values {
+            if self.values.get(count) != Some(&value) {
+                self.set(count, value);
+            }
+            count += 1;
+        }
+        self.values.truncate(count);
+        self.dirty.retain_mut(|range| {
+            range.end = range.end.min(count);
+            range.start < range.end
+        });
+    }
+
+    /// Bytes that the next `upload` will send.
+    pub fn pending_bytes(&self) -> u64 {
+        let dirty: usize = self.dirty.iter().map(ExactSizeIterator::len).sum();
+        (dirty * size_of::<T>()) as u64
+    }
+
+    /// Brings the GPU's copy up to date; true if the buffer is another one than before.
+    pub fn upload(&mut self, gpu: &Gpu) -> Result<bool, RenderError> {
+        let mut renewed = false;
+        if self.buffer.is_none() || self.values.len() > self.capacity {
+            self.capacity = self.values.len().next_power_of_two().max(1);
+            let size = (self.capacity * size_of::<T>()) as u64;
+            let limit = gpu.device.limits().max_storage_buffer_binding_size;
+            if size > limit {
+                return Err(RenderError::BufferTooLarge { what: self.label, bytes: size, limit });
+            }
+            self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(self.label),
+                size,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+            self.dirty.clear();
+            if !self.values.is_empty() {
+                self.dirty.push(0..self.values.len());
+            }
+            renewed = true;
+        }
+        if let Some(buffer) = &self.buffer {
+            for range in self.dirty.drain(..) {
+                let offset = (range.start * size_of::<T>()) as u64;
+                gpu.queue.write_buffer(buffer, offset, bytemuck::cast_slice(&self.values[range]));
+            }
+        }
+        Ok(renewed)
+    }
+
+    /// The GPU's copy, once `upload` has made it.
+    pub fn buffer(&self) -> Option<&wgpu::Buffer> {
+        self.buffer.as_ref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_differences_are_pending() {
+        let mut buffer = GrowableBuffer::<u32>::new("test");
+        buffer.replace([1, 2, 3, 4]);
+        assert_eq!(buffer.pending_bytes(), 16);
+        buffer.dirty.clear();
+        buffer.replace([1, 2, 3, 4]);
+        assert_eq!(buffer.pending_bytes(), 0);
+        buffer.replace([1, 9, 3]);
+        assert_eq!((buffer.pending_bytes(), buffer.values.as_slice()), (4, [1, 9, 3].as_slice()));
+    }
+}

@@ -1,0 +1,198 @@
+//! The bytes that shaders read. Layout twins of shaders/frame.wesl and shaders/optics/evaluate_light.wesl, field by field.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use lumbre_optics::{Light, LightKind, Material, SpotCone, SpotCosines, Surface};
+use lumbre_scene::{GlobalTransform, MaterialTextures, TextureReference};
+
+/// `Frame`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FrameData {
+    pub clip_from_frame: [[f32; 4]; 4],
+    pub eye: Vec3,
+    pub dynamic_lights: u32,
+    pub backward: Vec3,
+    pub all_lights: u32,
+    pub ambient: Vec3,
+    pub exposure: f32,
+    pub fog_color: Vec3,
+    pub padding: f32,
+    pub fog_parameters: [f32; 4],
+}
+
+/// `Object`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ObjectData {
+    pub rows: [[f32; 4]; 3],
+    pub normals: [[f32; 4]; 3],
+}
+
+impl ObjectData {
+    /// `origin` is subtracted in f64 before the rounding to f32.
+    pub fn new(transform: &GlobalTransform, origin: DVec3) -> Self {
+        let matrix = transform.0.matrix3;
+        let translation = transform.0.translation - origin;
+        let row = |index: usize| {
+            let row = matrix.row(index);
+            [row.x as f32, row.y as f32, row.z as f32, translation[index] as f32]
+        };
+        // Only the direction of a normal matters: scaled so that neither tiny nor huge scales leave f32.
+        let normal = transform.normal_matrix();
+        let largest = normal.x_axis.abs().max(normal.y_axis.abs()).max(normal.z_axis.abs()).max_element();
+        let factor = if largest > 0.0 && largest.is_finite() { 1.0 / largest } else { 0.0 };
+        let column = |column: DVec3| (column * factor).as_vec3().extend(0.0).to_array();
+        Self {
+            rows: [row(0), row(1), row(2)],
+            normals: [column(normal.x_axis), column(normal.y_axis), column(normal.z_axis)],
+        }
+    }
+}
+
+/// `Side`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SideData {
+    ambient: Vec3,
+    shininess: f32,
+    diffuse: Vec3,
+    alpha: f32,
+    specular: Vec3,
+    ior: f32,
+    emission: Vec3,
+    alpha_cutoff: f32,
+}
+
+impl SideData {
+    fn new(surface: &Surface, material: &Material) -> Self {
+        let alpha_cutoff = match material.alpha_mode {
+            lumbre_optics::AlphaMode::Mask { cutoff } => cutoff,
+            _ => 0.0,
+        };
+        Self {
+            ambient: surface.ambient,
+            shininess: surface.shininess_in_range(),
+            diffuse: surface.diffuse,
+            alpha: material.alpha,
+            specular: surface.specular,
+            ior: material.ior,
+            emission: surface.emission,
+            alpha_cutoff,
+        }
+    }
+}
+
+/// `TextureCoordinates`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CoordinatesData {
+    u: [f32; 4],
+    v: [f32; 4],
+}
+
+impl CoordinatesData {
+    fn new(texture: Option<&TextureReference>) -> Self {
+        let Some(texture) = texture else { return Self::default() };
+        let (sin, cos) = texture.rotation.sin_cos();
+        let (scale, offset) = (texture.scale, texture.offset);
+        // KHR_texture_transform: translation * rotation * scale, with its clockwise-looking matrix (v points down).
+        Self {
+            u: [cos * scale.x, sin * scale.y, offset.x, texture.tex_coord as f32],
+            v: [-sin * scale.x, cos * scale.y, offset.y, 0.0],
+        }
+    }
+}
+
+/// `Material`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct MaterialData {
+    front: SideData,
+    back: SideData,
+    base_color: CoordinatesData,
+    emissive: CoordinatesData,
+    metallic_roughness: CoordinatesData,
+    base_and_metallic: [f32; 4],
+    roughness: [f32; 4],
+}
+
+impl MaterialData {
+    pub fn new(material: &Material, textures: Option<&MaterialTextures>) -> Self {
+        let front = SideData::new(&material.front, material);
+        let back = SideData::new(material.back.as_ref().unwrap_or(&material.front), material);
+        let none = MaterialTextures::default();
+        let textures = textures.unwrap_or(&none);
+        let mapped = textures.metallic_roughness.as_ref();
+        Self {
+            front,
+            back,
+            base_color: CoordinatesData::new(textures.base_color.as_ref()),
+            emissive: CoordinatesData::new(textures.emissive.as_ref()),
+            metallic_roughness: CoordinatesData::new(mapped.map(|mapped| &mapped.texture)),
+            base_and_metallic: mapped.map_or([0.0; 4], |m| m.base_color.extend(m.metallic).to_array()),
+            roughness: mapped.map_or([0.0; 4], |m| [m.roughness, 0.0, 0.0, 0.0]),
+        }
+    }
+}
+
+/// `LightParameters`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct LightData {
+    ambient: Vec3,
+    kind: u32,
+    diffuse: Vec3,
+    attenuation_clamp: u32,
+    specular: Vec3,
+    range: f32,
+    position: Vec3,
+    spot: u32,
+    axis: Vec3,
+    spot_outer: f32,
+    attenuation: Vec3,
+    spot_inner_or_exponent: f32,
+}
+
+impl LightData {
+    /// A light in frame space.
+    pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
+        let cone = light.spot.filter(|cone| !cone.is_everywhere());
+        let cosines = cone.map(|cone| cone.cosines());
+        Self {
+            ambient: light.ambient,
+            kind: match light.kind {
+                LightKind::Ambient => 0,
+                LightKind::Directional => 1,
+                LightKind::Point => 2,
+            },
+            diffuse: light.diffuse,
+            attenuation_clamp: u32::from(light.attenuation.clamp),
+            specular: light.specular,
+            range: light.attenuation.shader_range(),
+            position: (transform.translation() - origin).as_vec3(),
+            spot: match cone {
+                None => 0,
+                Some(SpotCone::Exponent { .. }) => 1,
+                Some(SpotCone::Smooth { .. }) => 2,
+            },
+            axis: transform.forward().as_vec3(),
+            spot_outer: cosines.map_or(0.0, |cosines: SpotCosines| cosines.outer as f32),
+            attenuation: light.attenuation.coefficients(),
+            spot_inner_or_exponent: cosines.map_or(0.0, |cosines| cosines.inner_or_exponent as f32),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_those_of_the_shaders() {
+        assert_eq!(size_of::<FrameData>(), 144);
+        assert_eq!(size_of::<ObjectData>(), 96);
+        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 32);
+        assert_eq!(size_of::<LightData>(), 96);
+    }
+}

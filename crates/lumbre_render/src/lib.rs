@@ -1,0 +1,62 @@
+//! The passes that light a bevy_ecs World, their GPU buffers, and headless frames. No window library and no files are known here.
+//!
+//! ```text
+//!   World ──► extract ─────────► draws ──────────────► frame_graph ───────────────► target
+//!             changed components  cull, sort, batch     background ► lightmap ►        Offscreen or
+//!             to GPU buffers      variant per object    forward ► transparent ►        WindowSurface
+//!                 │                    │                display ► overlay
+//!                 └──── traits ────────┴──► explain: what the scene calls for, and what not
+//! ```
+//!
+//! A World, a renderer, a target:
+//!
+//! ```
+//! use std::sync::Arc;
+//! use bevy_ecs::prelude::*;
+//! use glam::Vec3;
+//! use lumbre_optics::{Light, Material};
+//! use lumbre_render::{FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
+//! use lumbre_scene::{Camera, Mesh, Transform};
+//!
+//! let mut world = World::new();
+//! world.spawn((Mesh(Arc::new(lumbre_mesh::shapes::uv_sphere(1.0, 32, 16))), Material::matt(Vec3::ONE)));
+//! world.spawn((Light::point(Vec3::splat(9.0)), Transform::from_xyz(0.0, 0.0, 4.0)));
+//! world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 4.0)));
+//! let gpu = Gpu::headless()?;
+//! let frame = Offscreen::new(&gpu, 64, 64, OffscreenFormat::Rgba8)?;
+//! Renderer::new(&gpu).render(&mut world, &frame.target(), &FrameOptions::default())?;
+//! let middle = &frame.read_rgba8(&gpu)?[4 * (32 * 64 + 32)..][..3];
+//! assert!(middle.iter().all(|channel| *channel > 200));
+//! # Ok::<(), lumbre_render::RenderError>(())
+//! ```
+
+mod display;
+mod draws;
+mod error;
+mod explain;
+mod extract;
+mod frame_graph;
+mod frame_report;
+mod gpu;
+mod growable_buffer;
+mod layout;
+mod mesh_buffers;
+mod offscreen;
+mod options;
+mod pipelines;
+mod renderer;
+mod shader;
+mod target;
+mod texture_sets;
+mod textures;
+mod window_surface;
+
+pub use error::RenderError;
+pub use explain::{SceneExplanation, explain};
+pub use frame_report::{FrameReport, Statistics};
+pub use gpu::Gpu;
+pub use offscreen::{Offscreen, OffscreenFormat};
+pub use options::{Display, FrameOptions, Measure};
+pub use renderer::Renderer;
+pub use target::FrameTarget;
+pub use window_surface::{Acquired, SurfaceFrame, WindowSurface};

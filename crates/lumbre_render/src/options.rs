@@ -1,0 +1,89 @@
+//! What a caller chooses for one frame. What the scene calls for is not chosen here: the census decides it.
+
+use bevy_ecs::entity::Entity;
+use lumbre_optics::{ReflectionModel, Shading};
+
+/// How linear radiance becomes the numbers of the target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Display {
+    /// The numbers as they are (after exposure).
+    Linear,
+    /// OpenGL's clamp to [0, 1]: per vertex before interpolation where a colour is computed per vertex, and again at the end.
+    Clamp,
+    /// For people: a tone curve, then the sRGB encoding.
+    #[default]
+    Srgb,
+}
+
+impl Display {
+    /// Every choice.
+    pub const ALL: &'static [Self] = &[Self::Linear, Self::Clamp, Self::Srgb];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Clamp => "clamp",
+            Self::Srgb => "srgb",
+        }
+    }
+
+    /// The choice with that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|display| display.name() == name)
+    }
+}
+
+/// What is measured. Measuring costs: queries, and merged passes that can no longer overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum Measure {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// CPU and GPU time per pass.
+    Time,
+    /// Times, and vertex and fragment invocations.
+    TimeAndInvocations,
+}
+
+/// Choices for one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameOptions {
+    /// The camera; else the one with `ActiveCamera`, else the first.
+    pub camera: Option<Entity>,
+    /// Shades every object this way, whatever it or the scene says.
+    pub shading: Option<Shading>,
+    /// Takes this specular model instead of the scene's.
+    pub reflection: Option<ReflectionModel>,
+    /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
+    pub lightmaps: bool,
+    /// Four samples per pixel instead of one.
+    pub multisample: bool,
+    /// From radiance to the target's numbers.
+    pub display: Display,
+    /// Factor on radiance, instead of the camera's.
+    pub exposure: Option<f32>,
+    /// f32 instead of f16 per channel until the display pass: for measuring, not for games.
+    pub full_precision: bool,
+    /// What is measured.
+    pub measure: Measure,
+    /// Looks for NaN and infinities after every pass.
+    pub probe: bool,
+}
+
+impl Default for FrameOptions {
+    fn default() -> Self {
+        Self {
+            camera: None,
+            shading: None,
+            reflection: None,
+            lightmaps: true,
+            multisample: false,
+            display: Display::Srgb,
+            exposure: None,
+            full_precision: false,
+            measure: Measure::Nothing,
+            probe: false,
+        }
+    }
+}

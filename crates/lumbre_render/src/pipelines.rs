@@ -1,0 +1,206 @@
+//! Render pipelines of the forward shader's variants, made when a draw first asks for one. Which draw asks for which: `draws`.
+
+use std::collections::HashMap;
+
+use lumbre_optics::Shading;
+
+use crate::mesh_buffers::Attribute;
+use crate::shader::{self, Feature, Variant};
+use crate::texture_sets::TextureSets;
+use crate::{Gpu, RenderError};
+
+/// Format of the depth buffer: reversed-Z wants floats.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Everything that a pipeline is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct PipelineKey {
+    pub variant: Variant,
+    pub format: wgpu::TextureFormat,
+    pub samples: u32,
+    /// The transform turns counter-clockwise triangles clockwise.
+    pub mirrored: bool,
+    pub double_sided: bool,
+    pub blend: bool,
+}
+
+/// A pipeline and the attributes that it reads, in the order of its vertex buffers.
+#[derive(Debug)]
+pub(crate) struct Pipeline {
+    pub pipeline: wgpu::RenderPipeline,
+    pub attributes: Vec<Attribute>,
+    /// Whether it draws three vertices per triangle, without indices.
+    pub flat: bool,
+}
+
+/// All pipelines made so far.
+#[derive(Debug)]
+pub(crate) struct Pipelines {
+    frame_layout: wgpu::BindGroupLayout,
+    modules: HashMap<Variant, wgpu::ShaderModule>,
+    pipelines: HashMap<PipelineKey, Pipeline>,
+}
+
+impl Pipelines {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self { frame_layout: frame_layout(gpu), modules: HashMap::new(), pipelines: HashMap::new() }
+    }
+
+    /// The layout of group 0.
+    pub fn frame_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.frame_layout
+    }
+
+    /// Number of shader variants compiled so far.
+    pub fn variants(&self) -> usize {
+        self.modules.len()
+    }
+
+    /// Makes the pipeline of a key unless it is there.
+    pub fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        sets: &mut TextureSets,
+        key: PipelineKey,
+        texture_mask: u8,
+    ) -> Result<(), RenderError> {
+        if self.pipelines.contains_key(&key) {
+            return Ok(());
+        }
+        if !self.modules.contains_key(&key.variant) {
+            let module = shader::compile(&gpu.device, "forward", &key.variant.flags())?;
+            self.modules.insert(key.variant, module);
+        }
+        let module = &self.modules[&key.variant];
+        let textures = sets.layout(gpu, texture_mask);
+        let lightmap = key.variant.has(Feature::Lightmap).then(|| sets.lightmap_layout(gpu));
+        let pipeline = make(gpu, module, &self.frame_layout, [textures.as_ref(), lightmap.as_ref()], key)?;
+        self.pipelines.insert(key, pipeline);
+        Ok(())
+    }
+
+    /// A pipeline that `prepare` made.
+    pub fn get(&self, key: &PipelineKey) -> Option<&Pipeline> {
+        self.pipelines.get(key)
+    }
+}
+
+/// The attributes that a variant reads, by shader location.
+pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
+    let lit = variant.has(Feature::Lit);
+    Attribute::ALL
+        .into_iter()
+        .filter(|attribute| match attribute {
+            Attribute::Position => true,
+            Attribute::Normal => lit,
+            Attribute::Uv0 => variant.has(Feature::Uv0),
+            Attribute::Uv1 => variant.has(Feature::Uv1),
+            Attribute::Color => variant.has(Feature::VertexColor),
+            Attribute::Centroid => lit && variant.shading == Shading::Flat,
+        })
+        .collect()
+}
+
+/// Whether a variant draws three vertices per triangle: flat shading, and lit at all.
+pub(crate) fn is_flat(variant: &Variant) -> bool {
+    variant.has(Feature::Lit) && variant.shading == Shading::Flat
+}
+
+fn frame_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        count: None,
+    };
+    let storage = wgpu::BufferBindingType::Storage { read_only: true };
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("frame"),
+        entries: &[
+            entry(0, wgpu::BufferBindingType::Uniform),
+            entry(1, storage),
+            entry(2, storage),
+            entry(3, storage),
+            entry(4, storage),
+        ],
+    })
+}
+
+fn make(
+    gpu: &Gpu,
+    module: &wgpu::ShaderModule,
+    frame: &wgpu::BindGroupLayout,
+    [textures, lightmap]: [Option<&wgpu::BindGroupLayout>; 2],
+    key: PipelineKey,
+) -> Result<Pipeline, RenderError> {
+    let attributes = attributes(&key.variant);
+    let formats: Vec<[wgpu::VertexAttribute; 1]> = attributes
+        .iter()
+        .map(|attribute| {
+            let shader_location = *attribute as u32;
+            [wgpu::VertexAttribute { format: attribute.format(), offset: 0, shader_location }]
+        })
+        .collect();
+    let buffers: Vec<_> = formats
+        .iter()
+        .map(|attributes| {
+            Some(wgpu::VertexBufferLayout {
+                array_stride: attributes[0].format.size(),
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes,
+            })
+        })
+        .collect();
+    let groups: &[Option<&wgpu::BindGroupLayout>] = match (textures, lightmap) {
+        (None, None) => &[Some(frame)],
+        (Some(_), None) => &[Some(frame), textures],
+        (_, Some(_)) => &[Some(frame), textures, lightmap],
+    };
+    let label = key.variant.to_string();
+    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("forward"),
+        bind_group_layouts: groups,
+        immediate_size: 0,
+    });
+    let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(&label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &buffers,
+        },
+        primitive: wgpu::PrimitiveState {
+            front_face: if key.mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw },
+            cull_mode: (!key.double_sided).then_some(wgpu::Face::Back),
+            ..Default::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(!key.blend),
+            // Reversed-Z: nearer is greater. Equal passes, so that of coplanar faces the one drawn last is seen, as in the file.
+            depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: key.samples, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: key.format,
+                blend: key.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    match pollster::block_on(scope.pop()) {
+        None => Ok(Pipeline { pipeline, attributes, flat: is_flat(&key.variant) }),
+        Some(error) => Err(RenderError::Shader { variant: label, message: error.to_string() }),
+    }
+}

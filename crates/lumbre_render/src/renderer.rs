@@ -1,0 +1,235 @@
+//! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
+//! these has its own file.
+
+use bevy_ecs::prelude::*;
+use lumbre_graph::Executor;
+use lumbre_scene::{SceneSettings, propagate_transforms};
+
+use crate::display::DisplayPass;
+use crate::draws::Draws;
+use crate::extract::{CameraView, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
+use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
+use crate::growable_buffer::GrowableBuffer;
+use crate::layout::{FrameData, LightData};
+use crate::mesh_buffers::MeshBuffers;
+use crate::pipelines::{Pipelines, attributes, is_flat};
+use crate::texture_sets::TextureSets;
+use crate::textures::Textures;
+use crate::{Display, FrameOptions, FrameReport, FrameTarget, Gpu, Measure, RenderError, Statistics};
+
+/// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
+pub struct Renderer {
+    gpu: Gpu,
+    executor: Executor,
+    objects: Objects,
+    lights: GrowableBuffer<LightData>,
+    draw_list: GrowableBuffer<u32>,
+    meshes: MeshBuffers,
+    textures: Textures,
+    sets: TextureSets,
+    pipelines: Pipelines,
+    display: DisplayPass,
+    frame_uniform: wgpu::Buffer,
+    frame_group: Option<wgpu::BindGroup>,
+}
+
+impl Renderer {
+    /// A renderer on a device.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            executor: Executor::new(),
+            objects: Objects::new(),
+            lights: GrowableBuffer::new("lights"),
+            draw_list: GrowableBuffer::new("draw list"),
+            meshes: MeshBuffers::default(),
+            textures: Textures::default(),
+            sets: TextureSets::default(),
+            pipelines: Pipelines::new(gpu),
+            display: DisplayPass::new(gpu),
+            frame_uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("frame"),
+                size: size_of::<FrameData>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            frame_group: None,
+        }
+    }
+
+    /// Draws one frame of `world` into `target` and submits it. Transforms are propagated first.
+    ///
+    /// # Errors
+    /// No camera or a bad one, too many objects for the device, a lost device, faults of shaders or the graph.
+    pub fn render(
+        &mut self,
+        world: &mut World,
+        target: &FrameTarget,
+        options: &FrameOptions,
+    ) -> Result<FrameReport, RenderError> {
+        self.draw(world, target, options, None)
+    }
+
+    /// As [`render`](Self::render), with a last pass that draws an overlay (a user interface) over the finished frame.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn render_with_overlay(
+        &mut self,
+        world: &mut World,
+        target: &FrameTarget,
+        options: &FrameOptions,
+        overlay: impl FnOnce(&mut wgpu::RenderPass<'static>),
+    ) -> Result<FrameReport, RenderError> {
+        self.draw(world, target, options, Some(Box::new(overlay)))
+    }
+
+    /// Waits until the GPU has finished and answers with the last frame's measurements, if any were asked for.
+    ///
+    /// # Errors
+    /// [`RenderError::Run`] if the device was lost.
+    pub fn wait(&mut self) -> Result<Option<&lumbre_graph::FrameReport>, RenderError> {
+        Ok(self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?)
+    }
+
+    fn draw(
+        &mut self,
+        world: &mut World,
+        target: &FrameTarget,
+        options: &FrameOptions,
+        overlay: Option<Overlay<'_>>,
+    ) -> Result<FrameReport, RenderError> {
+        if self.gpu.is_lost() {
+            return Err(RenderError::DeviceLost);
+        }
+        // The system cannot fail: it has no parameter that may be missing.
+        let _ = world.run_system_cached(propagate_transforms);
+        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let camera = find_camera(world, options.camera)?;
+        let view = CameraView::new(world, camera, target.aspect())?;
+        self.objects.extract(
+            world,
+            &self.gpu,
+            &mut self.meshes,
+            &mut self.textures,
+            &mut self.sets,
+            view.eye,
+        );
+        let mut lights = extract_lights(world, &mut self.lights, self.objects.origin);
+        if !options.lightmaps {
+            lights.dynamic = lights.all;
+        }
+        let exposure = options.exposure.unwrap_or(view.exposure);
+        let mut plan = FramePlan::new(self.objects.iter().map(|(_, object)| &object.traits), options);
+        plan.choose_formats(&self.gpu, target, options, exposure);
+        let features = FrameFeatures {
+            shading: options.shading,
+            reflection: options.reflection.unwrap_or(settings.reflection),
+            lightmaps: options.lightmaps,
+            clamp: options.display == Display::Clamp,
+            lights,
+        };
+        let draws = Draws::new(&self.objects, &view, &settings, &features, plan.format, plan.samples);
+        self.draw_list.replace(draws.list.iter().copied());
+        let uploaded_bytes = self.upload(&view, &settings, &lights, exposure)?;
+        let mut triangles = 0;
+        for batch in draws.batches() {
+            let mask = batch.texture_set.as_ref().map_or(0, |set| set.mask);
+            self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline, mask)?;
+            let variant = &batch.pipeline.variant;
+            if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
+                mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant));
+                triangles += mesh.triangles() * batch.instances.len();
+            }
+        }
+        let display_key = match plan.direct {
+            true => None,
+            false => Some(self.display.prepare(&self.gpu, options.display, target.format, exposure)?),
+        };
+        let statistics = Statistics {
+            lights: lights.all,
+            static_lights: lights.all - lights.dynamic,
+            objects: draws.list.len(),
+            objects_outside: draws.outside,
+            triangles,
+            draws: draws.batches().count(),
+            variants: self.pipelines.variants(),
+            uploaded_bytes,
+        };
+        self.executor.set_measure(match options.measure {
+            Measure::Nothing => lumbre_graph::Measure::OFF,
+            Measure::Time => lumbre_graph::Measure::TIMES,
+            Measure::TimeAndInvocations => lumbre_graph::Measure::ALL,
+        });
+        self.executor.enable_probe(options.probe);
+        let prepared = Prepared {
+            gpu: &self.gpu,
+            draws: &draws,
+            pipelines: &self.pipelines,
+            meshes: &self.meshes,
+            frame_group: self.frame_group.as_ref(),
+            display: &self.display,
+            display_key,
+            background: settings.background,
+        };
+        let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
+        let measured = self.executor.latest_report().cloned();
+        Ok(FrameReport { statistics, plan: frame.plan, measured })
+    }
+
+    /// Uploads what changed; answers with its bytes.
+    fn upload(
+        &mut self,
+        view: &CameraView,
+        settings: &SceneSettings,
+        lights: &LightSet,
+        exposure: f32,
+    ) -> Result<u64, RenderError> {
+        let origin = self.objects.origin;
+        let fog = settings.fog.as_ref();
+        let data = FrameData {
+            clip_from_frame: view.clip_from_frame(origin).as_mat4().to_cols_array_2d(),
+            eye: (view.eye - origin).as_vec3(),
+            dynamic_lights: lights.dynamic,
+            backward: view.basis.z_axis.as_vec3(),
+            all_lights: lights.all,
+            ambient: settings.ambient + lights.ambient,
+            exposure,
+            fog_color: fog.map_or(glam::Vec3::ZERO, |fog| fog.color),
+            padding: 0.0,
+            fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
+        };
+        self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&data));
+        let bytes = self.objects.transforms.pending_bytes()
+            + self.objects.materials.pending_bytes()
+            + self.lights.pending_bytes()
+            + self.draw_list.pending_bytes();
+        let mut renewed = self.frame_group.is_none();
+        renewed |= self.objects.transforms.upload(&self.gpu)?;
+        renewed |= self.objects.materials.upload(&self.gpu)?;
+        renewed |= self.draw_list.upload(&self.gpu)?;
+        renewed |= self.lights.upload(&self.gpu)?;
+        if renewed {
+            let buffers = [
+                Some(&self.frame_uniform),
+                self.objects.transforms.buffer(),
+                self.objects.materials.buffer(),
+                self.draw_list.buffer(),
+                self.lights.buffer(),
+            ];
+            let entries: Vec<_> = buffers
+                .iter()
+                .zip(0..)
+                .filter_map(|(buffer, binding)| {
+                    Some(wgpu::BindGroupEntry { binding, resource: (*buffer)?.as_entire_binding() })
+                })
+                .collect();
+            self.frame_group = Some(self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("frame"),
+                layout: self.pipelines.frame_layout(),
+                entries: &entries,
+            }));
+        }
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,8 @@
+//! Shaders: the embedded sources, the variants that a frame calls for, and their compilation. Not pipelines: those are `pipelines`.
+
+mod compile;
+mod sources;
+mod variant;
+
+pub(crate) use compile::compile;
+pub use variant::{DisplayVariant, Feature, Variant};

@@ -1,0 +1,188 @@
+//! Shader variants: the set of features that one draw calls for. What is not in the set is not in the shader.
+
+use lumbre_optics::{ReflectionModel, Shading};
+
+use crate::Display;
+
+macro_rules! features {
+    ($($(#[$doc:meta])* $name:ident = $bit:literal => $word:literal),+ $(,)?) => {
+        /// One thing that a shader may or may not do.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u32)]
+        pub enum Feature {
+            $($(#[$doc])* $name = 1 << $bit),+
+        }
+
+        impl Feature {
+            /// Every feature.
+            pub const ALL: &'static [Self] = &[$(Self::$name),+];
+
+            /// The name in the shaders.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$name => $word),+ }
+            }
+        }
+    };
+}
+
+features! {
+    /// Reads TEXCOORD_0.
+    Uv0 = 0 => "UV0",
+    /// Reads TEXCOORD_1.
+    Uv1 = 1 => "UV1",
+    /// Multiplies by vertex colours.
+    VertexColor = 2 => "VERTEX_COLOR",
+    /// Samples a base colour texture.
+    BaseColorTexture = 3 => "BASE_COLOR_TEXTURE",
+    /// Samples an emissive texture.
+    EmissiveTexture = 4 => "EMISSIVE_TEXTURE",
+    /// Samples a metallic-roughness texture.
+    MetallicRoughnessTexture = 5 => "METALLIC_ROUGHNESS_TEXTURE",
+    /// Writes alpha.
+    Alpha = 6 => "ALPHA",
+    /// Discards below the alpha cutoff.
+    AlphaMask = 7 => "ALPHA_MASK",
+    /// Samples a lightmap.
+    Lightmap = 8 => "LIGHTMAP",
+    /// Lights the back side by itself.
+    TwoSided = 9 => "TWO_SIDED",
+    /// Is lit at all.
+    Lit = 10 => "LIT",
+    /// Loops over dynamic lights.
+    DynamicLights = 11 => "DYNAMIC_LIGHTS",
+    /// Loops over baked lights.
+    StaticLights = 12 => "STATIC_LIGHTS",
+    /// Knows directional lights.
+    DirectionalLights = 13 => "DIRECTIONAL_LIGHTS",
+    /// Knows point lights.
+    PointLights = 14 => "POINT_LIGHTS",
+    /// Knows spot cones.
+    SpotLights = 15 => "SPOT_LIGHTS",
+    /// The viewer is near.
+    LocalViewer = 16 => "LOCAL_VIEWER",
+    /// Linear fog.
+    FogLinear = 17 => "FOG_LINEAR",
+    /// Exponential fog.
+    FogExponential = 18 => "FOG_EXPONENTIAL",
+    /// Squared exponential fog.
+    FogExponentialSquared = 19 => "FOG_EXPONENTIAL_SQUARED",
+    /// Depth cueing.
+    FogDepthCue = 20 => "FOG_DEPTH_CUE",
+    /// Any fog.
+    Fog = 21 => "FOG",
+    /// Clamps to [0, 1] as OpenGL does.
+    Clamp = 22 => "CLAMP",
+    /// Clamps vertex colours before interpolation.
+    ClampVertices = 23 => "CLAMP_VERTICES",
+    /// Vertex light is modulated per fragment, so that specular light travels apart.
+    Modulated = 24 => "MODULATED",
+    /// Takes the precise form of highlights with exponents above 256.
+    SharpHighlights = 25 => "SHARP_HIGHLIGHTS",
+}
+
+/// A variant of the forward shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// Rate of evaluation.
+    pub shading: Shading,
+    /// Specular model.
+    pub reflection: ReflectionModel,
+    bits: u32,
+}
+
+impl Variant {
+    /// No features yet.
+    pub fn new(shading: Shading, reflection: ReflectionModel) -> Self {
+        Self { shading, reflection, bits: 0 }
+    }
+
+    /// Adds a feature if it is called for.
+    pub fn set(&mut self, feature: Feature, called_for: bool) {
+        if called_for {
+            self.bits |= feature as u32;
+        }
+    }
+
+    /// Whether the feature is in it.
+    pub fn has(&self, feature: Feature) -> bool {
+        self.bits & feature as u32 != 0
+    }
+
+    /// The variant with everything that cannot matter taken out, so that fewer pipelines are made.
+    pub fn reduced(mut self) -> Self {
+        if !self.has(Feature::Lit) {
+            // Unlit: neither lights nor normals, whatever the technique.
+            let keep = !(Feature::DynamicLights as u32
+                | Feature::StaticLights as u32
+                | Feature::LocalViewer as u32
+                | Feature::TwoSided as u32
+                | Feature::Lightmap as u32
+                | Feature::MetallicRoughnessTexture as u32);
+            self.bits &= keep;
+            (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
+        }
+        if !self.has(Feature::DynamicLights) && !self.has(Feature::StaticLights) {
+            self.bits &= !(Feature::DirectionalLights as u32
+                | Feature::PointLights as u32
+                | Feature::SpotLights as u32
+                | Feature::SharpHighlights as u32);
+            self.reflection = ReflectionModel::Phong;
+        }
+        self
+    }
+
+    /// The shader's feature flags: each name, and whether it is on.
+    pub(crate) fn flags(&self) -> Vec<(&'static str, bool)> {
+        let features = Feature::ALL.iter().map(|feature| (feature.name(), self.has(*feature)));
+        let shading = [
+            ("SHADING_FLAT", Shading::Flat),
+            ("SHADING_GOURAUD", Shading::Gouraud),
+            ("SHADING_PHONG", Shading::Phong),
+        ];
+        let reflection = [
+            ("REFLECTION_PHONG", ReflectionModel::Phong),
+            ("REFLECTION_BLINN", ReflectionModel::Blinn),
+            ("REFLECTION_BLINN_4N", ReflectionModel::Blinn4n),
+            ("REFLECTION_BLINN_MATCHED", ReflectionModel::BlinnMatched),
+            ("REFLECTION_TORRANCE_SPARROW", ReflectionModel::TorranceSparrow),
+        ];
+        features
+            // Ambient lights are summed before the frame: no shader meets one.
+            .chain([("AMBIENT_LIGHTS", false)])
+            .chain(shading.map(|(name, value)| (name, value == self.shading)))
+            .chain(reflection.map(|(name, value)| (name, value == self.reflection)))
+            .collect()
+    }
+}
+
+impl std::fmt::Display for Variant {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut separator = "";
+        for (name, on) in self.flags() {
+            if on {
+                write!(formatter, "{separator}{name}")?;
+                separator = " ";
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A variant of the display shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct DisplayVariant {
+    /// What is shown.
+    pub display: Display,
+    /// The shader encodes sRGB (the target's format does not).
+    pub encode: bool,
+}
+
+impl DisplayVariant {
+    pub(crate) fn flags(self) -> Vec<(&'static str, bool)> {
+        vec![
+            ("DISPLAY_SRGB", self.display == Display::Srgb),
+            ("DISPLAY_CLAMP", self.display == Display::Clamp),
+            ("ENCODE_SRGB", self.encode),
+        ]
+    }
+}

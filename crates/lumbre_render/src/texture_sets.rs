@@ -1,0 +1,182 @@
+//! Bind groups of a material's textures and of lightmaps. A set binds only the textures that its material has.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumbre_scene::{Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
+
+use crate::Gpu;
+use crate::shader::Feature;
+use crate::textures::Textures;
+
+/// The slots of a set in binding order: the feature that reads it, and whether its bytes are sRGB-encoded.
+const SLOTS: [(Feature, bool); 3] = [
+    (Feature::BaseColorTexture, true),
+    (Feature::EmissiveTexture, true),
+    (Feature::MetallicRoughnessTexture, false),
+];
+
+/// A bind group of some of the three material textures.
+#[derive(Debug)]
+pub(crate) struct TextureSet {
+    /// Bit i: slot i is bound.
+    pub mask: u8,
+    pub bind_group: wgpu::BindGroup,
+}
+
+type SetKey = [Option<(usize, Sampler)>; 3];
+
+/// All sets in use.
+#[derive(Debug, Default)]
+pub(crate) struct TextureSets {
+    layouts: HashMap<u8, wgpu::BindGroupLayout>,
+    sets: HashMap<SetKey, Arc<TextureSet>>,
+    lightmap_layout: Option<wgpu::BindGroupLayout>,
+    lightmaps: HashMap<usize, Arc<wgpu::BindGroup>>,
+}
+
+fn slots(textures: &MaterialTextures) -> [Option<&TextureReference>; 3] {
+    [
+        textures.base_color.as_ref(),
+        textures.emissive.as_ref(),
+        textures.metallic_roughness.as_ref().map(|mapped| &mapped.texture),
+    ]
+}
+
+/// Which slots a material fills.
+pub(crate) fn mask(textures: &MaterialTextures) -> u8 {
+    slots(textures).iter().enumerate().map(|(i, slot)| u8::from(slot.is_some()) << i).sum()
+}
+
+/// The features that go with a mask.
+pub(crate) fn features(mask: u8) -> impl Iterator<Item = (Feature, bool)> {
+    SLOTS.iter().enumerate().map(move |(i, (feature, _))| (*feature, mask & (1 << i) != 0))
+}
+
+/// The coordinate sets that a material's textures read: (uv0, uv1).
+pub(crate) fn coordinate_sets(textures: &MaterialTextures) -> (bool, bool) {
+    let used = |set: u32| slots(textures).into_iter().flatten().any(|texture| texture.tex_coord == set);
+    (used(0), used(1))
+}
+
+impl TextureSets {
+    /// The layout for a mask; none for no textures.
+    pub fn layout(&mut self, gpu: &Gpu, mask: u8) -> Option<wgpu::BindGroupLayout> {
+        (mask != 0).then(|| self.layouts.entry(mask).or_insert_with(|| make_layout(gpu, mask)).clone())
+    }
+
+    /// The set of a material; none without textures.
+    pub fn set(
+        &mut self,
+        gpu: &Gpu,
+        textures: &mut Textures,
+        material: &MaterialTextures,
+    ) -> Option<Arc<TextureSet>> {
+        let mask = mask(material);
+        let layout = self.layout(gpu, mask)?;
+        let slots = slots(material);
+        let key = slots.map(|slot| slot.map(|t| (Arc::as_ptr(&t.image) as usize, t.sampler)));
+        if let Some(set) = self.sets.get(&key) {
+            return Some(Arc::clone(set));
+        }
+        let bound: Vec<_> = slots
+            .iter()
+            .zip(SLOTS)
+            .enumerate()
+            .filter_map(|(index, (slot, (_, srgb)))| {
+                let texture = (*slot)?;
+                let view = textures.image(gpu, &texture.image, srgb);
+                Some((index as u32 * 2, view, textures.sampler(gpu, &texture.sampler)))
+            })
+            .collect();
+        let set = Arc::new(TextureSet { mask, bind_group: bind(gpu, &layout, &bound) });
+        self.sets.insert(key, Arc::clone(&set));
+        Some(set)
+    }
+
+    /// The layout of a lightmap's group.
+    pub fn lightmap_layout(&mut self, gpu: &Gpu) -> wgpu::BindGroupLayout {
+        self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, &[0])).clone()
+    }
+
+    /// The group of a lightmap.
+    pub fn lightmap(
+        &mut self,
+        gpu: &Gpu,
+        textures: &mut Textures,
+        lightmap: &Lightmap,
+    ) -> Arc<wgpu::BindGroup> {
+        let key = Arc::as_ptr(&lightmap.image) as usize;
+        if let Some(group) = self.lightmaps.get(&key) {
+            return Arc::clone(group);
+        }
+        let layout = self.lightmap_layout(gpu);
+        let view = textures.lightmap(gpu, &lightmap.image);
+        let (wrap_u, wrap_v) = (Wrap::ClampToEdge, Wrap::ClampToEdge);
+        let sampler =
+            textures.sampler(gpu, &Sampler { wrap_u, wrap_v, mipmap: Mipmap::None, ..Sampler::default() });
+        let group = Arc::new(bind(gpu, &layout, &[(0, view, sampler)]));
+        self.lightmaps.insert(key, Arc::clone(&group));
+        group
+    }
+
+    /// Forgets what no object holds. Before `Textures::sweep`, which the groups would keep from forgetting.
+    pub fn sweep(&mut self) {
+        self.sets.retain(|_, set| Arc::strong_count(set) > 1);
+        self.lightmaps.retain(|_, group| Arc::strong_count(group) > 1);
+    }
+}
+
+fn make_layout(gpu: &Gpu, mask: u8) -> wgpu::BindGroupLayout {
+    let first: Vec<u32> = (0..3).filter(|i| mask & (1 << i) != 0).map(|i| i * 2).collect();
+    layout_of(gpu, &first)
+}
+
+/// A texture and a sampler at each of these bindings.
+fn layout_of(gpu: &Gpu, first: &[u32]) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty,
+        count: None,
+    };
+    let texture = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    let entries: Vec<_> =
+        first.iter().flat_map(|&binding| [entry(binding, texture), entry(binding + 1, sampler)]).collect();
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("textures"),
+        entries: &entries,
+    })
+}
+
+fn bind(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    bound: &[(u32, wgpu::TextureView, wgpu::Sampler)],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = bound
+        .iter()
+        .flat_map(|(binding, view, sampler)| {
+            [
+                wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: wgpu::BindingResource::TextureView(view),
+                },
+                wgpu::BindGroupEntry {
+                    binding: *binding + 1,
+                    resource: wgpu::BindingResource::Sampler(sampler),
+                },
+            ]
+        })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("textures"),
+        layout,
+        entries: &entries,
+    })
+}

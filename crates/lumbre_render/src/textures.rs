@@ -1,0 +1,183 @@
+//! GPU copies of images: material textures with mip levels, and lightmaps. Which material uses which is decided in `extract`.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use half::f16;
+use lumbre_scene::{Image, LightmapImage, Mipmap, Sampler, Wrap};
+
+use crate::Gpu;
+
+/// Textures and samplers in use, by the address of the shared image.
+#[derive(Debug, Default)]
+pub(crate) struct Textures {
+    images: HashMap<(usize, bool), (Arc<Image>, wgpu::TextureView)>,
+    lightmaps: HashMap<usize, (Arc<LightmapImage>, wgpu::TextureView)>,
+    samplers: HashMap<Sampler, wgpu::Sampler>,
+}
+
+impl Textures {
+    /// The view of an image, whose bytes are sRGB-encoded or linear.
+    pub fn image(&mut self, gpu: &Gpu, image: &Arc<Image>, srgb: bool) -> wgpu::TextureView {
+        let key = (Arc::as_ptr(image) as usize, srgb);
+        let entry = self.images.entry(key);
+        entry.or_insert_with(|| (Arc::clone(image), upload(gpu, image, srgb))).1.clone()
+    }
+
+    /// The view of a lightmap: E/π, f16 per channel.
+    pub fn lightmap(&mut self, gpu: &Gpu, image: &Arc<LightmapImage>) -> wgpu::TextureView {
+        let key = Arc::as_ptr(image) as usize;
+        let entry = self.lightmaps.entry(key);
+        entry.or_insert_with(|| (Arc::clone(image), upload_lightmap(gpu, image))).1.clone()
+    }
+
+    /// A sampler.
+    pub fn sampler(&mut self, gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
+        self.samplers.entry(*sampler).or_insert_with(|| make_sampler(gpu, sampler)).clone()
+    }
+
+    /// Forgets images that nothing else holds.
+    pub fn sweep(&mut self) {
+        self.images.retain(|_, (image, _)| Arc::strong_count(image) > 1);
+        self.lightmaps.retain(|_, (image, _)| Arc::strong_count(image) > 1);
+    }
+}
+
+fn make_sampler(gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
+    let wrap = |wrap: Wrap| match wrap {
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+        Wrap::MirroredRepeat => wgpu::AddressMode::MirrorRepeat,
+        Wrap::ClampToEdge => wgpu::AddressMode::ClampToEdge,
+    };
+    let filter = |linear| if linear { wgpu::FilterMode::Linear } else { wgpu::FilterMode::Nearest };
+    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("material"),
+        address_mode_u: wrap(sampler.wrap_u),
+        address_mode_v: wrap(sampler.wrap_v),
+        mag_filter: filter(sampler.magnify_linear),
+        min_filter: filter(sampler.minify_linear),
+        mipmap_filter: match sampler.mipmap {
+            Mipmap::Linear => wgpu::MipmapFilterMode::Linear,
+            Mipmap::None | Mipmap::Nearest => wgpu::MipmapFilterMode::Nearest,
+        },
+        lod_max_clamp: if sampler.mipmap == Mipmap::None { 0.0 } else { 32.0 },
+        ..Default::default()
+    })
+}
+
+fn upload(gpu: &Gpu, image: &Image, srgb: bool) -> wgpu::TextureView {
+    let mut level = (image.width, image.height, image.rgba.clone());
+    let limit = gpu.device.limits().max_texture_dimension_2d;
+    // Beyond the device's limit the largest mip level that fits stands in.
+    while level.0 > limit || level.1 > limit {
+        level = halved(&level, srgb);
+    }
+    let levels = 32 - level.0.max(level.1).leading_zeros();
+    let format = if srgb { wgpu::TextureFormat::Rgba8UnormSrgb } else { wgpu::TextureFormat::Rgba8Unorm };
+    let texture = texture_2d(gpu, level.0, level.1, levels, format);
+    for mip in 0..levels {
+        write(gpu, &texture, mip, level.0, level.1, 4, &level.2);
+        level = halved(&level, srgb);
+    }
+    texture.create_view(&Default::default())
+}
+
+fn upload_lightmap(gpu: &Gpu, image: &LightmapImage) -> wgpu::TextureView {
+    // f16 ends at 65504; a texel beyond it is a lamp, and as white as the largest number.
+    let half = |value: f32| f16::from_f32(value.clamp(0.0, f16::MAX.to_f32())).to_bits();
+    let texels: Vec<u16> =
+        image.texels.iter().flat_map(|t| [half(t.x), half(t.y), half(t.z), half(1.0)]).collect();
+    let texture = texture_2d(gpu, image.width, image.height, 1, wgpu::TextureFormat::Rgba16Float);
+    write(gpu, &texture, 0, image.width, image.height, 8, bytemuck::cast_slice(&texels));
+    texture.create_view(&Default::default())
+}
+
+fn texture_2d(
+    gpu: &Gpu,
+    width: u32,
+    height: u32,
+    mip_level_count: u32,
+    format: wgpu::TextureFormat,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("image"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
+}
+
+fn write(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    mip_level: u32,
+    width: u32,
+    height: u32,
+    texel: u32,
+    bytes: &[u8],
+) {
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() },
+        bytes,
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * texel), rows_per_image: None },
+        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+}
+
+/// The next mip level: a box filter in linear light, so that a minified wall keeps its brightness.
+fn halved((width, height, texels): &(u32, u32, Vec<u8>), srgb: bool) -> (u32, u32, Vec<u8>) {
+    let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
+    let decode = |byte: u8, channel: usize| {
+        let value = f32::from(byte) / 255.0;
+        if srgb && channel < 3 { srgb_to_linear(value) } else { value }
+    };
+    let encode = |value: f32, channel: usize| {
+        let value = if srgb && channel < 3 { linear_to_srgb(value) } else { value };
+        (value * 255.0).round() as u8
+    };
+    let mut result = Vec::with_capacity(4 * half_width as usize * half_height as usize);
+    for y in 0..half_height {
+        for x in 0..half_width {
+            for channel in 0..4 {
+                let mut sum = 0.0;
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let column = (2 * x + dx).min(width - 1);
+                    let row = (2 * y + dy).min(height - 1);
+                    let texel = 4 * (row as usize * *width as usize + column as usize);
+                    sum += decode(texels[texel + channel], channel);
+                }
+                result.push(encode(sum / 4.0, channel));
+            }
+        }
+    }
+    (half_width, half_height, result)
+}
+
+/// IEC 61966-2-1.
+fn srgb_to_linear(value: f32) -> f32 {
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+/// IEC 61966-2-1.
+fn linear_to_srgb(value: f32) -> f32 {
+    if value <= 0.003_130_8 { value * 12.92 } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn minifying_averages_light_and_not_codes() {
+        let checker = (2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255]);
+        let (width, height, texels) = halved(&checker, true);
+        assert_eq!((width, height), (1, 1));
+        // Half the light is sRGB code 188 (0.7354); half the code would be 128.
+        assert_eq!(texels, [188, 188, 188, 255]);
+        assert_eq!(halved(&checker, false).2, [128, 128, 128, 255]);
+    }
+}
