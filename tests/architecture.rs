@@ -1,0 +1,145 @@
+//! The plan of the house, kept: crates depend downwards only, and of wgpu, winit and glam one each is built.
+
+use std::collections::BTreeSet;
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
+
+/// Each crate with the crates of ours that it may use, and the outside ones that it must never use (design: rooms, from the ground up).
+/// `lumbre_trace` and `lumbre_cost` have their rules before they exist.
+const ROOMS: &[(&str, &[&str], &[&str])] = &[
+    ("lumbre_optics", &[], &["wgpu", "gltf", "image", "winit"]),
+    ("lumbre_mesh", &[], &["wgpu", "bevy_ecs", "gltf", "winit"]),
+    ("lumbre_rays", &[], &["wgpu", "bevy_ecs", "gltf", "winit"]),
+    ("lumbre_scene", &["lumbre_optics", "lumbre_mesh"], &["wgpu", "winit"]),
+    ("lumbre_graph", &[], &["bevy_ecs", "gltf", "winit", "glam"]),
+    ("lumbre_render", &["lumbre_optics", "lumbre_mesh", "lumbre_scene", "lumbre_graph"], &["winit"]),
+    ("lumbre_bake", &["lumbre_optics", "lumbre_mesh", "lumbre_rays", "lumbre_scene"], &["wgpu", "winit"]),
+    ("lumbre_trace", &["lumbre_optics", "lumbre_mesh", "lumbre_rays", "lumbre_scene"], &["wgpu", "winit"]),
+    (
+        "lumbre_cost",
+        &[
+            "lumbre_optics",
+            "lumbre_mesh",
+            "lumbre_rays",
+            "lumbre_scene",
+            "lumbre_graph",
+            "lumbre_render",
+            "lumbre_bake",
+            "lumbre_trace",
+        ],
+        &["winit"],
+    ),
+    (
+        "lumbre_demo",
+        &[
+            "lumbre_optics",
+            "lumbre_mesh",
+            "lumbre_rays",
+            "lumbre_scene",
+            "lumbre_graph",
+            "lumbre_render",
+            "lumbre_bake",
+        ],
+        &["clap"],
+    ),
+];
+
+fn metadata() -> Metadata {
+    MetadataCommand::new()
+        .manifest_path(concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml"))
+        .other_options(vec!["--offline".into(), "--locked".into()])
+        .exec()
+        .expect("cargo metadata answers")
+}
+
+/// Names of what a package needs to be built, development apart.
+fn needs(package: &Package) -> BTreeSet<&str> {
+    let shipped = package.dependencies.iter().filter(|needed| needed.kind != DependencyKind::Development);
+    shipped.map(|needed| needed.name.as_str()).collect()
+}
+
+/// What is wrong with the dependencies of a crate of that name.
+fn faults(name: &str, needs: &BTreeSet<&str>) -> Vec<String> {
+    let Some((_, may, never)) = ROOMS.iter().find(|(room, ..)| *room == name) else {
+        return vec![format!("{name} has no place in the plan of the house: give it one in ROOMS")];
+    };
+    let upwards = needs
+        .iter()
+        .filter(|needed| needed.starts_with("lumbre") && !may.contains(needed))
+        .map(|needed| format!("{name} uses {needed}, which is not below it"));
+    let forbidden = never
+        .iter()
+        .filter(|never| needs.contains(*never))
+        .map(|never| format!("{name} must never use {never}"));
+    upwards.chain(forbidden).collect()
+}
+
+#[test]
+fn crates_depend_downwards_only() {
+    let metadata = metadata();
+    let ours = metadata.workspace_packages();
+    assert!(ours.len() >= 10, "only {} packages found", ours.len());
+    let faults: Vec<String> = ours
+        .iter()
+        .filter(|package| !["lumbre", "lumbre_tests"].contains(&package.name.as_str()))
+        .flat_map(|package| faults(&package.name, &needs(package)))
+        .collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn an_upward_or_forbidden_dependency_is_seen() {
+    assert_eq!(faults("lumbre_optics", &BTreeSet::from(["glam", "lumbre_scene"])).len(), 1);
+    assert_eq!(faults("lumbre_bake", &BTreeSet::from(["wgpu", "lumbre_render"])).len(), 2);
+    assert_eq!(faults("lumbre_new", &BTreeSet::new()).len(), 1);
+    assert!(faults("lumbre_scene", &BTreeSet::from(["lumbre_mesh", "gltf"])).is_empty());
+}
+
+#[test]
+fn one_wgpu_one_winit_one_glam_are_built() {
+    // `cargo metadata` and the lock file also list what no feature switches on; `cargo tree` lists what is built.
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let arguments = ["tree", "--offline", "--locked", "--workspace", "--target", "all", "--prefix", "none"];
+    let output = std::process::Command::new(cargo)
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .args(arguments)
+        .args(["--edges", "normal,build,dev", "--format", "{p}"])
+        .output()
+        .expect("cargo tree runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let tree = String::from_utf8_lossy(&output.stdout);
+    for name in ["wgpu", "winit", "glam"] {
+        let found: BTreeSet<&str> = tree
+            .lines()
+            .filter_map(|line| line.strip_prefix(name)?.strip_prefix(" v")?.split(' ').next())
+            .collect();
+        assert_eq!(found.len(), 1, "{name} is built in these versions: {found:?}");
+    }
+}
+
+#[test]
+fn files_hold_one_concept_each() {
+    let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let mut lengths = Vec::new();
+    let mut folders = vec![root.join("crates"), root.join("shaders"), root.join("tests")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs" || e == "wesl" || e == "wgsl") {
+                let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+                lengths.push((lines, path));
+            }
+        }
+    }
+    lengths.sort();
+    let (median, _) = &lengths[lengths.len() / 2];
+    assert!(*median <= 200, "the median file has {median} lines");
+    // A list of cases may be longer than a concept.
+    let limit = |path: &std::path::Path| {
+        if path.components().any(|part| part.as_os_str() == "tests") { 600 } else { 400 }
+    };
+    let long: Vec<_> = lengths.iter().filter(|(lines, path)| *lines > limit(path)).collect();
+    assert!(long.is_empty(), "files that hold more than one concept: {long:?}");
+}

@@ -1,0 +1,13 @@
+//! Models and reference data that lie beside the checkout, where there are any. They are not part of the project.
+
+use std::path::PathBuf;
+
+/// The path of a shared file, or `None`, said aloud, if it is not there.
+pub fn shared_file(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared")).join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("SKIPPED: {name} is not there (the folder `shared` beside the checkout holds it)");
+    None
+}
