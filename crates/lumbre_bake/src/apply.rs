@@ -1,0 +1,54 @@
+//! Writes a finished bake into the World: meshes with `uv1`, lightmaps, static lights. The only place that changes it.
+
+use std::collections::HashSet;
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, Mesh};
+
+use crate::bake::map_texels;
+use crate::scene::{LightmapLayout, Object};
+
+/// Gives every object its map: E/π, and 0 where nothing is known.
+pub(crate) fn apply(world: &mut World, objects: &[Object], layout: &LightmapLayout, irradiance: &[Vec3]) {
+    let mut names = HashSet::new();
+    for (index, object) in objects.iter().enumerate() {
+        let map = &layout.maps[index];
+        let texels = map_texels(layout, index, irradiance)
+            .iter()
+            .map(|e| if e.is_finite() { *e / PI } else { Vec3::ZERO })
+            .collect();
+        let image = Arc::new(LightmapImage {
+            name: file_name(&object.name, &mut names),
+            width: map.width,
+            height: map.height,
+            texels,
+            encoding: LightmapEncoding::Rgb32Float,
+        });
+        for (part, mesh) in object.parts.iter().zip(&map.meshes) {
+            let Ok(mut entity) = world.get_entity_mut(part.entity) else { continue };
+            if !Arc::ptr_eq(&part.mesh, mesh) {
+                entity.insert(Mesh(Arc::clone(mesh)));
+            }
+            entity.insert(Lightmap { image: Arc::clone(&image) });
+        }
+    }
+}
+
+/// A file name that every system takes, used once.
+fn file_name(object: &str, taken: &mut HashSet<String>) -> String {
+    let plain: String = object
+        .chars()
+        .take(64)
+        .map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' })
+        .collect();
+    let mut name = format!("{plain}.lightmap.exr");
+    let mut number = 2;
+    while !taken.insert(name.to_lowercase()) {
+        name = format!("{plain}.{number}.lightmap.exr");
+        number += 1;
+    }
+    name
+}

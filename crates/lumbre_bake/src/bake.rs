@@ -1,0 +1,169 @@
+//! The bake from end to end: reads the World, runs the stages, writes the World. Not the stages themselves.
+
+use std::ops::ControlFlow;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+
+use crate::progress::Watch;
+use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, world_points};
+use crate::texels::charts::charts;
+use crate::texels::fill::fill;
+use crate::texels::footprint::{Texel, footprints};
+use crate::texels::gather::Outgoing;
+use crate::texels::hidden::remove_hidden;
+use crate::texels::{lighting, rounds};
+use crate::transport::direct::{Direct, Sources};
+use crate::transport::exchange::Exchange;
+use crate::{BakeError, BakeOptions, BakeReport, Progress, apply};
+
+/// Bakes the light of a world's static objects into lightmaps.
+///
+/// Reads every `Mesh` with a `StaticObject` (dynamic and hidden ones are left out), emissive materials, and lights whose
+/// `BakeMode` is `Static` (direct light and bounces) or `Mixed` (bounces only). Afterwards each of those entities has
+/// its mesh with `uv1` and a `Lightmap` of E/π; the primitives of a glTF node share one map. If anything fails or is
+/// cancelled the world's meshes and lightmaps are as they were (only global transforms are brought up to date).
+///
+/// `progress` is called between chunks of work; `ControlFlow::Break` ends the bake.
+///
+/// The same world, options and seed give the same bits on any number of threads, unless `options.time` cuts it short.
+///
+/// # Errors
+/// [`BakeError`], which names the option, node or stage.
+pub fn bake(
+    world: &mut World,
+    options: &BakeOptions,
+    progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+) -> Result<BakeReport, BakeError> {
+    options.check()?;
+    match options.threads {
+        None => run(world, options, progress),
+        Some(threads) => {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.map_err(|error| BakeError::Threads { reason: error.to_string() })?;
+            pool.install(|| run(world, options, progress))
+        }
+    }
+}
+
+fn run(
+    world: &mut World,
+    options: &BakeOptions,
+    progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+) -> Result<BakeReport, BakeError> {
+    let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
+    let mut watch = Watch::new(progress);
+    watch.stage("layout", &mut report)?;
+    let objects = collect(world)?;
+    let placed = lights(world);
+    if objects.is_empty() {
+        report.skipped.push("everything: the scene has no static mesh".into());
+        return Ok(finish(report, &mut watch));
+    }
+    let points =
+        objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+    let space = Canonical::of(points);
+    let layout = lay_out(&objects, space, options, &mut report.warnings)?;
+
+    watch.stage("hierarchy", &mut report)?;
+    let scene = BakeScene::new(&objects, &layout, space, &mut report.warnings)?;
+    let sources = Sources::new(&scene, placed);
+    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
+    if sources.is_empty() {
+        report.skipped.push("everything: no surface emits, and no light is static or mixed".into());
+        return Ok(finish(report, &mut watch));
+    }
+    name_what_is_missing(&sources, &mut report);
+
+    watch.stage("direct light", &mut report)?;
+    let mut texels = footprints(&scene, &layout);
+    let charts = charts(&scene);
+    let (hidden, rays) = remove_hidden(&scene, &layout, &mut texels, options.seed);
+    (report.hidden_texels, report.rays) = (hidden, rays);
+    report.texels = layout.texels;
+    report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
+    let direct = lighting::direct_light(&sources, &scene, &layout, &texels, options, &mut watch)?;
+    report.rays += direct.iter().map(|direct| u64::from(direct.rays)).sum::<u64>();
+    let baked: Vec<Vec3> = direct.iter().map(|direct| direct.baked).collect();
+
+    let exchange =
+        Exchange::new(&scene, &sources, options, texel_side(&scene, &texels), &mut watch, &mut report)?;
+    let indirect = match &exchange {
+        None => None,
+        Some(exchange) => {
+            watch.stage("final gather", &mut report)?;
+            let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
+            let total = fill(&layout, &texels, &charts, &total, 1);
+            let outgoing = Outgoing {
+                scene: &scene,
+                layout: &layout,
+                patches: &exchange.patches,
+                direct: &total,
+                patch_direct: &exchange.direct,
+                patch_indirect: &exchange.indirect,
+                near: exchange.near,
+            };
+            let mean_direct = baked.iter().map(|e| f64::from(e.element_sum()) / 3.0).sum::<f64>()
+                / baked.len().max(1) as f64;
+            Some(rounds::gather(&outgoing, &texels, &charts, mean_direct, options, &mut watch, &mut report)?)
+        }
+    };
+
+    watch.stage("texels", &mut report)?;
+    let values: Vec<Vec3> = match indirect {
+        Some(indirect) => baked.iter().zip(&indirect).map(|(direct, indirect)| *direct + *indirect).collect(),
+        None => {
+            report.error_reached = true;
+            baked
+        }
+    };
+    note_mean(&texels, &values, &mut report);
+    let filled = fill(&layout, &texels, &charts, &values, options.gap);
+    watch.advance(1.0)?;
+    apply::apply(world, &objects, &layout, &filled);
+    report.maps = layout.maps.len();
+    Ok(finish(report, &mut watch))
+}
+
+fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
+    watch.end_stage(&mut report);
+    report.seconds = watch.seconds();
+    let casting: f64 = report
+        .stages
+        .iter()
+        .filter(|stage| ["direct light", "form factors", "final gather"].contains(&stage.stage.as_str()))
+        .map(|stage| stage.seconds)
+        .sum();
+    report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
+    report
+}
+
+fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {
+    if sources.emitters.is_empty() {
+        report.skipped.push("area light: no surface emits".into());
+    }
+    if sources.lights.is_empty() {
+        report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());
+    }
+}
+
+/// Length of a texel's side on the surface, canonical units, by the mean of all.
+fn texel_side(scene: &BakeScene, texels: &[Texel]) -> f32 {
+    let area: f64 = scene.triangles.iter().map(|triangle| f64::from(triangle.area)).sum();
+    (area / texels.len().max(1) as f64).sqrt() as f32
+}
+
+fn note_mean(texels: &[Texel], values: &[Vec3], report: &mut BakeReport) {
+    let (mut sum, mut count) = (glam::DVec3::ZERO, 0u32);
+    for (_, value) in texels.iter().zip(values).filter(|(texel, _)| !texel.is_hidden()) {
+        sum += value.as_dvec3();
+        count += 1;
+    }
+    report.mean_irradiance = (sum / f64::from(count.max(1))).to_array();
+}
+
+/// What the layout's maps hold, for tests and messages.
+pub(crate) fn map_texels<'a>(layout: &LightmapLayout, map: usize, filled: &'a [Vec3]) -> &'a [Vec3] {
+    let map = &layout.maps[map];
+    &filled[map.first..map.first + (map.width * map.height) as usize]
+}

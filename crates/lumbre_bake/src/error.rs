@@ -1,0 +1,63 @@
+//! Why a bake ends without a result. The world is then as it was.
+
+/// Why a bake ends without a result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// The progress callback asked for the end.
+    #[error("the bake was cancelled during {stage}; the scene is unchanged")]
+    Cancelled {
+        /// The stage that was running.
+        stage: &'static str,
+    },
+    /// An option is out of its range.
+    #[error("{option} is {found}; give {expected}")]
+    Option {
+        /// Which option.
+        option: &'static str,
+        /// What it was.
+        found: String,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// A mesh has indices out of range or attributes of unequal length.
+    #[error("the mesh of {object}: {source}")]
+    Mesh {
+        /// The node's name.
+        object: String,
+        /// What is wrong.
+        source: lumbre_mesh::MeshError,
+    },
+    /// A mesh got no lightmap coordinates.
+    #[error("{object} cannot be unwrapped: {source}")]
+    Unwrap {
+        /// The node's name.
+        object: String,
+        /// What is wrong.
+        source: lumbre_mesh::UnwrapError,
+    },
+    /// The maps together would be larger than a bake allocates.
+    #[error(
+        "the lightmaps would hold {texels} texels, the limit is {limit}; lower the density or the map size"
+    )]
+    TooManyTexels {
+        /// Texels asked for.
+        texels: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// More triangles than indices can name.
+    #[error("the scene holds {triangles} static triangles, the limit is {limit}")]
+    TooManyTriangles {
+        /// Triangles found.
+        triangles: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// The worker threads could not be started.
+    #[error("worker threads could not be started: {reason}")]
+    Threads {
+        /// What the system says.
+        reason: String,
+    },
+}

@@ -1,0 +1,52 @@
+//! Radiosity baked into lightmaps: a World in, the same World with lit texels out.
+//!
+//! No GPU, no files: `lumbre_scene` loads and saves. Light bounces between patches; texels show it.
+//!
+//! ```text
+//!   World ─► scene ──────────► transport ───────────────────────────► texels ─────────────────► World
+//!            collect objects    patches ─► form factors ─► solver       footprints ─► hidden      uv1
+//!            lay out uv1         (pooled, reciprocal)   (per channel)   direct light              Lightmap E/π
+//!            triangles, BVH     emitters, lights ─► direct light        final gather, rounds
+//!            materials                                                  smooth ─► fill
+//! ```
+//!
+//! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per
+//! texel and patch: the same bits on any number of threads and at any 2^k scale of an emissive scene.
+//!
+//! ```
+//! use std::{ops::ControlFlow, sync::Arc};
+//! use bevy_ecs::world::World;
+//! use glam::Vec3;
+//! use lumbre_bake::{BakeOptions, Density, Quality, bake};
+//! use lumbre_optics::{BakeMode, Light, Material};
+//! use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
+//!
+//! let mut world = World::new();
+//! let floor = Arc::new(lumbre_mesh::shapes::cuboid(Vec3::new(4.0, 0.2, 4.0), 1));
+//! let floor = world.spawn((Mesh(floor), Material::default(), StaticObject)).id();
+//! let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
+//! world.spawn((lamp, Transform::from_xyz(0.0, 2.0, 0.0)));
+//! let options = BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() };
+//! let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
+//! assert!(report.mean_irradiance[0] > 0.0);
+//! assert_eq!(world.get::<Lightmap>(floor).map(|map| map.image.width), Some(32));
+//! # Ok::<(), lumbre_bake::BakeError>(())
+//! ```
+
+mod apply;
+mod bake;
+mod error;
+mod options;
+mod progress;
+mod report;
+mod sampling;
+mod scene;
+mod texels;
+mod transport;
+
+pub use bake::bake;
+pub use error::BakeError;
+pub use options::{BakeOptions, Density, Quality};
+pub use progress::Progress;
+pub use report::{BakeReport, StageTime};
+pub use transport::solver::Solver;

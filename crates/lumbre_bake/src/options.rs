@@ -1,0 +1,133 @@
+//! What a bake is asked for. Not how it went: that is `report`.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::transport::solver::Solver;
+
+/// How many texels a surface gets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum Density {
+    /// About 500,000 texels for the whole scene, spread by area: any scale of scene just works.
+    #[default]
+    Automatic,
+    /// Texels along one metre of surface; positive and finite.
+    TexelsPerMeter(f64),
+    /// The side of each node's own square map, in texels, in [4, 8192].
+    MapSize(u32),
+}
+
+/// How much work the sampling may take before the error is reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Quality {
+    /// For a look while the level is being built: few patches, few rays.
+    Draft,
+    /// For shipping.
+    #[default]
+    Final,
+}
+
+/// What a bake is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BakeOptions {
+    /// How many texels a surface gets.
+    pub density: Density,
+    /// Relative RMSE that sampling may leave in the lightmap (0.01 is one per cent of the mean); positive.
+    /// Gathering stops there, or at the quality's largest number of rays.
+    pub error: f64,
+    /// Wall-clock time after which no further round of samples begins. Bits then depend on the machine's speed.
+    pub time: Option<Duration>,
+    /// How much work the sampling may take.
+    pub quality: Quality,
+    /// Free texels between charts, and how far values are carried past a chart's border: 2 for bilinear filtering,
+    /// 4 for bicubic.
+    pub gap: u32,
+    /// Scrambles every sample sequence. The same seed gives the same bits on any number of threads.
+    pub seed: u32,
+    /// Worker threads; as many as the machine has if absent.
+    pub threads: Option<usize>,
+    /// How the radiosity system is solved.
+    pub solver: Solver,
+    /// Smooths the gathered light within charts where it is noisy.
+    pub denoise: bool,
+}
+
+impl Default for BakeOptions {
+    fn default() -> Self {
+        Self {
+            density: Density::Automatic,
+            error: 0.01,
+            time: None,
+            quality: Quality::Final,
+            gap: 2,
+            seed: 0,
+            threads: None,
+            solver: Solver::default(),
+            denoise: true,
+        }
+    }
+}
+
+/// The numbers behind a quality.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Most patches that area alone asks for; every triangle has at least one.
+    pub patches: usize,
+    /// Rays for all form factors together.
+    pub form_factor_rays: usize,
+    /// Texels along a patch's side, at least.
+    pub patch_texels: f32,
+    /// Shadow samples of a texel before and after a penumbra is found in it.
+    pub direct: [u32; 2],
+    /// Gather rays of a texel: first round and most.
+    pub gather: [u32; 2],
+}
+
+impl Quality {
+    pub(crate) fn effort(self) -> Effort {
+        match self {
+            Self::Draft => Effort {
+                patches: 3_000,
+                form_factor_rays: 600_000,
+                patch_texels: 6.0,
+                direct: [4, 16],
+                gather: [16, 16],
+            },
+            Self::Final => Effort {
+                patches: 8_000,
+                form_factor_rays: 1_500_000,
+                patch_texels: 4.0,
+                direct: [8, 64],
+                gather: [32, 1024],
+            },
+        }
+    }
+}
+
+impl BakeOptions {
+    /// Names the first option that is out of its range.
+    pub(crate) fn check(&self) -> Result<(), crate::BakeError> {
+        let wrong =
+            |option, found: String, expected| Err(crate::BakeError::Option { option, found, expected });
+        match self.density {
+            Density::TexelsPerMeter(density) if !(density.is_finite() && density > 0.0) => {
+                return wrong("texels per metre", density.to_string(), "a positive finite number");
+            }
+            Density::MapSize(side) if !(4..=8192).contains(&side) => {
+                return wrong("map size", side.to_string(), "a number of texels in [4, 8192]");
+            }
+            _ => {}
+        }
+        if !(self.error.is_finite() && self.error > 0.0) {
+            return wrong("error", self.error.to_string(), "a positive finite number");
+        }
+        if self.gap > 64 {
+            return wrong("gap", self.gap.to_string(), "at most 64 texels");
+        }
+        if self.threads.is_some_and(|threads| !(1..=1024).contains(&threads)) {
+            return wrong("threads", format!("{:?}", self.threads), "a number in [1, 1024]");
+        }
+        Ok(())
+    }
+}

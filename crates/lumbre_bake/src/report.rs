@@ -1,0 +1,102 @@
+//! What a bake did, what it cost and how good it is. Not its drawing.
+
+use serde::{Deserialize, Serialize};
+
+/// The time of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StageTime {
+    /// What was done, in words.
+    pub stage: String,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// What a bake did, what it cost and how good it is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BakeReport {
+    /// Wall-clock time of each stage that ran, in order.
+    pub stages: Vec<StageTime>,
+    /// Wall-clock seconds of the whole.
+    pub seconds: f64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Static triangles that light meets, after degenerate ones and duplicates were dropped.
+    pub triangles: usize,
+    /// Rays cast, of every kind.
+    pub rays: u64,
+    /// Millions of rays per second of the stages that cast them.
+    pub mega_rays_per_second: f64,
+    /// Patches of the radiosity system.
+    pub patches: usize,
+    /// Pairs of patches that see each other.
+    pub form_factors: usize,
+    /// Iterations of the solver, for red, green and blue.
+    pub iterations: [u32; 3],
+    /// Largest relative residual of the three channels.
+    pub residual: f64,
+    /// Bound on the relative error of the solution: residual / (1 - largest reflectance).
+    pub residual_bound: f64,
+    /// Lightmaps made.
+    pub maps: usize,
+    /// Texels of all maps.
+    pub texels: usize,
+    /// Share of the texels that a surface covers, in [0, 1].
+    pub coverage: f64,
+    /// Texels that lie wholly or partly inside other geometry; the hidden part does not count into their value.
+    pub hidden_texels: usize,
+    /// Gather rays per covered texel, on average.
+    pub gather_rays: f64,
+    /// Mean irradiance over covered texels, W/m², linear RGB.
+    pub mean_irradiance: [f64; 3],
+    /// Estimated relative RMSE that sampling leaves in the lightmap.
+    pub estimated_error: f64,
+    /// Whether the estimated error is at most the one asked for.
+    pub error_reached: bool,
+    /// Share of the patches' mutual exchange that was cut so that no row of form factors exceeds 1.
+    pub energy_lost: f64,
+    /// What was odd in the input, with names, and what was done about it.
+    pub warnings: Vec<String>,
+    /// Work that the scene did not call for, each with its reason.
+    pub skipped: Vec<String>,
+}
+
+impl std::fmt::Display for BakeReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let reached = if self.error_reached { "reached" } else { "not reached" };
+        writeln!(
+            f,
+            "{} maps, {} texels ({:.0} % covered, {} partly hidden) in {:.2} s on {} threads",
+            self.maps,
+            self.texels,
+            100.0 * self.coverage,
+            self.hidden_texels,
+            self.seconds,
+            self.threads
+        )?;
+        writeln!(
+            f,
+            "estimated error {:.2} % of the mean irradiance: {reached}",
+            100.0 * self.estimated_error
+        )?;
+        writeln!(
+            f,
+            "{} rays ({:.2} million a second), {:.0} gathered per texel",
+            self.rays, self.mega_rays_per_second, self.gather_rays
+        )?;
+        writeln!(
+            f,
+            "{} triangles, {} patches, {} form factors; {:?} iterations, residual {:.1e}, energy lost {:.1e}",
+            self.triangles, self.patches, self.form_factors, self.iterations, self.residual, self.energy_lost
+        )?;
+        for stage in &self.stages {
+            writeln!(f, "  {:<14} {:>8.3} s", stage.stage, stage.seconds)?;
+        }
+        for line in &self.skipped {
+            writeln!(f, "skipped {line}")?;
+        }
+        for line in &self.warnings {
+            writeln!(f, "warning: {line}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,130 @@
+//! Sample points and directions: Owen-scrambled Sobol sequences (Burley, "Practical Hash-based Owen Scrambling", JCGT
+//! 9(4), 2020) and their maps to hemispheres and triangles. Not what is sampled with them.
+
+use std::f32::consts::TAU;
+
+use glam::Vec3;
+
+/// A sequence of 4D points in [0, 1)⁴, of its own scramble.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sequence {
+    seed: u32,
+}
+
+/// The crate's limit: the sequence repeats its index beyond.
+const LENGTH: u32 = 1 << 16;
+
+impl Sequence {
+    /// One scramble for every (seed, what it is for, which one).
+    pub fn new(seed: u32, purpose: u32, index: u32) -> Self {
+        Self { seed: hash(hash(hash(seed) ^ purpose.wrapping_mul(0x9e37_79b9)) ^ index) }
+    }
+
+    /// The four dimensions of point `index`, of dimension set `set` (0, 1, …).
+    pub fn point(&self, index: u32, set: u32) -> [f32; 4] {
+        sobol_burley::sample_4d(index % LENGTH, set, self.seed)
+    }
+}
+
+/// A 32-bit finalizer (Wellons' lowbias32).
+pub(crate) fn hash(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// A unit vector about +Z with density cos θ / π, by Shirley and Chiu's concentric map.
+pub(crate) fn cosine_direction(u: f32, v: f32) -> Vec3 {
+    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    if a == 0.0 && b == 0.0 {
+        return Vec3::Z;
+    }
+    let (radius, angle) =
+        if a.abs() > b.abs() { (a, TAU / 8.0 * (b / a)) } else { (b, TAU / 4.0 - TAU / 8.0 * (a / b)) };
+    let (sine, cosine) = angle.sin_cos();
+    Vec3::new(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
+}
+
+/// Two unit vectors that make a right-handed frame with a unit `normal`
+/// (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017).
+pub(crate) fn frame(normal: Vec3) -> [Vec3; 2] {
+    let sign = 1.0f32.copysign(normal.z);
+    let a = -1.0 / (sign + normal.z);
+    let b = normal.x * normal.y * a;
+    [
+        Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x),
+        Vec3::new(b, sign + normal.y * normal.y * a, -normal.y),
+    ]
+}
+
+/// A direction with density cos θ / π about a unit `normal`.
+pub(crate) fn cosine_about(normal: Vec3, u: f32, v: f32) -> Vec3 {
+    let [x, y] = frame(normal);
+    let local = cosine_direction(u, v);
+    (x * local.x + y * local.y + normal * local.z).normalize_or(normal)
+}
+
+/// Barycentric weights (of the second and third vertex) of a point spread evenly over a triangle. Continuous in
+/// (u, v), so that stratified points stay stratified (Heitz, "A Low-Distortion Map Between Triangle and Square", 2019).
+pub(crate) fn triangle_point(u: f32, v: f32) -> (f32, f32) {
+    if v > u {
+        let x = 0.5 * u;
+        (x, v - x)
+    } else {
+        let y = 0.5 * v;
+        (u - y, y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cosine_directions_have_the_moments_of_the_cosine() {
+        // ∫ cos θ · cos θ / π = 2/3 and ∫ x² cos θ / π = 1/4, over 2^14 Sobol points: error ~ 1/N.
+        let sequence = Sequence::new(1, 2, 3);
+        let n = 1 << 14;
+        let (mut z, mut xx) = (0.0, 0.0);
+        for i in 0..n {
+            let [u, v, ..] = sequence.point(i, 0);
+            let d = cosine_direction(u, v);
+            assert!((d.length() - 1.0).abs() < 1e-5);
+            z += f64::from(d.z);
+            xx += f64::from(d.x * d.x);
+        }
+        assert!((z / f64::from(n) - 2.0 / 3.0).abs() < 1e-3);
+        assert!((xx / f64::from(n) - 0.25).abs() < 1e-3);
+    }
+
+    #[test]
+    fn triangle_points_lie_inside_and_have_the_centroid_as_mean() {
+        let sequence = Sequence::new(0, 0, 7);
+        let n = 1 << 12;
+        let (mut a, mut b) = (0.0, 0.0);
+        for i in 0..n {
+            let [u, v, ..] = sequence.point(i, 0);
+            let (x, y) = triangle_point(u, v);
+            assert!(x >= 0.0 && y >= 0.0 && x + y <= 1.0);
+            a += f64::from(x);
+            b += f64::from(y);
+        }
+        assert!((a / f64::from(n) - 1.0 / 3.0).abs() < 2e-3 && (b / f64::from(n) - 1.0 / 3.0).abs() < 2e-3);
+    }
+
+    #[test]
+    fn frames_are_orthonormal_for_every_normal() {
+        for normal in [Vec3::Z, Vec3::NEG_Z, Vec3::X, Vec3::new(-0.6, 0.0, -0.8), Vec3::new(1e-8, 0.0, -1.0)]
+        {
+            let [x, y] = frame(normal);
+            for (a, b, expected) in
+                [(x, y, 0.0), (x, normal, 0.0), (y, normal, 0.0), (x, x, 1.0), (y, y, 1.0)]
+            {
+                assert!((a.dot(b) - expected).abs() < 1e-6);
+            }
+            assert!(x.cross(y).dot(normal) > 0.999);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Reads the World: static meshes, grouped into objects of one lightmap each, and the lights that are baked.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use bevy_ecs::system::RunSystemOnce;
+use glam::{DAffine3, DVec3};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{BakeMode, Light, LightKind, Material};
+use lumbre_scene::{
+    ChildOf, DynamicObject, GlobalTransform, Hidden, MaterialTextures, Mesh, Name, Primitive, StaticObject,
+    propagate_transforms,
+};
+
+use crate::BakeError;
+
+/// A mesh with its material: one entity.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub entity: Entity,
+    pub mesh: Arc<TriangleMesh>,
+    pub material: Material,
+    pub textures: Option<MaterialTextures>,
+    /// Mesh to world.
+    pub transform: DAffine3,
+}
+
+/// What shares one lightmap: the primitives of a glTF node, or one entity made in code.
+#[derive(Clone, Debug)]
+pub(crate) struct Object {
+    pub name: String,
+    pub parts: Vec<Part>,
+}
+
+/// A point, spot or directional light in its place.
+#[derive(Clone, Debug)]
+pub(crate) struct PlacedLight {
+    pub light: Light,
+    pub position: DVec3,
+    /// Unit vector along which it shines.
+    pub axis: DVec3,
+}
+
+/// The static objects, in an order that depends on the entities only.
+pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
+    // The only way to fail is a system that cannot run; the transforms are then as the caller left them.
+    if world.run_system_once(propagate_transforms).is_err() {
+        tracing::warn!("transforms could not be propagated; baking with those found");
+    }
+    let mut parts: BTreeMap<Entity, Vec<(usize, Part)>> = BTreeMap::new();
+    let mut query = world.query_filtered::<(
+        Entity,
+        &Mesh,
+        &Material,
+        Option<&MaterialTextures>,
+        Option<&GlobalTransform>,
+        Option<&Primitive>,
+        Option<&ChildOf>,
+    ), (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>();
+    for (entity, mesh, material, textures, transform, primitive, parent) in query.iter(world) {
+        if under_a_dynamic_object(world, parent) {
+            continue;
+        }
+        let part = Part {
+            entity,
+            mesh: Arc::clone(&mesh.0),
+            material: material.clone(),
+            textures: textures.cloned(),
+            transform: transform.map_or(DAffine3::IDENTITY, |transform| transform.0),
+        };
+        let (owner, index) = match (primitive, parent) {
+            (Some(primitive), Some(parent)) => (parent.parent(), primitive.index),
+            _ => (entity, 0),
+        };
+        parts.entry(owner).or_default().push((index, part));
+    }
+    let mut objects = Vec::with_capacity(parts.len());
+    for (owner, mut parts) in parts {
+        parts.sort_by_key(|(index, part)| (*index, part.entity));
+        let name =
+            world.get::<Name>(owner).map_or_else(|| format!("object {owner}"), |name| name.to_string());
+        for (_, part) in &parts {
+            part.mesh.validate().map_err(|source| BakeError::Mesh { object: name.clone(), source })?;
+        }
+        objects.push(Object { name, parts: parts.into_iter().map(|(_, part)| part).collect() });
+    }
+    Ok(objects)
+}
+
+fn under_a_dynamic_object(world: &World, parent: Option<&ChildOf>) -> bool {
+    let mut above = parent.map(ChildOf::parent);
+    while let Some(entity) = above {
+        if world.get::<DynamicObject>(entity).is_some() {
+            return true;
+        }
+        above = world.get::<ChildOf>(entity).map(ChildOf::parent);
+    }
+    false
+}
+
+/// The enabled lights that are baked whole or for their bounces, in the order of their entities.
+pub(crate) fn lights(world: &mut World) -> Vec<PlacedLight> {
+    let mut query = world.query::<(Entity, &Light, Option<&GlobalTransform>)>();
+    let mut found: Vec<_> = query
+        .iter(world)
+        .filter(|(_, light, _)| {
+            light.enabled
+                && light.bake != BakeMode::Dynamic
+                && light.kind != LightKind::Ambient
+                && light.diffuse.max_element() > 0.0
+        })
+        .map(|(entity, light, transform)| {
+            let transform = transform.copied().unwrap_or_default();
+            let light = PlacedLight {
+                light: light.clone(),
+                position: transform.translation(),
+                axis: transform.forward(),
+            };
+            (entity, light)
+        })
+        .collect();
+    found.sort_by_key(|(entity, _)| *entity);
+    found.into_iter().map(|(_, light)| light).collect()
+}

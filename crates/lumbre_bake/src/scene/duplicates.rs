@@ -1,0 +1,43 @@
+//! Triangles that lie exactly on another, turned the same way: light must meet one of them. The emitter wins, else the
+//! first. Triangles turned the other way are the two faces of a sheet and both stay.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+/// For each triangle, whether another in the same place takes its light. `emits` says which of them shine.
+pub(crate) fn superseded(triangles: &[[Vec3; 3]], emits: &[bool]) -> Vec<bool> {
+    let mut first: HashMap<[[u32; 3]; 3], usize> = HashMap::with_capacity(triangles.len());
+    let mut superseded = vec![false; triangles.len()];
+    for (index, triangle) in triangles.iter().enumerate() {
+        let keys = triangle.map(|position| (position + Vec3::ZERO).to_array().map(f32::to_bits));
+        // Rotated so that the smallest comes first: the winding stays.
+        let smallest = (0..3).min_by_key(|&i| keys[i]).unwrap_or(0);
+        let key = [keys[smallest], keys[(smallest + 1) % 3], keys[(smallest + 2) % 3]];
+        match first.get(&key).copied() {
+            None => {
+                first.insert(key, index);
+            }
+            Some(earlier) if emits[index] && !emits[earlier] => {
+                superseded[earlier] = true;
+                first.insert(key, index);
+            }
+            Some(_) => superseded[index] = true,
+        }
+    }
+    superseded
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_emitter_wins_else_the_first() {
+        let t = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let rotated = [Vec3::X, Vec3::Y, Vec3::ZERO];
+        let back = [Vec3::X, Vec3::ZERO, Vec3::Y];
+        assert_eq!(superseded(&[t, rotated, back], &[false; 3]), [false, true, false]);
+        assert_eq!(superseded(&[t, rotated, back], &[false, true, false]), [true, false, false]);
+    }
+}

@@ -1,0 +1,65 @@
+//! Which sides of surfaces can never be seen: the inside of a closed mesh. Not which points lie inside: rays tell.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+/// For each triangle, whether its connected piece is closed: every directed edge has one that runs back.
+/// Vertices are the same where their coordinates are, bit by bit.
+pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<bool> {
+    let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
+    let corners: Vec<[u32; 3]> = triangles
+        .iter()
+        .map(|triangle| {
+            triangle.map(|position| {
+                // -0 and 0 are one place.
+                let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+                let next = vertices.len() as u32;
+                *vertices.entry(key).or_insert(next)
+            })
+        })
+        .collect();
+    let mut parent: Vec<u32> = (0..vertices.len() as u32).collect();
+    let mut balance: HashMap<(u32, u32), i32> = HashMap::new();
+    for &[a, b, c] in &corners {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let (x, y) = (find(&mut parent, from), find(&mut parent, to));
+            parent[x.max(y) as usize] = x.min(y);
+            *balance.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
+        }
+    }
+    let mut closed = vec![true; vertices.len()];
+    for (&(vertex, _), &sum) in &balance {
+        if sum != 0 {
+            closed[find(&mut parent, vertex) as usize] = false;
+        }
+    }
+    corners.iter().map(|&[a, ..]| closed[find(&mut parent, a) as usize]).collect()
+}
+
+fn find(parent: &mut [u32], mut at: u32) -> u32 {
+    while parent[at as usize] != at {
+        parent[at as usize] = parent[parent[at as usize] as usize];
+        at = parent[at as usize];
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_is_closed_a_sheet_is_not() {
+        let mesh = lumbre_mesh::shapes::cuboid(Vec3::ONE, 2);
+        let mut triangles = mesh.triangle_positions().unwrap();
+        let closed = triangles.len();
+        let far = Vec3::splat(9.0);
+        triangles.push([far, far + Vec3::X, far + Vec3::Y]);
+        let found = closed_pieces(&triangles);
+        assert!(found[..closed].iter().all(|&closed| closed));
+        assert!(!found[closed]);
+        triangles.remove(0);
+        assert!(closed_pieces(&triangles).iter().all(|&closed| !closed));
+    }
+}

@@ -1,0 +1,277 @@
+//! Where every object's texels are: its own `uv1` where it has sound ones, an unwrap where not, and the size of its map.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{DAffine3, Vec2, Vec3};
+use lumbre_mesh::uv_validation::validate_uv1;
+use lumbre_mesh::{TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
+
+use super::{Canonical, Object};
+use crate::{BakeError, BakeOptions, Density};
+
+/// The texels of one object.
+#[derive(Clone, Debug)]
+pub(crate) struct MapLayout {
+    /// One per part of the object, with `uv1`.
+    pub meshes: Vec<Arc<TriangleMesh>>,
+    /// Texels across.
+    pub width: u32,
+    /// Texel rows.
+    pub height: u32,
+    /// Index of its first texel in the row of all maps.
+    pub first: usize,
+}
+
+/// The texels of all objects.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LightmapLayout {
+    /// One per object.
+    pub maps: Vec<MapLayout>,
+    /// Texels of all maps.
+    pub texels: usize,
+}
+
+/// Texels that [`Density::Automatic`] aims at.
+const AUTOMATIC_TEXELS: f64 = 500_000.0;
+/// Largest side of a map.
+const LARGEST_SIDE: u32 = 8192;
+/// Most texels of all maps: 4 GiB of working memory at some 64 bytes each.
+const MOST_TEXELS: u64 = 1 << 26;
+
+/// Lays out every object.
+pub(crate) fn lay_out(
+    objects: &[Object],
+    space: Canonical,
+    options: &BakeOptions,
+    warnings: &mut Vec<String>,
+) -> Result<LightmapLayout, BakeError> {
+    let area: f64 = objects.iter().map(|object| Placed::new(object, space).area).sum();
+    // Texels per canonical unit: exact under a scale of 2^k, unlike metres.
+    let density = match options.density {
+        Density::Automatic if area > 0.0 => (AUTOMATIC_TEXELS / area).sqrt(),
+        Density::TexelsPerMeter(density) => density / space.scale,
+        _ => 1.0,
+    };
+    let mut layout = LightmapLayout::default();
+    let mut instances: HashMap<Vec<u64>, Made> = HashMap::new();
+    let mut texels = 0u64;
+    for object in objects {
+        let key = instance_key(object, space);
+        let (meshes, width, height) = match instances.get(&key) {
+            Some(known) => known.clone(),
+            None => {
+                let made = lay_out_object(object, space, density, options, warnings)?;
+                instances.insert(key, made.clone());
+                made
+            }
+        };
+        texels += u64::from(width) * u64::from(height);
+        if texels > MOST_TEXELS {
+            return Err(BakeError::TooManyTexels { texels, limit: MOST_TEXELS });
+        }
+        layout.maps.push(MapLayout { meshes, width, height, first: layout.texels });
+        layout.texels = texels as usize;
+    }
+    Ok(layout)
+}
+
+/// Objects that share their meshes and differ by a rotation and translation only share their coordinates.
+fn instance_key(object: &Object, space: Canonical) -> Vec<u64> {
+    let mut key = Vec::with_capacity(object.parts.len() * 7);
+    for part in &object.parts {
+        key.push(Arc::as_ptr(&part.mesh) as usize as u64);
+        let m = part.transform.matrix3;
+        let scale = space.scale * space.scale;
+        for (a, b) in [
+            (m.x_axis, m.x_axis),
+            (m.y_axis, m.y_axis),
+            (m.z_axis, m.z_axis),
+            (m.x_axis, m.y_axis),
+            (m.y_axis, m.z_axis),
+            (m.x_axis, m.z_axis),
+        ] {
+            // Rotations differ in the last bits; a thousandth of the axes' size tells scales apart.
+            let size = (a.length_squared() * b.length_squared()).sqrt();
+            let cosine = if size > 0.0 { (a.dot(b) / size * 1000.0).round() } else { 0.0 };
+            key.push((size * scale).to_bits() >> 40);
+            key.push(cosine.to_bits());
+        }
+    }
+    key
+}
+
+/// All triangles of an object in canonical space.
+struct Placed {
+    mesh: TriangleMesh,
+    area: f64,
+    /// Area in the unit square of `uv1`, if every part has it.
+    uv_area: Option<f64>,
+}
+
+impl Placed {
+    fn new(object: &Object, space: Canonical) -> Self {
+        let mut mesh = TriangleMesh::default();
+        let has_uv =
+            object.parts.iter().all(|part| !part.mesh.uv1.is_empty() || part.mesh.positions.is_empty());
+        for part in &object.parts {
+            let base = mesh.positions.len() as u32;
+            let place = |p: &Vec3| space.position(part.transform.transform_point3(p.as_dvec3()));
+            mesh.positions.extend(part.mesh.positions.iter().map(place));
+            if has_uv {
+                mesh.uv1.extend_from_slice(&part.mesh.uv1);
+            }
+            mesh.indices.extend(part.mesh.indices.iter().map(|index| index + base));
+        }
+        let (mut area, mut uv_area) = (0.0, 0.0);
+        for triangle in mesh.triangles() {
+            let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
+            let own = 0.5 * (b - a).cross(c - a).length();
+            area += if own.is_finite() { own } else { 0.0 };
+            if has_uv {
+                let [a, b, c] = triangle.map(|vertex| mesh.uv1[vertex as usize].as_dvec2());
+                let own = 0.5 * (b - a).perp_dot(c - a).abs();
+                uv_area += if own.is_finite() { own } else { 0.0 };
+            }
+        }
+        Self { mesh, area, uv_area: has_uv.then_some(uv_area) }
+    }
+}
+
+/// Meshes with `uv1`, texels across, texel rows.
+type Made = (Vec<Arc<TriangleMesh>>, u32, u32);
+
+fn lay_out_object(
+    object: &Object,
+    space: Canonical,
+    density: f64,
+    options: &BakeOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Made, BakeError> {
+    let placed = Placed::new(object, space);
+    if let Some(uv_area) = placed.uv_area.filter(|&area| area > 0.0) {
+        let side = match options.density {
+            Density::MapSize(side) => side,
+            _ => ((placed.area / uv_area).sqrt() * density).ceil().clamp(4.0, f64::from(LARGEST_SIDE)) as u32,
+        };
+        match validate_uv1(&placed.mesh, side, side) {
+            Ok(report) if report.is_sound() => {
+                return Ok((object.parts.iter().map(|part| Arc::clone(&part.mesh)).collect(), side, side));
+            }
+            Ok(report) => warnings.push(format!(
+                "{}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
+                 without area, {} overlapping pairs); it was unwrapped anew",
+                object.name,
+                report.out_of_range.len(),
+                report.without_coverage.len(),
+                report.overlapping.len()
+            )),
+            Err(error) => warnings.push(format!("{}: {error}; it was unwrapped anew", object.name)),
+        }
+    }
+    let (unwrapped, width, height) = match options.density {
+        Density::MapSize(side) => (fit(object, &placed, side, options.gap)?, side, side),
+        _ => {
+            let made = unwrap_at_most(object, &placed, density, options.gap, warnings)?;
+            let (width, height) = (made.width.max(1), made.height.max(1));
+            (made, width, height)
+        }
+    };
+    // From the rectangle of the charts to the map it lies in.
+    let shrink = Vec2::new(unwrapped.width as f32 / width as f32, unwrapped.height as f32 / height as f32);
+    Ok((split(object, &unwrapped, shrink), width, height))
+}
+
+/// The densest unwrap that fits a square of `side` texels.
+fn fit(object: &Object, placed: &Placed, side: u32, gap: u32) -> Result<Unwrapped, BakeError> {
+    let options = UnwrapOptions { gap, max_size: side, ..UnwrapOptions::default() };
+    let try_density = |density: f64| unwrap(&placed.mesh, &placed.mesh.positions, density, options);
+    // No packing exceeds one texel per texel; a density of nothing leaves two texels per chart.
+    let mut high = if placed.area > 0.0 { f64::from(side) / placed.area.sqrt() } else { 1.0 };
+    let mut low = high;
+    let mut best = loop {
+        match try_density(low) {
+            Ok(made) => break made,
+            Err(UnwrapError::TooLarge { .. }) if low > high * 1e-4 => {
+                high = low;
+                low *= 0.7;
+            }
+            Err(source) => return Err(BakeError::Unwrap { object: object.name.clone(), source }),
+        }
+    };
+    for _ in 0..6 {
+        let middle = 0.5 * (low + high);
+        match try_density(middle) {
+            Ok(made) => (best, low) = (made, middle),
+            Err(_) => high = middle,
+        }
+    }
+    Ok(best)
+}
+
+fn unwrap_at_most(
+    object: &Object,
+    placed: &Placed,
+    density: f64,
+    gap: u32,
+    warnings: &mut Vec<String>,
+) -> Result<Unwrapped, BakeError> {
+    let options = UnwrapOptions { gap, max_size: LARGEST_SIDE, ..UnwrapOptions::default() };
+    let mut tried = density;
+    loop {
+        match unwrap(&placed.mesh, &placed.mesh.positions, tried, options) {
+            Ok(made) => {
+                if tried < density {
+                    let share = 100.0 * tried / density;
+                    warnings.push(format!(
+                        "{}: its lightmap would exceed {LARGEST_SIDE} texels a side; it got {share:.0} % of the density",
+                        object.name
+                    ));
+                }
+                return Ok(made);
+            }
+            Err(UnwrapError::TooLarge { .. }) if tried > density * 1e-6 => tried *= 0.7,
+            Err(source) => return Err(BakeError::Unwrap { object: object.name.clone(), source }),
+        }
+    }
+}
+
+/// Gives the parts their shares of the unwrapped whole.
+fn split(object: &Object, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {
+    let (mut first_vertex, mut first_index) = (0u32, 0usize);
+    let mut meshes = Vec::with_capacity(object.parts.len());
+    for part in &object.parts {
+        let vertices = part.mesh.positions.len() as u32;
+        let own = first_vertex..first_vertex + vertices;
+        let mut local = HashMap::new();
+        let mut sources = Vec::new();
+        for (index, &source) in unwrapped.vertex_sources.iter().enumerate().filter(|(_, s)| own.contains(s)) {
+            local.insert(index as u32, sources.len() as u32);
+            sources.push((index, (source - first_vertex) as usize));
+        }
+        fn copy<T: Copy>(values: &[T], sources: &[(usize, usize)]) -> Vec<T> {
+            if values.is_empty() { Vec::new() } else { sources.iter().map(|&(_, s)| values[s]).collect() }
+        }
+        let count = part.mesh.indices.len();
+        let indices = &unwrapped.mesh.indices[first_index..first_index + count];
+        meshes.push(Arc::new(TriangleMesh {
+            positions: copy(&part.mesh.positions, &sources),
+            normals: copy(&part.mesh.normals, &sources),
+            uv0: copy(&part.mesh.uv0, &sources),
+            uv1: sources.iter().map(|&(index, _)| unwrapped.mesh.uv1[index] * shrink).collect(),
+            colors: copy(&part.mesh.colors, &sources),
+            indices: indices.iter().map(|index| local[index]).collect(),
+        }));
+        first_vertex += vertices;
+        first_index += count;
+    }
+    meshes
+}
+
+/// The box around a mesh in the world is that of its points; this is their place.
+pub(crate) fn world_points<'a>(
+    transform: &'a DAffine3,
+    mesh: &'a TriangleMesh,
+) -> impl Iterator<Item = glam::DVec3> + 'a {
+    mesh.positions.iter().map(|p| transform.transform_point3(p.as_dvec3()))
+}

@@ -1,0 +1,121 @@
+//! What a surface reflects, emits and lets through, at a point: factors, vertex colours and textures together.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3, Vec4};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{AlphaMode, Material};
+use lumbre_scene::{MaterialTextures, TextureReference};
+
+use super::texture::sample;
+
+/// Reflectances above this never stop bouncing; they are brought down to it, with a warning.
+pub(crate) const LARGEST_REFLECTANCE: f32 = 0.999;
+
+/// What a surface reflects, emits and lets through.
+#[derive(Clone, Debug)]
+pub(crate) struct SurfaceMaterial {
+    pub material: Material,
+    pub textures: Option<MaterialTextures>,
+    pub mesh: Arc<TriangleMesh>,
+}
+
+/// A side of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    Front,
+    Back,
+}
+
+impl SurfaceMaterial {
+    /// Whether what it reflects or emits changes over a triangle.
+    pub fn varies(&self) -> bool {
+        self.textures.is_some() || !self.mesh.colors.is_empty()
+    }
+
+    /// Whether its emission changes over a triangle.
+    pub fn emission_varies(&self) -> bool {
+        self.textures.as_ref().is_some_and(|textures| textures.emissive.is_some())
+    }
+
+    /// Whether light may pass through some of it.
+    pub fn is_masked(&self) -> bool {
+        match self.material.alpha_mode {
+            AlphaMode::Opaque => false,
+            AlphaMode::Mask { .. } | AlphaMode::Blend => self.material.alpha < 1.0 || self.varies(),
+        }
+    }
+
+    /// Diffuse reflectance ρ, each channel in [0, 0.999].
+    pub fn reflectance(&self, side: Side, vertices: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        if self.material.unlit {
+            return Vec3::ZERO;
+        }
+        let surface = match (side, &self.material.back) {
+            (Side::Back, Some(back)) => back,
+            _ => &self.material.front,
+        };
+        let mut diffuse = surface.diffuse;
+        if let Some(textures) = &self.textures {
+            if let Some(metallic) = &textures.metallic_roughness {
+                let blue = self.read(&metallic.texture, vertices, weights, false).z;
+                diffuse = metallic.base_color * (1.0 - metallic.metallic * blue);
+            }
+            if let Some(base) = &textures.base_color {
+                diffuse *= self.read(base, vertices, weights, true).truncate();
+            }
+        }
+        diffuse *= self.color(vertices, weights).truncate();
+        clean(diffuse).min(Vec3::splat(LARGEST_REFLECTANCE))
+    }
+
+    /// Emitted radiance, W/(m² sr).
+    pub fn emission(&self, side: Side, vertices: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        let emission = match (side, &self.material.back) {
+            (Side::Front, _) => self.material.front.emission,
+            (Side::Back, Some(back)) => back.emission,
+            // Emitters shine to the front unless a back of their own says otherwise.
+            (Side::Back, None) => Vec3::ZERO,
+        };
+        if emission == Vec3::ZERO {
+            return emission;
+        }
+        let texture = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref());
+        let factor =
+            texture.map_or(Vec3::ONE, |texture| self.read(texture, vertices, weights, true).truncate());
+        clean(emission * factor)
+    }
+
+    /// Whether light is stopped: alpha against the cutoff, or one half where it blends.
+    pub fn stops_light(&self, vertices: [u32; 3], weights: [f32; 3]) -> bool {
+        let cutoff = match self.material.alpha_mode {
+            AlphaMode::Opaque => return true,
+            AlphaMode::Mask { cutoff } => cutoff,
+            AlphaMode::Blend => 0.5,
+        };
+        let texture = self.textures.as_ref().and_then(|textures| textures.base_color.as_ref());
+        let texel = texture.map_or(1.0, |texture| self.read(texture, vertices, weights, true).w);
+        self.material.alpha * texel * self.color(vertices, weights).w >= cutoff
+    }
+
+    fn color(&self, vertices: [u32; 3], weights: [f32; 3]) -> Vec4 {
+        if self.mesh.colors.is_empty() {
+            return Vec4::ONE;
+        }
+        (0..3).map(|i| self.mesh.colors[vertices[i] as usize] * weights[i]).sum()
+    }
+
+    fn read(&self, texture: &TextureReference, vertices: [u32; 3], weights: [f32; 3], srgb: bool) -> Vec4 {
+        let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
+        if coordinates.is_empty() {
+            return Vec4::ONE;
+        }
+        let uv: Vec2 = (0..3).map(|i| coordinates[vertices[i] as usize] * weights[i]).sum();
+        sample(texture, uv, srgb)
+    }
+}
+
+/// Negative, infinite and NaN channels count as none.
+fn clean(color: Vec3) -> Vec3 {
+    Vec3::from_array(color.to_array().map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 }))
+}

@@ -1,0 +1,19 @@
+//! The static scene as light meets it: triangles in one space, what they reflect and emit, where their texels are.
+//! Not the World: it is read once, before, and written once, after.
+
+mod collect;
+mod duplicates;
+mod hidden_side;
+mod lightmap_layout;
+pub(crate) mod material;
+mod occlusion;
+mod texture;
+mod triangles;
+
+#[cfg(test)]
+pub(crate) use collect::Part;
+pub(crate) use collect::{Object, PlacedLight, collect, lights};
+pub(crate) use lightmap_layout::{LightmapLayout, lay_out, world_points};
+pub(crate) use material::SurfaceMaterial;
+pub(crate) use occlusion::SurfaceHit;
+pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle};

@@ -1,0 +1,91 @@
+//! What a ray meets: a lit side of a surface, a black back, the inside of something, or nothing.
+
+use glam::Vec3;
+use lumbre_rays::{Hit, Ray, offset_ray_origin};
+
+use super::BakeScene;
+use super::material::Side;
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum SurfaceHit {
+    /// Nothing.
+    None,
+    /// A side that takes part in the exchange of light.
+    Lit {
+        /// Triangle of the scene.
+        triangle: u32,
+        /// Which side.
+        side: Side,
+        /// Barycentric weights of the second and third vertex.
+        at: (f32, f32),
+        /// Distance in canonical units (the direction being of unit length).
+        distance: f32,
+    },
+    /// The back of a single-sided open surface: black.
+    Back,
+    /// The inside of a closed piece: the ray began inside.
+    Inside,
+}
+
+/// Two hits nearer to each other than this share of their distance and coordinates are in one place.
+const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
+
+impl BakeScene {
+    /// The first thing on a ray with a direction of unit length.
+    pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
+        let ray = Ray::new(origin, direction);
+        let Some(mut hit) = self.closest(&ray, |_| true) else { return SurfaceHit::None };
+        let triangle = &self.triangles[hit.triangle as usize];
+        if hit.back_face && !triangle.two_sided {
+            // Of the two faces of a sheet, the one that looks at the ray.
+            let slack = SAME_PLACE * (hit.distance + triangle.extent);
+            let near = ray.with_range((hit.distance - slack).max(0.0), hit.distance + slack);
+            let facing = |index: u32| self.triangles[index as usize].normal.dot(direction) < 0.0;
+            match self.closest(&near, facing) {
+                Some(front) => hit = front,
+                None if triangle.closed => return SurfaceHit::Inside,
+                None => return SurfaceHit::Back,
+            }
+        }
+        let side = if hit.back_face { Side::Back } else { Side::Front };
+        SurfaceHit::Lit { triangle: hit.triangle, side, at: hit.barycentric, distance: hit.distance }
+    }
+
+    /// Whether something lies between two points that are off their surfaces.
+    pub fn blocked(&self, from: Vec3, to: Vec3) -> bool {
+        self.any(&Ray::segment(from, to))
+    }
+
+    /// Whether something lies in a direction, however far.
+    pub fn blocked_towards(&self, from: Vec3, direction: Vec3) -> bool {
+        self.any(&Ray::new(from, direction))
+    }
+
+    /// A point just off a side of a triangle.
+    pub fn off_surface(&self, triangle: u32, side: Side, position: Vec3) -> Vec3 {
+        let triangle = &self.triangles[triangle as usize];
+        offset_ray_origin(position, triangle.side_normal(side), triangle.extent)
+    }
+
+    fn closest(&self, ray: &Ray, accept: impl Fn(u32) -> bool) -> Option<Hit> {
+        if self.masked {
+            self.bvh.closest_hit_filtered(ray, |index, u, v| accept(index) && self.is_solid(index, u, v))
+        } else {
+            self.bvh.closest_hit_filtered(ray, |index, _, _| accept(index))
+        }
+    }
+
+    fn any(&self, ray: &Ray) -> bool {
+        if self.masked {
+            self.bvh.any_hit_filtered(ray, |index, u, v| self.is_solid(index, u, v))
+        } else {
+            self.bvh.any_hit(ray)
+        }
+    }
+
+    fn is_solid(&self, index: u32, u: f32, v: f32) -> bool {
+        let triangle = &self.triangles[index as usize];
+        self.surfaces[triangle.surface as usize].stops_light(triangle.vertices, [1.0 - u - v, u, v])
+    }
+}

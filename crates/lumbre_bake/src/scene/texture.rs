@@ -1,0 +1,93 @@
+//! Reads a material's texture at a point, bilinearly, as glTF wraps and transforms it. No mip levels: patches average.
+
+use glam::{Vec2, Vec4};
+use lumbre_scene::{TextureReference, Wrap};
+
+/// RGBA at texture coordinates; colour channels decoded from sRGB if asked.
+pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
+    let (sine, cosine) = texture.rotation.sin_cos();
+    let scaled = uv * texture.scale;
+    // KHR_texture_transform: translation * rotation * scale, with its rotation matrix's sign.
+    let uv =
+        texture.offset + Vec2::new(cosine * scaled.x + sine * scaled.y, -sine * scaled.x + cosine * scaled.y);
+    if !uv.is_finite() {
+        return Vec4::ONE;
+    }
+    let image = &texture.image;
+    let size = Vec2::new(image.width as f32, image.height as f32);
+    let at = uv * size - 0.5;
+    let low = at.floor();
+    let fraction = at - low;
+    let read = |dx: f32, dy: f32| {
+        let x = wrap(low.x + dx, image.width, texture.sampler.wrap_u);
+        let y = wrap(low.y + dy, image.height, texture.sampler.wrap_v);
+        let first = 4 * (y * image.width as usize + x);
+        let Some(&[r, g, b, a]) = image.rgba.get(first..first + 4) else { return Vec4::ONE };
+        let channel = |value: u8| if srgb { linear(value) } else { f32::from(value) / 255.0 };
+        Vec4::new(channel(r), channel(g), channel(b), f32::from(a) / 255.0)
+    };
+    let top = read(0.0, 0.0).lerp(read(1.0, 0.0), fraction.x);
+    let bottom = read(0.0, 1.0).lerp(read(1.0, 1.0), fraction.x);
+    top.lerp(bottom, fraction.y)
+}
+
+fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
+    let size_f = size.max(1) as f32;
+    let last = size.max(1) as usize - 1;
+    let wrapped = match wrap {
+        Wrap::Repeat => index.rem_euclid(size_f),
+        Wrap::MirroredRepeat => {
+            let period = index.rem_euclid(2.0 * size_f);
+            if period < size_f { period } else { 2.0 * size_f - 1.0 - period }
+        }
+        Wrap::ClampToEdge => index.max(0.0),
+    };
+    (wrapped as usize).min(last)
+}
+
+/// IEC 61966-2-1.
+fn linear(value: u8) -> f32 {
+    let v = f32::from(value) / 255.0;
+    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use lumbre_scene::{Image, Sampler};
+
+    use super::*;
+
+    fn two_texels() -> TextureReference {
+        let rgba = vec![0, 0, 0, 255, 255, 255, 255, 255];
+        TextureReference {
+            image: Arc::new(Image { name: "two".into(), width: 2, height: 1, rgba }),
+            sampler: Sampler::default(),
+            tex_coord: 0,
+            offset: Vec2::ZERO,
+            rotation: 0.0,
+            scale: Vec2::ONE,
+        }
+    }
+
+    #[test]
+    fn centres_are_exact_and_the_middle_is_the_mean() {
+        let texture = two_texels();
+        assert_eq!(sample(&texture, Vec2::new(0.25, 0.5), true).x, 0.0);
+        assert_eq!(sample(&texture, Vec2::new(0.75, 0.5), true).x, 1.0);
+        assert_eq!(sample(&texture, Vec2::new(0.5, 0.5), true).x, 0.5);
+        // Repeats: u = 1.25 is u = 0.25.
+        assert_eq!(sample(&texture, Vec2::new(1.25, -3.0), true).x, 0.0);
+    }
+
+    #[test]
+    fn wrapping_never_leaves_the_image() {
+        for mode in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge] {
+            for index in [-1e9, -3.0, -1.0, 0.0, 1.0, 2.0, 7.0, 1e9] {
+                assert!(wrap(index, 2, mode) < 2);
+            }
+        }
+        assert_eq!([-2.0, -1.0, 0.0, 1.0, 2.0].map(|i| wrap(i, 2, Wrap::MirroredRepeat)), [1, 0, 0, 1, 1]);
+    }
+}

@@ -1,0 +1,61 @@
+//! Direct light of every covered texel, in two passes: a few shadow rays everywhere, many where the first pass, there or
+//! next to it, saw a source partly or differently. A penumbra's faint ends are found by their neighbours.
+
+use super::footprint::{Texel, receiver};
+use super::in_chunks;
+use crate::progress::Watch;
+use crate::sampling::Sequence;
+use crate::scene::{BakeScene, LightmapLayout};
+use crate::transport::direct::{Direct, Seen, Sources};
+use crate::{BakeError, BakeOptions};
+
+/// How far a penumbra is suspected around a texel that saw one, in texels.
+const REACH: u32 = 2;
+
+/// Direct light of every covered texel.
+pub(crate) fn direct_light(
+    sources: &Sources<'_>,
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    texels: &[Texel],
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Direct>, BakeError> {
+    let [few, many] = options.quality.effort().direct;
+    let light = |texel: &Texel, samples: u32| {
+        if texel.is_hidden() {
+            return Direct::default();
+        }
+        let sequence = Sequence::new(options.seed, 4, texel.index);
+        sources.irradiance(sequence, samples, &|x, y| {
+            texel.point(scene, x, y).map(|point| receiver(scene, &point))
+        })
+    };
+    let mut direct = in_chunks(texels.len(), watch, |index| light(&texels[index], few))?;
+    let again = in_doubt(layout, texels, &direct);
+    let better = in_chunks(again.len(), watch, |place| light(&texels[again[place] as usize], many))?;
+    for (&index, better) in again.iter().zip(better) {
+        let first = &mut direct[index as usize];
+        *first = Direct { rays: first.rays + better.rays, ..better };
+    }
+    Ok(direct)
+}
+
+/// Texels that saw a source partly, or near one that did, or next to one that saw other sources.
+fn in_doubt(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<u32> {
+    let mut seen: Vec<Option<Seen>> = vec![None; layout.texels];
+    for (texel, direct) in texels.iter().zip(direct).filter(|(texel, _)| !texel.is_hidden()) {
+        seen[texel.index as usize] = Some(direct.seen);
+    }
+    let doubtful = |texel: &Texel| {
+        let Some(own) = seen[texel.index as usize] else { return false };
+        let map = &layout.maps[texel.object as usize];
+        let rows = texel.y.saturating_sub(REACH)..=(texel.y + REACH).min(map.height - 1);
+        let columns = texel.x.saturating_sub(REACH)..=(texel.x + REACH).min(map.width - 1);
+        rows.flat_map(|y| columns.clone().map(move |x| (x, y))).any(|(x, y)| {
+            seen[map.first + (y * map.width + x) as usize]
+                .is_some_and(|other| other.partly || other.signature != own.signature)
+        })
+    };
+    (0..texels.len() as u32).filter(|&index| doubtful(&texels[index as usize])).collect()
+}

@@ -1,0 +1,177 @@
+//! Smooths the gathered light within charts: a weighted plane through each texel's neighbourhood, with weights that stop at
+//! edges larger than the noise. The same weights for every scramble, so that their spread stays an estimate of the error.
+
+use glam::{DMat2, DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::footprint::Texel;
+use super::gather::SCRAMBLES;
+use crate::scene::{BakeScene, LightmapLayout};
+
+/// What a texel has, before and after.
+pub(crate) type Estimates = [Vec3; SCRAMBLES];
+
+/// Reach of the smoothing in texels.
+const RADIUS: i64 = 4;
+
+/// The estimates of every covered texel, smoothed.
+pub(crate) fn smooth(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    texels: &[Texel],
+    charts: &[u32],
+    estimates: &[Estimates],
+) -> Vec<Estimates> {
+    let mut place = vec![u32::MAX; layout.texels];
+    for (index, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
+        place[texel.index as usize] = index as u32;
+    }
+    let surroundings = Surroundings { scene, layout, texels, charts, place: &place };
+    // A single texel's spread of four is itself noise: the neighbourhood's mean is not.
+    let variances: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum()).collect();
+    let noise: Vec<f32> = texels
+        .par_iter()
+        .map(|texel| {
+            let (mut sum, mut count) = (0.0, 0u32);
+            for (_, _, other) in surroundings.of(texel, NOISE_RADIUS) {
+                sum += variances[other];
+                count += 1;
+            }
+            sum / count.max(1) as f32
+        })
+        .collect();
+    // Each half's weights come from the other half: noise that shaped the weights would pull the mean towards what is
+    // most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
+    let guides: Vec<[Vec3; 2]> =
+        texels.par_iter().map(|texel| guide(&surroundings, texel, estimates)).collect();
+    (0..texels.len())
+        .into_par_iter()
+        .map(|index| {
+            let texel = &texels[index];
+            if texel.is_hidden() {
+                return estimates[index];
+            }
+            let mut planes = [Plane::default(), Plane::default()];
+            for (dx, dy, other) in surroundings.of(texel, RADIUS) {
+                let nearness = (dx * dx + dy * dy) / 9.0;
+                let expected =
+                    (GUIDE_SIGMAS * GUIDE_NOISE * (noise[index] + noise[other])).max(f32::MIN_POSITIVE);
+                for (half, plane) in planes.iter_mut().enumerate() {
+                    let difference = guides[other][1 - half] - guides[index][1 - half];
+                    let edge = f64::from(difference.length_squared() / expected);
+                    plane.add(dx, dy, (-nearness - edge).exp(), &estimates[other][half * HALF..][..HALF]);
+                }
+            }
+            let mut smoothed = estimates[index];
+            for (half, plane) in planes.iter().enumerate() {
+                plane.at_center(&mut smoothed[half * HALF..][..HALF]);
+            }
+            smoothed
+        })
+        .collect()
+}
+
+/// Scrambles of one half.
+const HALF: usize = SCRAMBLES / 2;
+/// Variance of a guide over that of a texel's mean: twice for a half, a ninth for nine texels.
+const GUIDE_NOISE: f32 = 2.0 / 9.0;
+/// Squared differences of this many variances weigh e⁻¹.
+const GUIDE_SIGMAS: f32 = 8.0;
+/// Reach over which a texel's noise is averaged, and that of its guides, in texels.
+const NOISE_RADIUS: i64 = 2;
+const GUIDE_RADIUS: i64 = 1;
+
+/// The means of both halves over the texels next to one.
+fn guide(surroundings: &Surroundings<'_>, texel: &Texel, estimates: &[Estimates]) -> [Vec3; 2] {
+    let (mut sums, mut count) = ([Vec3::ZERO; 2], 0u32);
+    for (_, _, other) in surroundings.of(texel, GUIDE_RADIUS) {
+        for (half, sum) in sums.iter_mut().enumerate() {
+            *sum += estimates[other][half * HALF..][..HALF].iter().sum::<Vec3>();
+        }
+        count += HALF as u32;
+    }
+    sums.map(|sum| sum / count.max(1) as f32)
+}
+
+/// Who lies around whom.
+struct Surroundings<'a> {
+    scene: &'a BakeScene,
+    layout: &'a LightmapLayout,
+    texels: &'a [Texel],
+    charts: &'a [u32],
+    /// Covered texel of each texel of all maps.
+    place: &'a [u32],
+}
+
+impl<'a> Surroundings<'a> {
+    /// Texels of the same chart and about the same normal, with their offsets.
+    fn of(&'a self, texel: &'a Texel, radius: i64) -> impl Iterator<Item = (f64, f64, usize)> + 'a {
+        let map = &self.layout.maps[texel.object as usize];
+        let chart = self.charts[texel.triangle as usize];
+        let normal = self.scene.triangles[texel.triangle as usize].normal;
+        let offsets = (-radius..=radius).flat_map(move |dy| (-radius..=radius).map(move |dx| (dx, dy)));
+        offsets.filter_map(move |(dx, dy)| {
+            let (x, y) = (i64::from(texel.x) + dx, i64::from(texel.y) + dy);
+            if x < 0 || y < 0 || x >= i64::from(map.width) || y >= i64::from(map.height) {
+                return None;
+            }
+            let other = self.place[map.first + (y * i64::from(map.width) + x) as usize];
+            let neighbour = self.texels.get(other as usize)?;
+            let same = self.charts[neighbour.triangle as usize] == chart
+                && self.scene.triangles[neighbour.triangle as usize].normal.dot(normal) > 0.9;
+            same.then_some((dx as f64, dy as f64, other as usize))
+        })
+    }
+}
+
+/// Mean of the scrambles.
+pub(crate) fn mean(estimates: &Estimates) -> Vec3 {
+    estimates.iter().sum::<Vec3>() / SCRAMBLES as f32
+}
+
+/// Variance of that mean.
+pub(crate) fn variance(estimates: &Estimates) -> Vec3 {
+    let mean = mean(estimates);
+    let squares: Vec3 = estimates.iter().map(|&e| (e - mean) * (e - mean)).sum();
+    squares / (SCRAMBLES * (SCRAMBLES - 1)) as f32
+}
+
+/// Weighted sums of a plane a + b x + c y through the values of one half.
+#[derive(Default)]
+struct Plane {
+    moments: [f64; 6],
+    sums: [[DVec3; HALF]; 3],
+}
+
+/// Square texels of spread below which a slope counts as unknown.
+const RIDGE: f64 = 0.002;
+
+impl Plane {
+    fn add(&mut self, x: f64, y: f64, weight: f64, values: &[Vec3]) {
+        for (moment, term) in self.moments.iter_mut().zip([1.0, x, y, x * x, x * y, y * y]) {
+            *moment += weight * term;
+        }
+        for (sums, term) in self.sums.iter_mut().zip([1.0, x, y]) {
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += value.as_dvec3() * (weight * term);
+            }
+        }
+    }
+
+    /// Writes the plane's values at (0, 0); leaves what is there if they are not finite.
+    fn at_center(&self, values: &mut [Vec3]) {
+        let [_, sx, sy, sxx, sxy, syy] = self.moments.map(|moment| moment / self.moments[0]);
+        let spread = DMat2::from_cols(
+            DVec2::new(sxx - sx * sx + RIDGE, sxy - sx * sy),
+            DVec2::new(sxy - sx * sy, syy - sy * sy + RIDGE),
+        );
+        let towards = spread.inverse() * DVec2::new(-sx, -sy);
+        for (k, value) in values.iter_mut().enumerate() {
+            let [mean, with_x, with_y] = self.sums.map(|sums| sums[k] / self.moments[0]);
+            let fitted = mean + (with_x - mean * sx) * towards.x + (with_y - mean * sy) * towards.y;
+            if fitted.is_finite() {
+                *value = fitted.max(DVec3::ZERO).as_vec3();
+            }
+        }
+    }
+}

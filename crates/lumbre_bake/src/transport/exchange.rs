@@ -1,0 +1,134 @@
+//! The exchange of light between patches: cuts the scene, samples form factors, finds the patches' direct light, solves
+//! each channel. Not the texels.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::direct::{Receiver, Sources};
+use super::form_factors::FormFactors;
+use super::patches::{Patch, Patches};
+use super::solver::{self, Solver};
+use crate::progress::Watch;
+use crate::sampling::{Sequence, triangle_point};
+use crate::scene::BakeScene;
+use crate::scene::material::Side;
+use crate::{BakeError, BakeOptions, BakeReport};
+
+/// The solution that the final gather reads.
+pub(crate) struct Exchange {
+    pub patches: Patches,
+    /// Direct irradiance of each patch's open part.
+    pub direct: Vec<Vec3>,
+    /// Irradiance by bounces of each patch.
+    pub indirect: Vec<Vec3>,
+    /// Below this distance patches are too coarse to read, canonical units.
+    pub near: f32,
+}
+
+/// Relative residual at which the solver stops: well below what form factors are known to.
+const TOLERANCE: f64 = 1e-5;
+
+/// Shadow rays of a patch to each source.
+const SHADOW_RAYS: u32 = 16;
+
+impl Exchange {
+    /// `None` where nothing bounces; the report then says why.
+    pub fn new(
+        scene: &BakeScene,
+        sources: &Sources<'_>,
+        options: &BakeOptions,
+        texel_side: f32,
+        watch: &mut Watch<'_>,
+        report: &mut BakeReport,
+    ) -> Result<Option<Self>, BakeError> {
+        let effort = options.quality.effort();
+        let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+        let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
+        watch.stage("form factors", report)?;
+        let patches = Patches::new(scene, side);
+        report.patches = patches.list.len();
+        if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
+            report
+                .skipped
+                .push("form factors, radiosity and final gather: no surface reflects (rho = 0)".into());
+            return Ok(None);
+        }
+        let factors = FormFactors::sample(scene, &patches, effort.form_factor_rays, options.seed);
+        report.rays += factors.rays;
+        report.form_factors = factors.columns.len();
+        report.energy_lost = factors.energy_lost;
+
+        watch.stage("radiosity", report)?;
+        let direct: Vec<(Vec3, u32)> = (0..patches.list.len())
+            .into_par_iter()
+            .map(|index| patch_direct(scene, sources, &patches, index, factors.open[index], options.seed))
+            .collect();
+        report.rays += direct.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+        let direct: Vec<Vec3> = direct.into_iter().map(|(direct, _)| direct).collect();
+        if direct.iter().zip(&patches.list).all(|(direct, patch)| *direct * patch.reflectance == Vec3::ZERO) {
+            report
+                .skipped
+                .push("radiosity and final gather: no light reaches a surface that reflects".into());
+            return Ok(None);
+        }
+        watch.advance(0.5)?;
+        let indirect = solve(options.solver, &factors, &patches.list, &direct, report);
+        Ok(Some(Self { patches, direct, indirect, near: 2.0 * side }))
+    }
+}
+
+/// Direct irradiance of a patch. What other geometry covers receives nothing: the rest has it all.
+fn patch_direct(
+    scene: &BakeScene,
+    sources: &Sources<'_>,
+    patches: &Patches,
+    index: usize,
+    open: f32,
+    seed: u32,
+) -> (Vec3, u32) {
+    let patch = &patches.list[index];
+    if open <= 0.0 {
+        return (Vec3::ZERO, 0);
+    }
+    let triangle = &scene.triangles[patch.triangle as usize];
+    let point = |x: f32, y: f32| {
+        let (u, v) = patches.point(patch, triangle_point(x, y));
+        let normal = triangle.side_normal(patch.side);
+        let position = triangle.position(u, v);
+        let origin = scene.off_surface(patch.triangle, patch.side, position);
+        let smooth = triangle.shading_normal(u, v);
+        let smooth = if patch.side == Side::Front { smooth } else { -smooth };
+        Some(Receiver { position, origin, geometric_normal: normal, normal: smooth })
+    };
+    let direct = sources.irradiance(Sequence::new(seed, 5, index as u32), SHADOW_RAYS, &point);
+    (direct.total() / open, direct.rays)
+}
+
+/// Irradiance by bounces: Σ_j F_ij B_j, with B the solution for the light that direct light has left on the patches.
+fn solve(
+    solver: Solver,
+    factors: &FormFactors,
+    patches: &[Patch],
+    direct: &[Vec3],
+    report: &mut BakeReport,
+) -> Vec<Vec3> {
+    let channels: Vec<(Vec<f64>, u32, f64)> = (0..3)
+        .into_par_iter()
+        .map(|channel| {
+            let reflectance: Vec<f64> = patches.iter().map(|p| f64::from(p.reflectance[channel])).collect();
+            let emission: Vec<f64> =
+                direct.iter().zip(&reflectance).map(|(e, &rho)| f64::from(e[channel]) * rho).collect();
+            let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
+            let gathered = solver::gather(factors, &solution.radiosity);
+            (gathered, solution.iterations, solution.residual)
+        })
+        .collect();
+    let largest = patches.iter().map(|p| f64::from(p.reflectance.max_element())).fold(0.0, f64::max);
+    for (channel, (_, iterations, residual)) in channels.iter().enumerate() {
+        report.iterations[channel] = *iterations;
+        report.residual = report.residual.max(*residual);
+    }
+    report.residual_bound = report.residual / (1.0 - largest);
+    let [red, green, blue] = [0, 1, 2].map(|channel| &channels[channel].0);
+    (0..patches.len()).map(|i| DVec3::new(red[i], green[i], blue[i]).as_vec3()).collect()
+}

@@ -1,0 +1,147 @@
+//! Form factors against their closed forms: within 5 sigma, sigma = sqrt(F (1 - F) / N).
+
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::Material;
+
+use super::form_factors::FormFactors;
+use super::patches::Patches;
+use crate::scene::{BakeScene, Canonical, Object, Part, lay_out};
+use crate::{BakeOptions, Density};
+
+fn mesh(triangles: &[[Vec3; 3]]) -> Arc<TriangleMesh> {
+    let positions: Vec<Vec3> = triangles.iter().flatten().copied().collect();
+    let indices = (0..positions.len() as u32).collect();
+    Arc::new(TriangleMesh { positions, indices, ..TriangleMesh::default() })
+}
+
+fn square(origin: [f32; 3], u: Vec3, v: Vec3) -> [[Vec3; 3]; 2] {
+    let o = Vec3::from(origin);
+    [[o, o + u, o + u + v], [o, o + u + v, o + v]]
+}
+
+/// A scene of matt objects, one per list of triangles.
+fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
+    let mut world = World::new();
+    let objects: Vec<Object> = objects
+        .iter()
+        .map(|triangles| Object {
+            name: "object".into(),
+            parts: vec![Part {
+                entity: world.spawn_empty().id(),
+                mesh: mesh(triangles),
+                material: Material::default(),
+                textures: None,
+                transform: glam::DAffine3::IDENTITY,
+            }],
+        })
+        .collect();
+    let points = objects.iter().flat_map(|o| &o.parts[0].mesh.positions).map(|p| p.as_dvec3());
+    let space = Canonical::of(points);
+    let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
+    let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
+    BakeScene::new(&objects, &layout, space, &mut Vec::new()).unwrap()
+}
+
+/// F from the first object to the second, and the rays behind it.
+fn factor(objects: &[&[[Vec3; 3]]], side: f32) -> (f64, f64) {
+    let scene = scene(objects);
+    let patches = Patches::new(&scene, side * scene.space.scale as f32);
+    let factors = FormFactors::sample(&scene, &patches, 200_000, 7);
+    let object = |patch: usize| scene.triangles[patches.list[patch].triangle as usize].object;
+    let (mut exchange, mut area) = (0.0, 0.0);
+    for i in (0..factors.len()).filter(|&i| object(i) == 0) {
+        area += f64::from(factors.areas[i]);
+        exchange += factors.row(i).filter(|&(j, _)| object(j) == 1).map(|(_, g)| g).sum::<f64>();
+    }
+    (exchange / area, factors.rays as f64)
+}
+
+fn check(name: &str, objects: &[&[[Vec3; 3]]], expected: f64) {
+    for side in [4.0, 0.4] {
+        let (found, rays) = factor(objects, side);
+        let sigma = (expected * (1.0 - expected) / rays).sqrt();
+        assert!(
+            (found - expected).abs() < 5.0 * sigma,
+            "{name}, patches of {side}: {found} instead of {expected}"
+        );
+    }
+}
+
+#[test]
+fn parallel_squares() {
+    let lower = square([0.0; 3], Vec3::Z, Vec3::X);
+    for (distance, expected) in [
+        (0.01, 0.980416602925973),
+        (0.1, 0.826994522397257),
+        (0.5, 0.415253283577147),
+        (1.0, 0.199824895698387),
+        (2.0, 0.0685895888185524),
+        (5.0, 0.0124039773132451),
+        (10.0, 0.0031620568387576),
+    ] {
+        let upper = square([0.0, distance, 0.0], Vec3::X, Vec3::Z);
+        check(&format!("distance {distance}"), &[&lower, &upper], expected);
+    }
+    let shifted = square([1.0, 1.0, 0.0], Vec3::X, Vec3::Z);
+    check("shifted by one width", &[&lower, &shifted], 0.0860504891523273);
+}
+
+#[test]
+fn perpendicular_squares_down_to_a_shared_edge() {
+    let floor = square([0.0; 3], Vec3::Z, Vec3::X);
+    for (gap, height, expected) in [
+        (0.0, 1.0, 0.200043776075403),
+        (0.0, 2.0, 0.232852602795362),
+        (0.0, 10.0, 0.249209485790311),
+        (1e-3, 1.0, 0.19961080893592),
+    ] {
+        let wall = square([-gap, 0.0, 0.0], Vec3::Y * height, Vec3::Z);
+        check(&format!("gap {gap}, height {height}"), &[&floor, &wall], expected);
+    }
+}
+
+#[test]
+fn a_blocker_blocks() {
+    let lower = square([0.0; 3], Vec3::Z, Vec3::X);
+    let upper = square([0.0, 1.0, 0.0], Vec3::X, Vec3::Z);
+    let blocker = square([-9.0, 0.5, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
+    assert_eq!(factor(&[&lower, &upper, &blocker], 0.4).0, 0.0);
+}
+
+/// A cube seen from inside: turned faces of `cuboid`.
+fn room() -> Vec<[Vec3; 3]> {
+    let outside = lumbre_mesh::shapes::cuboid(Vec3::ONE, 1).triangle_positions().unwrap();
+    outside.into_iter().map(|[a, b, c]| [a, c, b]).collect()
+}
+
+#[test]
+fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
+    let scene = scene(&[&room()]);
+    let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
+    let factors = FormFactors::sample(&scene, &patches, 100_000, 3);
+    for i in 0..factors.len() {
+        // Twelve rounds of scaling leave what f32 and their own convergence leave.
+        assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "row {i}: {}", factors.row_sum(i));
+        assert!(factors.row_sum(i) <= 1.0 + 1e-6);
+        for (j, g) in factors.row(i) {
+            let back = factors.row(j).find(|&(k, _)| k == i).map(|(_, g)| g);
+            assert_eq!(back, Some(g), "A_i F_ij = A_j F_ji");
+        }
+    }
+    assert!(factors.energy_lost < 2e-3, "{}", factors.energy_lost);
+}
+
+#[test]
+fn agrees_with_the_contour_integral_where_nothing_blocks() {
+    // Two skew triangles in general position.
+    let one = [[Vec3::ZERO, Vec3::new(0.3, 0.1, 1.0), Vec3::new(1.0, 0.0, 0.2)]];
+    let two = [[Vec3::new(0.2, 0.9, 0.1), Vec3::new(1.1, 1.3, 0.2), Vec3::new(0.4, 0.8, 0.9)]];
+    let f64s = |t: [Vec3; 3]| t.map(|p| p.as_dvec3());
+    let expected = super::contour::triangle_to_triangle(&f64s(one[0]), &f64s(two[0]));
+    assert!(expected > 0.01, "the triangles must face each other: {expected}");
+    check("skew triangles", &[&one, &two], expected);
+}

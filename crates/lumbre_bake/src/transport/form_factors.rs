@@ -1,0 +1,195 @@
+//! Form factors by Monte Carlo: cosine rays from every patch, visibility included. The two estimates of a pair are
+//! pooled into one exchange area G_ij = A_i F_ij = A_j F_ji, so reciprocity is exact; then rows are scaled to the share
+//! of rays that met a surface, which is the exact row sum's own estimate (1 in a closed scene).
+//! Not the solution of the system they make.
+
+use rayon::prelude::*;
+
+use super::patches::Patches;
+use crate::sampling::{Sequence, cosine_about, triangle_point};
+use crate::scene::{BakeScene, SurfaceHit};
+
+/// The symmetric matrix of exchange areas, row by row, sparse.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FormFactors {
+    /// Row i is `starts[i]..starts[i + 1]` of the other two.
+    pub starts: Vec<usize>,
+    pub columns: Vec<u32>,
+    /// G_ij, square canonical units.
+    pub exchange: Vec<f32>,
+    /// A_i: the area in the open, not inside other geometry.
+    pub areas: Vec<f32>,
+    /// Share of each patch that is in the open, in [0, 1].
+    pub open: Vec<f32>,
+    /// Rays cast.
+    pub rays: u64,
+    /// Share of all exchange that was cut so that no row exceeds 1.
+    pub energy_lost: f64,
+}
+
+/// Least and most rays of a patch. The sequence has 65,536 points.
+const RAYS: (f64, f64) = (32.0, 65_536.0);
+
+impl FormFactors {
+    /// Casts about `rays` rays, in proportion to the patches' areas.
+    pub fn sample(scene: &BakeScene, patches: &Patches, rays: usize, seed: u32) -> Self {
+        let total: f64 = patches.list.iter().map(|patch| f64::from(patch.area)).sum();
+        let counts: Vec<u32> = patches
+            .list
+            .iter()
+            .map(|patch| (rays as f64 * f64::from(patch.area) / total).round().clamp(RAYS.0, RAYS.1) as u32)
+            .collect();
+        let cast: Vec<(Vec<(u32, u32)>, u32)> = (0..patches.list.len())
+            .into_par_iter()
+            .map(|index| cast(scene, patches, index as u32, counts[index], seed))
+            .collect();
+        let (hits, inside): (Vec<_>, Vec<u32>) = cast.into_iter().unzip();
+        let areas: Vec<f32> = patches.list.iter().map(|patch| patch.area).collect();
+        let mut factors = pool(&hits, &counts, areas);
+        factors.open =
+            counts.iter().zip(&inside).map(|(&n, &inside)| (n - inside) as f32 / n as f32).collect();
+        for (area, open) in factors.areas.iter_mut().zip(&factors.open) {
+            // A patch wholly inside exchanges nothing; its area only divides that nothing.
+            *area *= open.max(1e-3);
+        }
+        factors.rays = counts.iter().map(|&count| u64::from(count)).sum();
+        let row_sums: Vec<f64> = hits
+            .iter()
+            .zip(counts.iter().zip(&inside))
+            .map(|(row, (&count, &inside))| {
+                let met: f64 = row.iter().map(|&(_, n)| f64::from(n)).sum();
+                met / f64::from((count - inside).max(1))
+            })
+            .collect();
+        factors.scale_rows(&row_sums);
+        factors
+    }
+
+    /// The entries of row i: (j, G_ij).
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.starts[i]..self.starts[i + 1];
+        let columns = self.columns[range.clone()].iter();
+        columns.zip(&self.exchange[range]).map(|(&j, &g)| (j as usize, f64::from(g)))
+    }
+
+    /// Number of patches.
+    pub fn len(&self) -> usize {
+        self.areas.len()
+    }
+
+    /// Sum over j of F_ij.
+    pub fn row_sum(&self, i: usize) -> f64 {
+        self.row(i).map(|(_, g)| g).sum::<f64>() / f64::from(self.areas[i])
+    }
+
+    /// Symmetric scaling d_i G_ij d_j towards the given row sums (Sinkhorn and Knopp), then what still exceeds 1 is cut.
+    fn scale_rows(&mut self, targets: &[f64]) {
+        // The square root of the correction keeps the alternation from overshooting; pooling leaves some per cent,
+        // and each round halves what is left.
+        const ROUNDS: usize = 12;
+        let mut scale = vec![1.0f64; self.len()];
+        for _ in 0..ROUNDS {
+            let next: Vec<f64> = (0..self.len())
+                .into_par_iter()
+                .map(|i| {
+                    let sum: f64 = self.row(i).map(|(j, g)| g * scale[j]).sum::<f64>() * scale[i];
+                    let target = targets[i] * f64::from(self.areas[i]);
+                    // A patch that sees what does not see it keeps its own estimate within a factor.
+                    if sum > 0.0 && target > 0.0 {
+                        scale[i] * (target / sum).sqrt().clamp(0.5, 2.0)
+                    } else {
+                        scale[i]
+                    }
+                })
+                .collect();
+            scale = next;
+        }
+        let scale: Vec<f64> = scale.iter().map(|s| s.clamp(0.25, 4.0)).collect();
+        self.multiply(|i, j| scale[i] * scale[j]);
+        let over: Vec<f64> = (0..self.len()).map(|i| 1.0 / self.row_sum(i).max(1.0)).collect();
+        let before: f64 = self.exchange.iter().map(|&g| f64::from(g)).sum();
+        self.multiply(|i, j| over[i].min(over[j]));
+        let after: f64 = self.exchange.iter().map(|&g| f64::from(g)).sum();
+        self.energy_lost = if before > 0.0 { 1.0 - after / before } else { 0.0 };
+    }
+
+    fn multiply(&mut self, factor: impl Fn(usize, usize) -> f64) {
+        for i in 0..self.areas.len() {
+            for k in self.starts[i]..self.starts[i + 1] {
+                self.exchange[k] = (f64::from(self.exchange[k]) * factor(i, self.columns[k] as usize)) as f32;
+            }
+        }
+    }
+}
+
+/// Rays of one patch: how many met each other patch, by index, and how many began inside other geometry.
+fn cast(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32) -> (Vec<(u32, u32)>, u32) {
+    let patch = &patches.list[index as usize];
+    let triangle = &scene.triangles[patch.triangle as usize];
+    let normal = triangle.side_normal(patch.side);
+    let [p, q, r] = patches.corners(scene, patch);
+    let sequence = Sequence::new(seed, 1, index);
+    let mut met = Vec::with_capacity(count as usize);
+    let mut inside = 0;
+    for ray in 0..count {
+        let [a, b, c, d] = sequence.point(ray, 0);
+        let (u, v) = triangle_point(a, b);
+        let position = p + (q - p) * u + (r - p) * v;
+        let origin = scene.off_surface(patch.triangle, patch.side, position);
+        match scene.first_hit(origin, cosine_about(normal, c, d)) {
+            SurfaceHit::Lit { triangle, side, at, .. } => {
+                met.extend(patches.at(triangle, side, at).filter(|&other| other != index));
+            }
+            SurfaceHit::Inside => inside += 1,
+            SurfaceHit::Back | SurfaceHit::None => {}
+        }
+    }
+    met.sort_unstable();
+    let mut row: Vec<(u32, u32)> = Vec::new();
+    for other in met {
+        match row.last_mut() {
+            Some((last, n)) if *last == other => *n += 1,
+            _ => row.push((other, 1)),
+        }
+    }
+    (row, inside)
+}
+
+/// Both directions of a pair count the same flux: N_ij has mean R_i G/A_i, N_ji has mean R_j G/A_j. The best estimate of
+/// G from two Poisson counts is their sum over the sum of their rates.
+fn pool(hits: &[Vec<(u32, u32)>], counts: &[u32], areas: Vec<f32>) -> FormFactors {
+    let mut incoming: Vec<Vec<(u32, u32)>> = vec![Vec::new(); hits.len()];
+    for (i, row) in hits.iter().enumerate() {
+        for &(j, n) in row {
+            incoming[j as usize].push((i as u32, n));
+        }
+    }
+    let rate = |i: usize| f64::from(counts[i]) / f64::from(areas[i]);
+    let mut factors = FormFactors { starts: vec![0], ..FormFactors::default() };
+    for (i, (out, into)) in hits.iter().zip(&incoming).enumerate() {
+        let (mut x, mut y) = (out.iter().peekable(), into.iter().peekable());
+        loop {
+            let (j, n) = match (x.peek(), y.peek()) {
+                (Some(&&(a, n)), Some(&&(b, m))) if a == b => {
+                    x.next();
+                    y.next();
+                    (a, n + m)
+                }
+                (Some(&&(a, n)), other) if other.is_none_or(|&&(b, _)| a < b) => {
+                    x.next();
+                    (a, n)
+                }
+                (_, Some(&&(b, m))) => {
+                    y.next();
+                    (b, m)
+                }
+                _ => break,
+            };
+            factors.columns.push(j);
+            factors.exchange.push((f64::from(n) / (rate(i) + rate(j as usize))) as f32);
+        }
+        factors.starts.push(factors.columns.len());
+    }
+    factors.areas = areas;
+    factors
+}
