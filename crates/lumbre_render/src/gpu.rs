@@ -33,8 +33,20 @@ impl Gpu {
     /// # Errors
     /// [`RenderError::NoAdapter`], which says what to install, and [`RenderError::Device`].
     pub fn headless() -> Result<Self, RenderError> {
-        let descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-        Self::from_instance(wgpu::Instance::new(descriptor), None)
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        // OpenGL is asked only if nothing better is there: its libraries complain aloud where there is no display.
+        let others = descriptor.backends & wgpu::Backends::SECONDARY;
+        if descriptor.backends.intersects(wgpu::Backends::PRIMARY) {
+            descriptor.backends &= wgpu::Backends::PRIMARY;
+        }
+        let first = Self::from_instance(wgpu::Instance::new(descriptor), None);
+        if !matches!(first, Err(RenderError::NoAdapter { .. })) || others.is_empty() {
+            return first;
+        }
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        descriptor.backends = others;
+        // The first error is the one that tells what to install.
+        Self::from_instance(wgpu::Instance::new(descriptor), None).or(first)
     }
 
     /// A device that can present to `surface`, which was made by `instance`.

@@ -1,0 +1,218 @@
+//! The command line: what can be asked for. Not what is done about it.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use lumbre::optics::{ReflectionModel, Shading};
+use lumbre::render::Display;
+
+/// Lighting for games that tells you what it costs.
+#[derive(Debug, Parser)]
+#[command(
+    name = "lumbre",
+    version,
+    after_help = "\
+Examples:
+  lumbre                                         play the demo level
+  lumbre bake room.glb -o room.baked.glb         bake its radiosity into lightmaps
+  lumbre render room.baked.glb -o room.png       draw it without a window
+  lumbre explain room.glb                        what it calls for, and what it does not"
+)]
+pub struct Arguments {
+    /// What to do; without it, plays the demo level.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Play a level; without a display, draw a short tour of it to PNG frames.
+    #[command(
+        after_help = "Examples:\n  lumbre play\n  lumbre play room.baked.glb\n  lumbre play --headless --frames-dir tour"
+    )]
+    Play(Play),
+    /// Bake radiosity into lightmaps.
+    #[command(after_help = "\
+Examples:
+  lumbre bake room.glb -o room.baked.glb
+  lumbre bake room.glb -o room.baked.glb --error 0.005 --time 120
+  lumbre bake box.glb -o box.baked.glb --map-size 256 --json > report.json")]
+    Bake(Bake),
+    /// Draw frames without a window.
+    #[command(after_help = "\
+Examples:
+  lumbre render room.baked.glb -o room.png --size 1920x1080
+  lumbre render ball.glb -o ball.exr --shading gouraud --display linear
+  lumbre render room.glb -o room.png --frames 20 --timings times.json")]
+    Render(Render),
+    /// Say what a scene calls for, which passes run and why the others do not.
+    #[command(
+        after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
+    )]
+    Explain(Explain),
+}
+
+#[derive(Args, Debug, Default)]
+pub struct Play {
+    /// A level; without one the demo level, baked first if it is not baked.
+    pub level: Option<PathBuf>,
+    /// Draws a tour to PNG frames even if there is a display.
+    #[arg(long)]
+    pub headless: bool,
+    /// Where the tour's frames go.
+    #[arg(long, value_name = "DIR", default_value = "frames")]
+    pub frames_dir: PathBuf,
+    /// Plays back recorded input (JSON) instead of the keyboard and mouse.
+    #[arg(long, value_name = "FILE")]
+    pub input: Option<PathBuf>,
+    /// Records what is played to this file (JSON), for --input.
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Writes the last frame with its overlay to a PNG.
+    #[arg(long, value_name = "FILE")]
+    pub screenshot: Option<PathBuf>,
+    /// Ends after so many frames.
+    #[arg(long, value_name = "FRAMES")]
+    pub quit_after: Option<u32>,
+}
+
+#[derive(Args, Debug)]
+pub struct Bake {
+    /// The level: .glb or .gltf.
+    pub input: PathBuf,
+    /// The baked level; its lightmaps go beside it.
+    #[arg(short, long, value_name = "OUT.glb")]
+    pub output: PathBuf,
+    /// Relative RMSE that the lightmap may have by its own estimate.
+    #[arg(long, default_value_t = 0.01, value_parser = positive)]
+    pub error: f64,
+    /// Seconds after which no further samples are begun.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub time: Option<f64>,
+    /// Texels along a metre of surface; chosen from the scene's area without this.
+    #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "map_size")]
+    pub texels_per_meter: Option<f64>,
+    /// Side of each mesh's own map in texels.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=8192))]
+    pub map_size: Option<u32>,
+    /// Continues an interrupted bake from its checkpoint, if there is one.
+    #[arg(long)]
+    pub resume: bool,
+    /// How much work may go into it.
+    #[arg(long, value_enum, default_value_t = BakeQuality::Final)]
+    pub quality: BakeQuality,
+    /// Worker threads; as many as there are cores without this.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Prints the report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BakeQuality {
+    /// For a look while the level is being built.
+    Draft,
+    /// For shipping.
+    Final,
+}
+
+#[derive(Args, Debug)]
+pub struct Render {
+    /// The scene: .glb or .gltf, baked or not.
+    pub input: PathBuf,
+    /// The frame: .png (eight bits) or .exr (floats). Several frames are numbered.
+    #[arg(short, long, value_name = "OUT.png|OUT.exr")]
+    pub output: PathBuf,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub size: (u32, u32),
+    #[command(flatten)]
+    pub frame: Frame,
+    /// Draws so many frames and writes the last one.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Writes what each frame and each of its passes cost, as JSON.
+    #[arg(long, value_name = "OUT.json")]
+    pub timings: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Explain {
+    /// The scene: .glb or .gltf, baked or not.
+    pub input: PathBuf,
+    /// For people, for programs, for Graphviz.
+    #[arg(long, value_enum, default_value_t = ExplainFormat::Text)]
+    pub format: ExplainFormat,
+    #[command(flatten)]
+    pub frame: Frame,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ExplainFormat {
+    /// For people.
+    Text,
+    /// For programs.
+    Json,
+    /// For Graphviz.
+    Dot,
+}
+
+/// Choices about how a frame is drawn.
+#[derive(Args, Debug)]
+pub struct Frame {
+    /// Camera by name or index; the first without this, and one that sees the whole scene if it has none.
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Shades every object this way, whatever the file says.
+    #[arg(long, value_name = "flat|gouraud|phong", value_parser = shading)]
+    pub shading: Option<Shading>,
+    /// Takes this specular model instead of the file's: phong, blinn, blinn-4n, blinn-matched, torrance-sparrow.
+    #[arg(long, value_name = "MODEL", value_parser = reflection)]
+    pub reflection: Option<ReflectionModel>,
+    /// From radiance to numbers: srgb for people (the default for PNG), linear as it is (for EXR), clamp as OpenGL.
+    #[arg(long, value_name = "linear|clamp|srgb", value_parser = display)]
+    pub display: Option<Display>,
+    /// Leaves the lightmaps out.
+    #[arg(long)]
+    pub no_lightmaps: bool,
+    /// Four samples per pixel.
+    #[arg(long)]
+    pub msaa: bool,
+    /// Factor on radiance before it is shown, instead of the camera's.
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub exposure: Option<f64>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("a number greater than 0 is wanted".into()),
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match sides {
+        Some((width, height)) if (1..=32_768).contains(&width) && (1..=32_768).contains(&height) => {
+            Ok((width, height))
+        }
+        _ => Err("WxH is wanted, each from 1 to 32768, like 1280x720".into()),
+    }
+}
+
+fn named<T>(found: Option<T>, all: impl Iterator<Item = &'static str>) -> Result<T, String> {
+    found.ok_or_else(|| format!("one of {} is wanted", all.collect::<Vec<_>>().join(", ")))
+}
+
+fn shading(text: &str) -> Result<Shading, String> {
+    named(Shading::from_name(text), Shading::ALL.iter().map(|choice| choice.name()))
+}
+
+fn reflection(text: &str) -> Result<ReflectionModel, String> {
+    named(ReflectionModel::from_name(text), ReflectionModel::ALL.iter().map(|choice| choice.name()))
+}
+
+fn display(text: &str) -> Result<Display, String> {
+    named(Display::from_name(text), Display::ALL.iter().map(|choice| choice.name()))
+}

@@ -1,0 +1,87 @@
+//! `lumbre bake`: a level in, the same level with lightmaps out.
+
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use lumbre::bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre::scene::save;
+
+use crate::arguments::{Bake, BakeQuality};
+use crate::loading::load;
+use crate::output::progress_bar;
+
+/// Runs the command.
+pub fn run(asked: &Bake) -> anyhow::Result<()> {
+    let mut world = load(&asked.input)?;
+    if asked.resume {
+        eprintln!(
+            "lumbre: note: there is no checkpoint of {}: baking from the start",
+            asked.output.display()
+        );
+    }
+    let density = match (asked.texels_per_meter, asked.map_size) {
+        (Some(density), _) => Density::TexelsPerMeter(density),
+        (None, Some(side)) => Density::MapSize(side),
+        (None, None) => Density::Automatic,
+    };
+    let options = BakeOptions {
+        density,
+        error: asked.error,
+        time: asked.time.map(Duration::from_secs_f64),
+        quality: match asked.quality {
+            BakeQuality::Draft => Quality::Draft,
+            BakeQuality::Final => Quality::Final,
+        },
+        threads: asked.threads.map(usize::from),
+        ..BakeOptions::default()
+    };
+    let bar = progress_bar();
+    let report = bake(&mut world, &options, &mut |progress| {
+        bar.set_message(progress.stage);
+        bar.set_position((progress.fraction * 1000.0) as u64);
+        ControlFlow::Continue(())
+    })?;
+    bar.finish_and_clear();
+    save(&mut world, &asked.output)?;
+    for warning in &report.warnings {
+        eprintln!("lumbre: warning: {warning}");
+    }
+    let mut out = std::io::stdout().lock();
+    if asked.json {
+        serde_json::to_writer_pretty(&mut out, &report)?;
+        writeln!(out)?;
+    } else {
+        write!(out, "{}", summary(&report))?;
+    }
+    Ok(())
+}
+
+/// The report for people.
+fn summary(report: &BakeReport) -> String {
+    let mut text = format!(
+        "{} maps, {} texels ({:.0} % covered), {} patches, {:.1} million rays at {:.2} Mrays/s\n\
+         estimated error {:.2} % ({}), {:.1} s on {} threads\n",
+        report.maps,
+        report.texels,
+        100.0 * report.coverage,
+        report.patches,
+        report.rays as f64 * 1e-6,
+        report.mega_rays_per_second,
+        100.0 * report.estimated_error,
+        if report.error_reached {
+            "reached"
+        } else {
+            "not reached: give it more --time or ask for a larger --error"
+        },
+        report.seconds,
+        report.threads,
+    );
+    for stage in &report.stages {
+        text.push_str(&format!("  {:24} {:7.2} s\n", stage.stage, stage.seconds));
+    }
+    for skipped in &report.skipped {
+        text.push_str(&format!("  skipped: {skipped}\n"));
+    }
+    text
+}

@@ -1,0 +1,80 @@
+//! From a file to a World with a camera, and from the command line's words to a frame's options.
+
+use std::path::Path;
+
+use anyhow::bail;
+use bevy_ecs::prelude::*;
+use lumbre::render::{Display, FrameOptions};
+use lumbre::scene::{self, Camera, GlobalTransform, Name};
+
+use crate::arguments::Frame;
+
+/// Loads a scene; what the importer has to remark goes to standard error.
+pub fn load(path: &Path) -> anyhow::Result<World> {
+    let mut world = World::new();
+    let report = scene::load(&mut world, path)?;
+    for note in &report.notes {
+        eprintln!("lumbre: note: {}: {note}", path.display());
+    }
+    Ok(world)
+}
+
+/// The options that the command line asks for. A scene without a camera gets one.
+pub fn frame_options(
+    world: &mut World,
+    frame: &Frame,
+    display: Display,
+    aspect: f64,
+) -> anyhow::Result<FrameOptions> {
+    Ok(FrameOptions {
+        camera: Some(camera(world, frame.camera.as_deref(), aspect)?),
+        shading: frame.shading,
+        reflection: frame.reflection,
+        lightmaps: !frame.no_lightmaps,
+        multisample: frame.msaa,
+        display,
+        exposure: frame.exposure.map(|exposure| exposure as f32),
+        full_precision: display != Display::Srgb,
+        ..FrameOptions::default()
+    })
+}
+
+/// The camera by name or index, or the first one, or one made to see everything.
+fn camera(world: &mut World, asked: Option<&str>, aspect: f64) -> anyhow::Result<Entity> {
+    let mut query = world.query_filtered::<(Entity, Option<&Name>), (With<Camera>, With<GlobalTransform>)>();
+    let mut cameras: Vec<(Entity, String)> = query
+        .iter(world)
+        .map(|(entity, name)| (entity, name.map_or(String::new(), ToString::to_string)))
+        .collect();
+    cameras.sort();
+    let Some(asked) = asked else {
+        return Ok(match cameras.first() {
+            Some((entity, _)) => *entity,
+            None => {
+                let made = scene::default_camera(world, aspect);
+                let entity = world.spawn(made).id();
+                scene::update_transforms(world);
+                entity
+            }
+        });
+    };
+    if let Some((entity, _)) = cameras.iter().find(|(_, name)| name == asked) {
+        return Ok(*entity);
+    }
+    if let Some((entity, _)) = asked.parse::<usize>().ok().and_then(|index| cameras.get(index)) {
+        return Ok(*entity);
+    }
+    let names: Vec<_> = cameras.iter().enumerate().map(|(i, (_, name))| format!("{i} {name}")).collect();
+    if names.is_empty() {
+        bail!("there is no camera `{asked}`: the scene has none (leave --camera out to see all of it)");
+    }
+    bail!("there is no camera `{asked}`; there are: {}", names.join(", "))
+}
+
+/// Lower-case extension of a path.
+pub fn extension(path: &Path) -> anyhow::Result<String> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some(extension) => Ok(extension.to_ascii_lowercase()),
+        None => bail!("{}: the name has no extension to tell the format by", path.display()),
+    }
+}

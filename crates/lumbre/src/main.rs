@@ -1,0 +1,37 @@
+//! The `lumbre` program: reads the command line, runs one command, turns its outcome into an exit status.
+
+mod arguments;
+mod bake;
+mod explain;
+mod loading;
+mod output;
+mod play;
+mod render;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::arguments::{Arguments, Command};
+
+fn main() -> ExitCode {
+    // Bad usage ends in here, with exit status 2.
+    let arguments = Arguments::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_env("LUMBRE_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn,wgpu_hal=error,wgpu_core=error"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    let outcome = match arguments.command {
+        None => play::run(&arguments::Play::default()),
+        Some(Command::Play(options)) => play::run(&options),
+        Some(Command::Bake(options)) => bake::run(&options),
+        Some(Command::Render(options)) => render::run(&options),
+        Some(Command::Explain(options)) => explain::run(&options),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("lumbre: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

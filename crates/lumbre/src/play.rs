@@ -1,0 +1,77 @@
+//! `lumbre play`: the demo level, or any other. Without a display, a tour of it in PNG frames.
+
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use lumbre::bake::{BakeOptions, bake};
+use lumbre::demo;
+use lumbre::scene;
+
+use crate::arguments::Play;
+use crate::loading::load;
+use crate::output::progress_bar;
+
+/// Frames of the tour, and their size.
+const TOUR: (u32, (u32, u32)) = (12, (960, 540));
+
+/// Runs the command.
+pub fn run(asked: &Play) -> anyhow::Result<()> {
+    let level = match &asked.level {
+        Some(level) => level.clone(),
+        None => demo_level()?,
+    };
+    if asked.headless || !demo::has_display() {
+        let (frames, size) = TOUR;
+        let paths = demo::tour(&level, &asked.frames_dir, frames, size)?;
+        let mut out = std::io::stdout().lock();
+        for path in paths {
+            writeln!(out, "{}", path.display())?;
+        }
+        return Ok(());
+    }
+    let options = demo::PlayOptions {
+        title: format!("Lumbre: {}", level.file_stem().unwrap_or_default().to_string_lossy()),
+        input: asked.input.clone(),
+        record: asked.record.clone(),
+        screenshot: asked.screenshot.clone(),
+        quit_after: asked.quit_after,
+        ..demo::PlayOptions::default()
+    };
+    demo::run(&level, options)
+}
+
+/// The baked demo level; baked now if it is not there or older than the level.
+fn demo_level() -> anyhow::Result<PathBuf> {
+    let source = demo_source()?;
+    let baked = source.with_file_name("demo.baked.glb");
+    let time = |path: &Path| std::fs::metadata(path).and_then(|data| data.modified()).ok();
+    if time(&baked).is_some_and(|baked| time(&source).is_none_or(|source| source <= baked)) {
+        return Ok(baked);
+    }
+    eprintln!("lumbre: baking {} (once)", source.display());
+    let mut world = load(&source)?;
+    let bar = progress_bar();
+    let options = BakeOptions { error: 0.02, ..BakeOptions::default() };
+    bake(&mut world, &options, &mut |progress| {
+        bar.set_message(progress.stage);
+        bar.set_position((progress.fraction * 1000.0) as u64);
+        ControlFlow::Continue(())
+    })?;
+    bar.finish_and_clear();
+    scene::save(&mut world, &baked)?;
+    Ok(baked)
+}
+
+/// `assets/demo.glb` under the working folder, beside the program, or in the source tree it was built from.
+fn demo_source() -> anyhow::Result<PathBuf> {
+    let mut places = vec![PathBuf::from("assets")];
+    if let Some(folder) = std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned())) {
+        places.push(folder.join("assets"));
+    }
+    places.push(PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets")));
+    places.iter().map(|place| place.join("demo.glb")).find(|path| path.exists()).context(
+        "the demo level assets/demo.glb is not found: run this in the project's folder, or name a level",
+    )
+}

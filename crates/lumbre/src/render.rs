@@ -1,0 +1,131 @@
+//! `lumbre render`: frames without a window, and what they cost.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use lumbre::graph;
+use lumbre::render::{Display, Gpu, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
+use serde::Serialize;
+
+use crate::arguments::Render;
+use crate::loading::{extension, frame_options, load};
+use crate::output::write_file;
+
+/// What `--timings` writes.
+#[derive(Serialize)]
+struct Timings {
+    /// The device and its driver: figures mean little without them.
+    device: String,
+    width: u32,
+    height: u32,
+    frames: Vec<FrameTimes>,
+}
+
+/// One frame.
+#[derive(Serialize)]
+struct FrameTimes {
+    /// From the call to the finished frame, the GPU waited for.
+    wall_ms: f64,
+    cpu_ms: Option<f64>,
+    gpu_ms: Option<f64>,
+    statistics: Statistics,
+    passes: Vec<PassTimes>,
+}
+
+/// One pass.
+#[derive(Serialize)]
+struct PassTimes {
+    name: String,
+    /// Passes of the same group were merged into one.
+    group: usize,
+    cpu_ms: Option<f64>,
+    gpu_ms: Option<f64>,
+    vertex_invocations: Option<u64>,
+    fragment_invocations: Option<u64>,
+    /// Lights that an invocation of this pass looks at.
+    lights_tested: u32,
+    /// Lights that an invocation of this pass evaluates; all that it looks at, as long as none is culled.
+    lights_shaded: u32,
+}
+
+/// Runs the command.
+pub fn run(asked: &Render) -> anyhow::Result<()> {
+    let floats = match extension(&asked.output)?.as_str() {
+        "png" => false,
+        "exr" => true,
+        other => bail!("{}: .{other} is not written, only .png and .exr", asked.output.display()),
+    };
+    let mut world = load(&asked.input)?;
+    let (width, height) = asked.size;
+    let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
+    let aspect = f64::from(width) / f64::from(height);
+    let mut options = frame_options(&mut world, &asked.frame, display, aspect)?;
+    if asked.timings.is_some() {
+        options.measure = Measure::TimeAndInvocations;
+    }
+    let gpu = Gpu::headless()?;
+    let mut renderer = Renderer::new(&gpu);
+    let format = if floats { OffscreenFormat::LinearFloat } else { OffscreenFormat::Rgba8 };
+    let target = Offscreen::new(&gpu, width, height, format)?;
+    let mut frames = Vec::new();
+    for _ in 0..asked.frames {
+        let start = Instant::now();
+        let report = renderer
+            .render(&mut world, &target.target(), &options)
+            .with_context(|| format!("{} could not be drawn", asked.input.display()))?;
+        let measured = renderer.wait()?.cloned();
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        frames.push(frame_times(wall_ms, report.statistics, measured));
+    }
+    write_frame(&asked.output, &gpu, &target, floats)?;
+    if let Some(path) = &asked.timings {
+        let timings = Timings { device: gpu.describe(), width, height, frames };
+        write_file(path, |path| Ok(std::fs::write(path, serde_json::to_string_pretty(&timings)? + "\n")?))?;
+    }
+    Ok(())
+}
+
+fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::FrameReport>) -> FrameTimes {
+    let measured = measured.unwrap_or_default();
+    let passes = measured.passes.iter().map(|pass| {
+        let lights = match pass.name.as_ref() {
+            "lightmap" | "forward" | "transparent" => statistics.lights,
+            _ => 0,
+        };
+        PassTimes {
+            name: pass.name.to_string(),
+            group: pass.group,
+            cpu_ms: pass.cpu_ms,
+            gpu_ms: pass.gpu.ms(),
+            vertex_invocations: pass.invocations.map(|counts| counts.vertex),
+            fragment_invocations: pass.invocations.map(|counts| counts.fragment),
+            lights_tested: lights,
+            lights_shaded: lights,
+        }
+    });
+    FrameTimes {
+        wall_ms,
+        cpu_ms: measured.cpu_ms,
+        gpu_ms: measured.gpu_ms,
+        statistics,
+        passes: passes.collect(),
+    }
+}
+
+fn write_frame(path: &Path, gpu: &Gpu, target: &Offscreen, floats: bool) -> anyhow::Result<()> {
+    let (width, height) = target.size();
+    let image = if floats {
+        let values: Vec<f32> =
+            target.read_linear(gpu)?.iter().flat_map(|pixel| pixel.truncate().to_array()).collect();
+        image::Rgb32FImage::from_raw(width, height, values).map(image::DynamicImage::ImageRgb32F)
+    } else {
+        let mut bytes = target.read_rgba8(gpu)?;
+        // A picture of a scene is opaque, whatever blending left in the alpha channel.
+        bytes.chunks_exact_mut(4).for_each(|pixel| pixel[3] = 255);
+        image::RgbaImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgba8)
+    };
+    let image = image.context("the frame has another size than was asked for")?;
+    let path: PathBuf = path.to_owned();
+    write_file(&path, |path| Ok(image.save(path)?))
+}

@@ -1,0 +1,222 @@
+//! The command line as its users meet it: exit statuses, messages, files, pipes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre::optics::{Light, Material, Surface};
+use lumbre::scene::{Camera, Mesh, StaticObject, Transform};
+
+fn lumbre(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lumbre")).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A folder with a small level: a floor, a ball, a lamp panel, a light, a camera.
+fn level() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("level.glb");
+    let mut world = World::new();
+    let floor = Arc::new(lumbre::mesh::shapes::cuboid(Vec3::new(6.0, 0.2, 6.0), 1));
+    world.spawn((Mesh(floor), Material::matt(Vec3::new(0.6, 0.5, 0.4)), StaticObject));
+    let ball = Arc::new(lumbre::mesh::shapes::uv_sphere(0.7, 24, 12));
+    let red = Material::from_metallic_roughness(Vec3::new(0.8, 0.1, 0.1), 0.0, 0.4);
+    world.spawn((Mesh(ball), red, StaticObject, Transform::from_xyz(0.0, 0.9, 0.0)));
+    let lamp = Surface { emission: Vec3::splat(8.0), ..Surface::default() };
+    let panel = Arc::new(lumbre::mesh::shapes::cuboid(Vec3::new(1.0, 0.1, 1.0), 1));
+    let glow = Material { front: lamp, ..Material::default() };
+    world.spawn((Mesh(panel), glow, StaticObject, Transform::from_xyz(-2.0, 3.0, 0.0)));
+    world.spawn((Light::point(Vec3::splat(3.0)), Transform::from_xyz(1.5, 2.5, 1.5)));
+    world.spawn((
+        bevy_ecs::name::Name::new("view"),
+        Camera::default(),
+        Transform::from_xyz(0.0, 2.5, 6.0).looking_at(DVec3::new(0.0, 0.8, 0.0), DVec3::Y),
+    ));
+    for (name, x) in [("tour 1", -3.0), ("tour 2", 3.0)] {
+        let place = Transform::from_xyz(x, 2.0, 5.0).looking_at(DVec3::new(0.0, 0.8, 0.0), DVec3::Y);
+        world.spawn((bevy_ecs::name::Name::new(name), Camera::default(), place));
+    }
+    lumbre::scene::save(&mut world, &path).unwrap();
+    (folder, path)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn help_shows_examples_and_bad_usage_exits_with_2() {
+    for command in
+        [vec!["--help"], vec!["bake", "--help"], vec!["render", "--help"], vec!["explain", "--help"]]
+    {
+        let output = lumbre(&command);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(stdout(&output).contains("Examples:"), "{command:?}");
+    }
+    for command in [
+        vec!["paint"],
+        vec!["render", "a.glb"],
+        vec!["render", "a.glb", "-o", "a.png", "--shading", "shiny"],
+        vec!["render", "a.glb", "-o", "a.png", "--size", "0x5"],
+        vec!["bake", "a.glb", "-o", "b.glb", "--error", "-1"],
+        vec!["bake", "a.glb", "-o", "b.glb", "--map-size", "64", "--texels-per-meter", "2"],
+    ] {
+        let output = lumbre(&command);
+        assert_eq!(output.status.code(), Some(2), "{command:?}: {}", stderr(&output));
+        assert!(stdout(&output).is_empty());
+    }
+}
+
+#[test]
+fn a_failed_job_exits_with_1_and_names_the_file() {
+    let (folder, path) = level();
+    let missing = lumbre(&["render", "nowhere.glb", "-o", "x.png"]);
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(stderr(&missing).contains("nowhere.glb"), "{}", stderr(&missing));
+
+    let broken = folder.path().join("broken.glb");
+    std::fs::write(&broken, &std::fs::read(&path).unwrap()[..200]).unwrap();
+    let output = lumbre(&["explain", text(&broken)]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("broken.glb"), "{}", stderr(&output));
+
+    let gif = folder.path().join("frame.gif");
+    let output = lumbre(&["render", text(&path), "-o", text(&gif)]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains(".gif") && !gif.exists());
+
+    let camera = folder.path().join("frame.png");
+    let output = lumbre(&["render", text(&path), "-o", text(&camera), "--camera", "roof"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("view"), "the cameras that there are: {}", stderr(&output));
+    let unwritable = lumbre(&["render", text(&path), "-o", text(&folder.path().join("no/such/frame.png"))]);
+    assert_eq!(unwritable.status.code(), Some(1));
+    assert!(stderr(&unwritable).contains("frame.png"), "{}", stderr(&unwritable));
+}
+
+#[test]
+fn frames_and_timings_are_written_whole() {
+    let (folder, path) = level();
+    let (png, exr, times) =
+        (folder.path().join("frame.png"), folder.path().join("frame.exr"), folder.path().join("times.json"));
+    let output = lumbre(&[
+        "render",
+        text(&path),
+        "-o",
+        text(&png),
+        "--size",
+        "96x64",
+        "--camera",
+        "view",
+        "--frames",
+        "3",
+        "--timings",
+        text(&times),
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stdout(&output).is_empty());
+    let frame = image::open(&png).unwrap().to_rgb8();
+    assert_eq!(frame.dimensions(), (96, 64));
+    let red = frame.pixels().filter(|pixel| pixel.0[0] / 2 > pixel.0[1] && pixel.0[0] > 60).count();
+    assert!(red > 50, "the ball is not to be seen: {red} red pixels");
+
+    let timings: serde_json::Value = serde_json::from_slice(&std::fs::read(&times).unwrap()).unwrap();
+    let frames = timings["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    let forward =
+        frames[2]["passes"].as_array().unwrap().iter().find(|pass| pass["name"] == "forward").unwrap();
+    assert_eq!(forward["lights_tested"], 1);
+    assert!(forward["fragment_invocations"].as_u64().unwrap() > 500);
+    assert!(frames[2]["wall_ms"].as_f64().unwrap() > 0.0);
+
+    let output = lumbre(&[
+        "render",
+        text(&path),
+        "-o",
+        text(&exr),
+        "--size",
+        "96x64",
+        "--camera",
+        "view",
+        "--shading",
+        "flat",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let linear = image::open(&exr).unwrap().to_rgb32f();
+    assert!(linear.pixels().any(|pixel| pixel.0[0] > 1.0), "an EXR keeps the lamp's radiance");
+    let left_over = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left_over, 4, "level, two frames and the timings; nothing half-written");
+}
+
+#[test]
+fn a_bake_is_loaded_explained_and_drawn() {
+    let (folder, path) = level();
+    let baked = folder.path().join("level.baked.glb");
+    let arguments =
+        ["bake", text(&path), "-o", text(&baked), "--quality", "draft", "--map-size", "32", "--json"];
+    let output = lumbre(&arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert!(report["estimated_error"].as_f64().unwrap() < 0.2);
+    assert!(!stderr(&output).contains('\r'), "a progress bar in a pipe: {}", stderr(&output));
+
+    let before = stdout(&lumbre(&["explain", text(&path)]));
+    assert!(before.contains("the scene has no lightmapped mesh"), "{before}");
+    assert!(!before.contains("LIGHTMAP"), "{before}");
+    let after = lumbre(&["explain", text(&baked), "--format", "json"]);
+    let after: serde_json::Value = serde_json::from_str(&stdout(&after)).unwrap();
+    assert_eq!(after["census"]["lightmapped"], 3);
+    let variants = after["variants"].as_object().unwrap();
+    assert!(variants.keys().all(|variant| variant.contains("LIGHTMAP")), "{variants:?}");
+    assert!(variants.keys().all(|variant| !variant.contains("TEXTURE")), "{variants:?}");
+    assert!(stdout(&lumbre(&["explain", text(&baked), "--format", "dot"])).starts_with("digraph"));
+
+    // The lamp panel lights nothing before the bake and the floor under it afterwards.
+    let red_sum = |path: &Path, name: &str| {
+        let frame = folder.path().join(name);
+        let output = lumbre(&[
+            "render",
+            text(path),
+            "-o",
+            text(&frame),
+            "--size",
+            "64x48",
+            "--camera",
+            "view",
+            "--display",
+            "linear",
+        ]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let frame = image::open(&frame).unwrap().to_rgb32f();
+        frame.pixels().map(|pixel| f64::from(pixel.0[0].min(1.0))).sum::<f64>()
+    };
+    let (unlit, lit) = (red_sum(&path, "before.exr"), red_sum(&baked, "after.exr"));
+    assert!(lit > 1.2 * unlit, "baked light adds to the frame: {unlit} before, {lit} after");
+}
+
+#[test]
+fn playing_without_a_display_draws_a_tour() {
+    let (folder, path) = level();
+    let frames = folder.path().join("tour");
+    let output = Command::new(env!("CARGO_BIN_EXE_lumbre"))
+        .args(["play", text(&path), "--frames-dir", text(&frames)])
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let paths: Vec<PathBuf> = stdout(&output).lines().map(PathBuf::from).collect();
+    assert!(paths.len() >= 6, "{paths:?}");
+    let pictures: Vec<_> = paths.iter().map(|path| image::open(path).unwrap().to_rgb8().into_raw()).collect();
+    assert!(pictures[0] != pictures[pictures.len() / 2], "the tour stands still");
+}

@@ -1,0 +1,112 @@
+//! Baked scenes: what the baker writes is what the frame shows, in the twin too, and it looks like radiosity.
+
+use std::ops::ControlFlow;
+
+use bevy_ecs::prelude::*;
+use glam::DVec3;
+use lumbre_bake::{BakeOptions, Density, Quality, bake};
+use lumbre_render::FrameOptions;
+use lumbre_scene::{Lightmap, default_camera};
+use lumbre_tests::compare::compare;
+use lumbre_tests::shared_files::shared_file;
+use lumbre_tests::twin::{self, TwinOptions};
+
+use crate::adapter::{draw, linear};
+
+const SIZE: usize = 120;
+
+/// f16 lightmaps round to 2^-11 relative, the texture unit's bilinear weights to 2^-8 of the step between texels (Vulkan's least
+/// precision): with steps of at most a tenth of the radiance near 1 that is 5e-4 + 4e-4.
+const LARGEST: f64 = 2e-3;
+const RELATIVE_L2: f64 = 1e-3;
+
+fn baked_cornell_box() -> Option<World> {
+    let mut world = World::new();
+    lumbre_scene::load(&mut world, &shared_file("models/cornell_box.glb")?).unwrap();
+    let options = BakeOptions {
+        density: Density::MapSize(64),
+        quality: Quality::Draft,
+        error: 0.05,
+        ..BakeOptions::default()
+    };
+    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let camera = default_camera(&mut world, 1.0);
+    world.spawn(camera);
+    Some(world)
+}
+
+#[test]
+fn the_baked_cornell_box_shows_its_lightmaps() {
+    let Some(mut world) = baked_cornell_box() else { return };
+    let (got, report) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
+    assert!(report.plan.status("lightmap").unwrap().runs());
+    let expected = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default());
+    // The lamp's radiance of 100 would drown the rest in the norm.
+    let interior: Vec<_> =
+        expected.interior(false).into_iter().map(|p| p.filter(|p| p.max_element() < 10.0)).collect();
+    let some: Vec<_> = got.iter().copied().map(Some).collect();
+    let difference = compare(&some, &interior);
+    println!("{difference:?}");
+    assert!(difference.pixels > SIZE * SIZE / 2);
+    assert!(difference.largest < LARGEST, "{difference:?}");
+    assert!(difference.relative_l2 < RELATIVE_L2, "{difference:?}");
+
+    // Negative control: without its lightmaps the box is black but for the lamp.
+    let (dark, report) =
+        draw(&mut world, SIZE as u32, SIZE as u32, &FrameOptions { lightmaps: false, ..linear() });
+    assert!(!report.plan.status("lightmap").unwrap().runs());
+    let dark: Vec<_> = dark.into_iter().map(Some).collect();
+    assert!(compare(&dark, &interior).relative_l2 > 0.9);
+}
+
+#[test]
+fn colour_bleeds_and_nothing_inside_is_black() {
+    let Some(mut world) = baked_cornell_box() else { return };
+    let (pixels, _) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
+    let frame = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default());
+    let mut found = world.query::<(&lumbre_scene::Mesh, &lumbre_scene::Primitive)>();
+    let names: Vec<String> = found.iter(&world).map(|(_, primitive)| primitive.mesh.to_string()).collect();
+    assert!(names.iter().any(|name| name == "large_box"), "{names:?}");
+    // The side of the tall box that faces the red wall on the left is redder than it is green, the floor is grey-ish and lit.
+    let of = |name: &str, left: bool| -> Vec<DVec3> {
+        let of_object = |at: usize| frame.surface[at].is_some_and(|(object, _)| names[object] == name);
+        let columns: Vec<usize> = (0..SIZE * SIZE).filter(|&at| of_object(at)).map(|at| at % SIZE).collect();
+        let (low, high) = (columns.iter().min().unwrap_or(&0), columns.iter().max().unwrap_or(&0));
+        let edge = if left { low + (high - low) / 12 } else { high - (high - low) / 12 };
+        (0..SIZE * SIZE)
+            .filter(|&at| of_object(at) && if left { at % SIZE <= edge } else { at % SIZE >= edge })
+            .map(|at| pixels[at])
+            .collect()
+    };
+    let mean = |values: Vec<DVec3>| values.iter().sum::<DVec3>() / values.len().max(1) as f64;
+    let left = mean(of("large_box", true));
+    assert!(left.x > 2.0 * left.y, "the side towards the red wall is {left}");
+    let right = mean(of("small_box", false));
+    assert!(right.y > 1.5 * right.x, "the side towards the green wall is {right}");
+    let black = (0..SIZE * SIZE)
+        .filter(|&at| frame.surface[at].is_some() && pixels[at].max_element() < 1e-4)
+        .count();
+    assert_eq!(black, 0, "{black} pixels of surfaces are black");
+}
+
+#[test]
+fn static_lights_of_a_baked_level_are_not_counted_twice() {
+    use lumbre_optics::{BakeMode, Light, Material};
+    use lumbre_scene::{Camera, Mesh, StaticObject, Transform};
+    let mut world = World::new();
+    let floor = std::sync::Arc::new(lumbre_mesh::shapes::cuboid(glam::Vec3::new(4.0, 0.2, 4.0), 1));
+    world.spawn((Mesh(floor), Material::matt(glam::Vec3::splat(0.5)), StaticObject));
+    let lamp = Light { bake: BakeMode::Static, ..Light::point(glam::Vec3::splat(4.0)) };
+    world.spawn((lamp, Transform::from_xyz(0.0, 2.0, 0.0)));
+    world.spawn((Camera::default(), Transform::from_xyz(0.0, 3.0, 0.01).looking_at(DVec3::ZERO, DVec3::NEG_Z)));
+    let center = |world: &mut World| draw(world, 33, 33, &linear()).0[16 * 33 + 16].x;
+    let shaded = center(&mut world);
+    let options =
+        BakeOptions { density: Density::MapSize(64), quality: Quality::Draft, ..BakeOptions::default() };
+    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(world.query::<&Lightmap>().iter(&world).count(), 1);
+    let baked = center(&mut world);
+    // One lamp over a convex floor: no bounce, so baked and shaded light are the same but for the texels' width (1/8 m at 1.9 m under
+    // the lamp: the inverse square and the cosine change by under 1 % over it) and sampling.
+    assert!((baked / shaded - 1.0).abs() < 0.02, "shaded {shaded}, baked {baked}");
+}
