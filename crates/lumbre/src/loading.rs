@@ -9,6 +9,10 @@ use lumbre::scene::{self, Camera, GlobalTransform, Name};
 
 use crate::arguments::Frame;
 
+/// The nodes of the loaded file, in its order: `--camera INDEX` counts by it.
+#[derive(Resource)]
+struct FileOrder(Vec<Entity>);
+
 /// Loads a scene; what the importer has to remark goes to standard error.
 pub fn load(path: &Path) -> anyhow::Result<World> {
     let mut world = World::new();
@@ -16,6 +20,7 @@ pub fn load(path: &Path) -> anyhow::Result<World> {
     for note in &report.notes {
         eprintln!("lumbre: note: {}: {note}", path.display());
     }
+    world.insert_resource(FileOrder(report.nodes));
     Ok(world)
 }
 
@@ -41,12 +46,17 @@ pub fn frame_options(
 
 /// The camera by name or index, or the first one, or one made to see everything.
 fn camera(world: &mut World, asked: Option<&str>, aspect: f64) -> anyhow::Result<Entity> {
-    let mut query = world.query_filtered::<(Entity, Option<&Name>), (With<Camera>, With<GlobalTransform>)>();
-    let mut cameras: Vec<(Entity, String)> = query
+    let order = world.remove_resource::<FileOrder>().map_or(Vec::new(), |order| order.0);
+    let place = |entity: Entity| order.iter().position(|node| *node == entity).unwrap_or(usize::MAX);
+    let mut query =
+        world.query_filtered::<(Entity, Option<&Name>), (With<Camera>, With<GlobalTransform>)>();
+    let mut cameras: Vec<(usize, Entity, String)> = query
         .iter(world)
-        .map(|(entity, name)| (entity, name.map_or(String::new(), ToString::to_string)))
+        .map(|(entity, name)| (place(entity), entity, name.map_or(String::new(), ToString::to_string)))
         .collect();
     cameras.sort();
+    let cameras: Vec<(Entity, String)> =
+        cameras.into_iter().map(|(_, entity, name)| (entity, name)).collect();
     let Some(asked) = asked else {
         return Ok(match cameras.first() {
             Some((entity, _)) => *entity,

@@ -43,10 +43,10 @@ struct PassTimes {
     gpu_ms: Option<f64>,
     vertex_invocations: Option<u64>,
     fragment_invocations: Option<u64>,
-    /// Lights that an invocation of this pass looks at.
+    /// Lights that were tested against each object of this pass.
     lights_tested: u32,
-    /// Lights that an invocation of this pass evaluates; all that it looks at, as long as none is culled.
-    lights_shaded: u32,
+    /// Lights that reach an object in view and that its vertices or fragments evaluate, on average.
+    lights_shaded: f32,
 }
 
 /// Runs the command.
@@ -89,10 +89,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
 fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::FrameReport>) -> FrameTimes {
     let measured = measured.unwrap_or_default();
     let passes = measured.passes.iter().map(|pass| {
-        let lights = match pass.name.as_ref() {
-            "lightmap" | "forward" | "transparent" => statistics.lights,
-            _ => 0,
-        };
+        let lit = ["lightmap", "forward", "transparent"].contains(&pass.name.as_ref());
         PassTimes {
             name: pass.name.to_string(),
             group: pass.group,
@@ -100,8 +97,8 @@ fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::Fra
             gpu_ms: pass.gpu.ms(),
             vertex_invocations: pass.invocations.map(|counts| counts.vertex),
             fragment_invocations: pass.invocations.map(|counts| counts.fragment),
-            lights_tested: lights,
-            lights_shaded: lights,
+            lights_tested: if lit { statistics.lights } else { 0 },
+            lights_shaded: if lit { statistics.lights_per_object } else { 0.0 },
         }
     });
     FrameTimes {

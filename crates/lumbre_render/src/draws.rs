@@ -7,6 +7,8 @@ use glam::DVec3;
 use lumbre_scene::SceneSettings;
 
 use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects};
+use crate::layout::InstanceData;
+use crate::light_lists::LightLists;
 use crate::mesh_buffers::MeshKey;
 use crate::pipelines::PipelineKey;
 use crate::shader::Feature;
@@ -19,7 +21,7 @@ pub(crate) struct Batch {
     pub mesh: MeshKey,
     pub texture_set: Option<Arc<TextureSet>>,
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
-    /// Into the draw list.
+    /// Into the frame's instances.
     pub instances: Range<u32>,
 }
 
@@ -29,8 +31,8 @@ pub(crate) struct Draws {
     pub lightmapped: Vec<Batch>,
     pub opaque: Vec<Batch>,
     pub transparent: Vec<Batch>,
-    /// From instance to slot.
-    pub list: Vec<u32>,
+    /// In the order of the draws.
+    pub instances: Vec<InstanceData>,
     /// Objects outside the view.
     pub outside: usize,
 }
@@ -50,8 +52,8 @@ impl Draws {
         view: &CameraView,
         settings: &SceneSettings,
         frame: &FrameFeatures,
-        format: wgpu::TextureFormat,
-        samples: u32,
+        (format, samples): (wgpu::TextureFormat, u32),
+        lights: &mut LightLists,
     ) -> Self {
         let mut draws = Self::default();
         let planes = view.frustum(objects.origin);
@@ -84,15 +86,17 @@ impl Draws {
             a.pass.cmp(&b.pass).then(order).then(a.slot.cmp(&b.slot))
         });
         for seen in visible {
-            draws.push(&seen);
+            draws.push(&seen, lights);
         }
         draws
     }
 
     /// Adds an instance, to the last batch if it fits.
-    fn push(&mut self, seen: &Visible) {
-        let instance = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
-        self.list.push(u32::try_from(seen.slot).unwrap_or(u32::MAX));
+    fn push(&mut self, seen: &Visible, lights: &mut LightLists) {
+        let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
+        let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
+        let list = lights.reaching(seen.object.center, seen.object.half_size);
+        self.instances.push(InstanceData { object, ..list });
         let batches = match seen.pass {
             LitPass::Lightmap => &mut self.lightmapped,
             LitPass::Forward => &mut self.opaque,

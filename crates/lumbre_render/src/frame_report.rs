@@ -5,12 +5,14 @@ use std::sync::Arc;
 use lumbre_graph::Plan;
 
 /// Counts of one frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
     /// Lights that are on, ambient ones apart.
     pub lights: u32,
     /// Of these, the static ones: a lightmapped mesh takes their highlights only. 0 while lightmaps are switched off.
     pub static_lights: u32,
+    /// Lights that reach an object in view, on average: what each of its vertices or fragments loops over.
+    pub lights_per_object: f32,
     /// Objects in view.
     pub objects: usize,
     /// Objects outside the view, not drawn.

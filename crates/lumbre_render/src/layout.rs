@@ -11,14 +11,24 @@ use lumbre_scene::{GlobalTransform, MaterialTextures, TextureReference};
 pub(crate) struct FrameData {
     pub clip_from_frame: [[f32; 4]; 4],
     pub eye: Vec3,
-    pub dynamic_lights: u32,
-    pub backward: Vec3,
-    pub all_lights: u32,
-    pub ambient: Vec3,
     pub exposure: f32,
-    pub fog_color: Vec3,
+    pub backward: Vec3,
     pub padding: f32,
+    pub ambient: Vec3,
+    pub padding_2: f32,
+    pub fog_color: Vec3,
+    pub padding_3: f32,
     pub fog_parameters: [f32; 4],
+}
+
+/// `Instance`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct InstanceData {
+    pub object: u32,
+    pub first_light: u32,
+    pub dynamic_end: u32,
+    pub static_end: u32,
 }
 
 /// `Object`.

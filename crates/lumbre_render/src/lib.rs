@@ -40,6 +40,7 @@ mod frame_report;
 mod gpu;
 mod growable_buffer;
 mod layout;
+mod light_lists;
 mod mesh_buffers;
 mod offscreen;
 mod options;

@@ -47,10 +47,10 @@ pub(crate) struct GpuMesh {
     indices: Option<wgpu::Buffer>,
     /// Three vertices per triangle, for flat shading.
     expanded: VertexBuffers,
-    /// Bounding sphere in mesh space.
+    /// Middle of the bounding box in mesh space.
     pub center: DVec3,
-    /// Its radius in metres.
-    pub radius: f64,
+    /// Half its sides.
+    pub half_size: DVec3,
 }
 
 /// A draw's worth of buffers.
@@ -66,11 +66,11 @@ impl GpuMesh {
         for position in source.positions.iter().filter(|position| position.is_finite()) {
             (min, max) = (min.min(*position), max.max(*position));
         }
-        let (center, radius) = if min.cmple(max).all() {
+        let (center, half_size) = if min.cmple(max).all() {
             let (min, max) = (min.as_dvec3(), max.as_dvec3());
-            (0.5 * (min + max), 0.5 * (max - min).length())
+            (0.5 * (min + max), 0.5 * (max - min))
         } else {
-            (DVec3::ZERO, 0.0)
+            (DVec3::ZERO, DVec3::ZERO)
         };
         Self {
             source,
@@ -78,7 +78,7 @@ impl GpuMesh {
             indices: None,
             expanded: VertexBuffers::default(),
             center,
-            radius,
+            half_size,
         }
     }
 

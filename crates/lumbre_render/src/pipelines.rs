@@ -122,6 +122,7 @@ fn frame_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
             entry(2, storage),
             entry(3, storage),
             entry(4, storage),
+            entry(5, storage),
         ],
     })
 }

@@ -10,7 +10,8 @@ use crate::draws::Draws;
 use crate::extract::{CameraView, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
 use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
 use crate::growable_buffer::GrowableBuffer;
-use crate::layout::{FrameData, LightData};
+use crate::layout::{FrameData, InstanceData, LightData};
+use crate::light_lists::LightLists;
 use crate::mesh_buffers::MeshBuffers;
 use crate::pipelines::{Pipelines, attributes, is_flat};
 use crate::texture_sets::TextureSets;
@@ -23,7 +24,8 @@ pub struct Renderer {
     executor: Executor,
     objects: Objects,
     lights: GrowableBuffer<LightData>,
-    draw_list: GrowableBuffer<u32>,
+    instances: GrowableBuffer<InstanceData>,
+    light_list: GrowableBuffer<u32>,
     meshes: MeshBuffers,
     textures: Textures,
     sets: TextureSets,
@@ -41,7 +43,8 @@ impl Renderer {
             executor: Executor::new(),
             objects: Objects::new(),
             lights: GrowableBuffer::new("lights"),
-            draw_list: GrowableBuffer::new("draw list"),
+            instances: GrowableBuffer::new("instances"),
+            light_list: GrowableBuffer::new("light list"),
             meshes: MeshBuffers::default(),
             textures: Textures::default(),
             sets: TextureSets::default(),
@@ -115,9 +118,10 @@ impl Renderer {
             &mut self.sets,
             view.eye,
         );
-        let mut lights = extract_lights(world, &mut self.lights, self.objects.origin);
+        let (mut lights, mut reaches) = extract_lights(world, &mut self.lights, self.objects.origin);
         if !options.lightmaps {
             lights.dynamic = lights.all;
+            reaches.iter_mut().for_each(|reach| reach.baked = false);
         }
         let exposure = options.exposure.unwrap_or(view.exposure);
         let mut plan = FramePlan::new(self.objects.iter().map(|(_, object)| &object.traits), options);
@@ -129,8 +133,11 @@ impl Renderer {
             clamp: options.display == Display::Clamp,
             lights,
         };
-        let draws = Draws::new(&self.objects, &view, &settings, &features, plan.format, plan.samples);
-        self.draw_list.replace(draws.list.iter().copied());
+        let mut lists = LightLists::new(&reaches);
+        let target_kind = (plan.format, plan.samples);
+        let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
+        self.instances.replace(draws.instances.iter().copied());
+        self.light_list.replace(lists.indices.iter().copied());
         let uploaded_bytes = self.upload(&view, &settings, &lights, exposure)?;
         let mut triangles = 0;
         for batch in draws.batches() {
@@ -149,7 +156,8 @@ impl Renderer {
         let statistics = Statistics {
             lights: lights.all,
             static_lights: lights.all - lights.dynamic,
-            objects: draws.list.len(),
+            lights_per_object: lists.mean_length(),
+            objects: draws.instances.len(),
             objects_outside: draws.outside,
             triangles,
             draws: draws.batches().count(),
@@ -190,32 +198,35 @@ impl Renderer {
         let data = FrameData {
             clip_from_frame: view.clip_from_frame(origin).as_mat4().to_cols_array_2d(),
             eye: (view.eye - origin).as_vec3(),
-            dynamic_lights: lights.dynamic,
-            backward: view.basis.z_axis.as_vec3(),
-            all_lights: lights.all,
-            ambient: settings.ambient + lights.ambient,
             exposure,
-            fog_color: fog.map_or(glam::Vec3::ZERO, |fog| fog.color),
+            backward: view.basis.z_axis.as_vec3(),
             padding: 0.0,
+            ambient: settings.ambient + lights.ambient,
+            padding_2: 0.0,
+            fog_color: fog.map_or(glam::Vec3::ZERO, |fog| fog.color),
+            padding_3: 0.0,
             fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
         };
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&data));
         let bytes = self.objects.transforms.pending_bytes()
             + self.objects.materials.pending_bytes()
             + self.lights.pending_bytes()
-            + self.draw_list.pending_bytes();
+            + self.instances.pending_bytes()
+            + self.light_list.pending_bytes();
         let mut renewed = self.frame_group.is_none();
         renewed |= self.objects.transforms.upload(&self.gpu)?;
         renewed |= self.objects.materials.upload(&self.gpu)?;
-        renewed |= self.draw_list.upload(&self.gpu)?;
+        renewed |= self.instances.upload(&self.gpu)?;
         renewed |= self.lights.upload(&self.gpu)?;
+        renewed |= self.light_list.upload(&self.gpu)?;
         if renewed {
             let buffers = [
                 Some(&self.frame_uniform),
                 self.objects.transforms.buffer(),
                 self.objects.materials.buffer(),
-                self.draw_list.buffer(),
+                self.instances.buffer(),
                 self.lights.buffer(),
+                self.light_list.buffer(),
             ];
             let entries: Vec<_> = buffers
                 .iter()

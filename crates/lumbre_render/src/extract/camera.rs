@@ -23,7 +23,7 @@ pub(crate) fn find_camera(world: &mut World, asked: Option<Entity>) -> Result<En
         return if there { Ok(entity) } else { Err(RenderError::NotACamera { entity }) };
     }
     let mut cameras = world.query_filtered::<(Entity, Has<ActiveCamera>), With<Camera>>();
-    let found = cameras.iter(world).min_by_key(|(entity, active)| (!active, *entity));
+    let found = cameras.iter(world).min_by_key(|(entity, active)| (!active, entity.index_u32()));
     found.map(|(entity, _)| entity).ok_or(RenderError::NoCamera)
 }
 

@@ -11,9 +11,9 @@ use crate::layout::LightData;
 /// What the shaders need to know of a frame's lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LightSet {
-    /// Lights [0, dynamic) are shaded in full.
+    /// Lights that are shaded in full.
     pub dynamic: u32,
-    /// Lights [dynamic, all) are baked into the lightmaps.
+    /// These and the lights that are baked into the lightmaps.
     pub all: u32,
     /// Sum of the ambient lights.
     pub ambient: Vec3,
@@ -44,20 +44,42 @@ impl LightSet {
     }
 }
 
+/// How far a light of the buffer goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LightReach {
+    /// In the world.
+    pub center: DVec3,
+    /// Metres; infinite for a light without a range.
+    pub radius: f64,
+    /// Baked into the lightmaps in use.
+    pub baked: bool,
+}
+
+impl LightReach {
+    fn new(light: &Light, transform: &GlobalTransform) -> Self {
+        let radius = match light.kind {
+            LightKind::Point => f64::from(light.attenuation.range),
+            LightKind::Ambient | LightKind::Directional => f64::INFINITY,
+        };
+        Self { center: transform.translation(), radius, baked: light.bake == BakeMode::Static }
+    }
+}
+
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time.
 pub(crate) fn extract_lights(
     world: &mut World,
     buffer: &mut GrowableBuffer<LightData>,
     origin: DVec3,
-) -> LightSet {
+) -> (LightSet, Vec<LightReach>) {
     let mut set = LightSet::default();
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
     let mut found: Vec<_> = query.iter(world).filter(|(_, light, _)| shines(light)).collect();
-    found.sort_by_key(|(entity, light, _)| (light.bake == BakeMode::Static, *entity));
+    found.sort_by_key(|(entity, light, _)| (light.bake == BakeMode::Static, entity.index_u32()));
     found.iter().for_each(|(_, light, _)| set.add(light));
-    let positional = found.iter().filter(|(_, light, _)| light.kind != LightKind::Ambient);
-    buffer.replace(positional.map(|(_, light, transform)| LightData::new(light, transform, origin)));
-    set
+    found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
+    buffer.replace(found.iter().map(|(_, light, transform)| LightData::new(light, transform, origin)));
+    let reaches = found.iter().map(|(_, light, transform)| LightReach::new(light, transform)).collect();
+    (set, reaches)
 }
 
 /// Whether a light adds anything; one whose numbers are out of range is left out rather than let into a frame.

@@ -6,6 +6,6 @@ mod objects;
 mod traits;
 
 pub(crate) use camera::{CameraView, find_camera};
-pub(crate) use lights::{LightSet, extract_lights};
+pub(crate) use lights::{LightReach, LightSet, extract_lights};
 pub(crate) use objects::{Object, Objects};
 pub(crate) use traits::{FrameFeatures, LitPass, Traits};

@@ -27,8 +27,11 @@ pub(crate) struct Object {
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
     pub traits: Traits,
     pub mirrored: bool,
-    /// Bounding sphere in the world.
+    /// Middle of the bounding box in the world.
     pub center: DVec3,
+    /// Half the sides of that box, along the world's axes.
+    pub half_size: DVec3,
+    /// Of the sphere around the same middle.
     pub radius: f64,
     seen: u64,
 }
@@ -191,6 +194,7 @@ impl Object {
             traits,
             mirrored: false,
             center: DVec3::ZERO,
+            half_size: DVec3::ZERO,
             radius: 0.0,
             seen: 0,
         }
@@ -199,14 +203,13 @@ impl Object {
     fn bound(&mut self, meshes: &MeshBuffers, transform: &GlobalTransform) {
         self.mirrored = transform.mirrors();
         let matrix = transform.0.matrix3;
-        // The Frobenius norm is at least the largest stretch.
-        let stretch = (matrix.x_axis.length_squared()
-            + matrix.y_axis.length_squared()
-            + matrix.z_axis.length_squared())
-        .sqrt();
         if let Some(mesh) = meshes.get(self.mesh) {
+            let half = mesh.half_size;
             self.center = transform.0.transform_point3(mesh.center);
-            self.radius = stretch * mesh.radius;
+            self.half_size = matrix.x_axis.abs() * half.x
+                + matrix.y_axis.abs() * half.y
+                + matrix.z_axis.abs() * half.z;
+            self.radius = self.half_size.length();
         }
     }
 }

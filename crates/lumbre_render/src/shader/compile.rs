@@ -121,7 +121,7 @@ mod tests {
         }
         let unlit = valid(&variant(Shading::Phong, &[Feature::Uv0, Feature::BaseColorTexture]));
         assert!(unlit.contains("textureSample"));
-        for word in ["frame_lights", "safe_normalize", "for ("] {
+        for word in ["frame_lights", "light_list", "safe_normalize", "for ("] {
             assert!(!unlit.contains(word), "{word} is left in:\n{unlit}");
         }
         let dark = valid(&variant(Shading::Phong, &[Feature::Lit]));

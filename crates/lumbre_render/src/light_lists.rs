@@ -1,0 +1,86 @@
+//! Which lights reach which object: a list per object, by the object's bounding box and the light's range. Exact, not an approximation: a light is left out only where
+//! its range window is 0. Lists are per object and not per screen tile, so that Gouraud's vertices outside the view keep their light.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::extract::LightReach;
+use crate::layout::InstanceData;
+
+/// Lists of light indices; objects that the same lights reach share one.
+#[derive(Debug)]
+pub(crate) struct LightLists<'a> {
+    reaches: &'a [LightReach],
+    /// All lists, one after the other.
+    pub indices: Vec<u32>,
+    known: HashMap<Vec<u32>, InstanceData>,
+    lengths: (u64, u64),
+}
+
+impl<'a> LightLists<'a> {
+    /// No lists yet. Baked lights stand last in `reaches`.
+    pub fn new(reaches: &'a [LightReach]) -> Self {
+        Self { reaches, indices: Vec::new(), known: HashMap::new(), lengths: (0, 0) }
+    }
+
+    /// The list of an object with this bounding box in the world (its `object` is 0).
+    pub fn reaching(&mut self, center: DVec3, half_size: DVec3) -> InstanceData {
+        let reaches = |light: &LightReach| {
+            let outside = ((light.center - center).abs() - half_size).max(DVec3::ZERO);
+            light.radius.is_infinite() || outside.length() < light.radius
+        };
+        let found = self.reaches.iter().zip(0..).filter(|(light, _)| reaches(light));
+        let list: Vec<u32> = found.map(|(_, index)| index).collect();
+        self.lengths = (self.lengths.0 + list.len() as u64, self.lengths.1 + 1);
+        if let Some(known) = self.known.get(&list) {
+            return *known;
+        }
+        let end = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        let first_light = end(self.indices.len());
+        let dynamic = list.iter().filter(|index| !self.reaches[**index as usize].baked).count();
+        self.indices.extend_from_slice(&list);
+        let instance = InstanceData {
+            object: 0,
+            first_light,
+            dynamic_end: first_light + end(dynamic),
+            static_end: end(self.indices.len()),
+        };
+        self.known.insert(list, instance);
+        instance
+    }
+
+    /// Lights per object, on average over the calls of `reaching`.
+    pub fn mean_length(&self) -> f32 {
+        self.lengths.0 as f32 / self.lengths.1.max(1) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_object_gets_the_lights_whose_range_touches_it_baked_ones_last() {
+        let light = |x: f64, radius, baked| LightReach { center: DVec3::new(x, 0.0, 0.0), radius, baked };
+        let reaches = [
+            light(0.0, 2.0, false),
+            light(100.0, f64::INFINITY, false),
+            light(10.0, 2.0, false),
+            light(1.0, 1.0, true),
+            light(30.0, 1.0, true),
+        ];
+        let mut lists = LightLists::new(&reaches);
+        let near = lists.reaching(DVec3::ZERO, DVec3::splat(0.5));
+        assert_eq!(lists.indices, [0, 1, 3]);
+        assert_eq!((near.first_light, near.dynamic_end, near.static_end), (0, 2, 3));
+        let far = lists.reaching(DVec3::new(11.0, 0.0, 0.0), DVec3::splat(0.5));
+        assert_eq!(lists.indices, [0, 1, 3, 1, 2]);
+        assert_eq!((far.first_light, far.dynamic_end, far.static_end), (3, 5, 5));
+        // The same lights, the same list.
+        assert_eq!(lists.reaching(DVec3::new(0.1, 0.0, 0.0), DVec3::splat(0.5)), near);
+        assert_eq!(lists.indices.len(), 5);
+        // A box that touches the sphere meets it where the window is 0 already.
+        assert_eq!(lists.reaching(DVec3::new(-3.0, 0.0, 0.0), DVec3::ONE).static_end, 6);
+    }
+}
