@@ -1,0 +1,60 @@
+//! The playable level: its rules, its input, its window, its overlay.
+//!
+//! ```text
+//!   level::build ──► lumbre_scene::save ──► assets/demo.glb ──► bake ──► Game::load
+//!                                                                          │
+//!   keys, mouse ──► Input, Action ──► Game::step ──► World ──► lumbre_render ──► window
+//!        ▲               │             │  player: walking (gravity, walls, steps)
+//!   Recording ◄──────────┘             │  motion: lights and props move with the time
+//! ```
+//!
+//! The rules know no window: a recorded walk runs in a test as it runs on a screen.
+//!
+//! ```
+//! use std::time::Duration;
+//! use lumbre_demo::{Action, Game, Input, level};
+//!
+//! let mut world = bevy_ecs::world::World::new();
+//! level::build(&mut world);
+//! let mut game = Game::new(world)?;
+//! let before = game.player().body.feet;
+//! game.apply(Action::ToggleTorch);
+//! game.step(Duration::from_millis(200), &Input { forward: true, ..Input::default() });
+//! assert!(game.player().body.feet.distance(before) > 0.2);
+//! # Ok::<(), lumbre_demo::GameError>(())
+//! ```
+
+mod clock;
+mod game;
+mod input;
+pub mod level;
+mod motion;
+mod moving;
+#[cfg(feature = "window")]
+mod picture;
+mod player;
+mod recording;
+mod solid;
+mod torch;
+mod tour;
+#[cfg(feature = "window")]
+mod tour_frames;
+mod view_settings;
+pub mod walking;
+#[cfg(feature = "window")]
+mod window;
+
+pub use clock::{LONGEST_FRAME, STEP_SECONDS};
+pub use game::{Game, GameError, START_CAMERA};
+pub use input::{Action, Input};
+pub use motion::{Bob, Flicker, Motion, MotionError, Orbit, Path, Pose, Spin, Swing};
+pub use moving::{ExtrasError, GameTime, Rest, move_things, read_motions};
+pub use player::Player;
+pub use recording::{Event, Playback, Recording, RecordingError, STEPS_PER_SECOND};
+pub use torch::{torch_light, torch_place};
+pub use tour::{TOUR_CAMERA, Tour};
+#[cfg(feature = "window")]
+pub use tour_frames::tour;
+pub use view_settings::ViewSettings;
+#[cfg(feature = "window")]
+pub use window::{PlayOptions, Trial, has_display, run};

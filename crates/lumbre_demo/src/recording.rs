@@ -1,0 +1,197 @@
+//! Recorded input: what a player did, step by step, so that it can be done again exactly. Not the playing: that is `game`.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::input::{Action, Input};
+
+/// Fixed steps per second of game time: the clock of recordings.
+pub const STEPS_PER_SECOND: u32 = 120;
+
+/// Input over time. A walk written by hand looks the same as a recorded one:
+///
+/// ```json
+/// {"events": [{"step": 0, "input": {"forward": true}},
+///             {"step": 240, "input": {"look": [1.57, 0]}, "actions": ["toggle-torch"]}],
+///  "end": 360}
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recording {
+    /// Changes, by rising step.
+    pub events: Vec<Event>,
+    /// The step after the last one.
+    pub end: u64,
+}
+
+/// A change of input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Event {
+    /// The step before which it happens; there are [`STEPS_PER_SECOND`].
+    pub step: u64,
+    /// Held until the next event; its `look` turns the view once.
+    #[serde(default)]
+    pub input: Input,
+    /// Commands.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub actions: Vec<Action>,
+}
+
+/// Why a recording cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The file cannot be read or written.
+    #[error("{file}: {source}; check the path and its permissions")]
+    File {
+        /// Path.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is not a recording.
+    #[error("{file} is no recording: {source}")]
+    Unreadable {
+        /// Path.
+        file: String,
+        /// Where and why.
+        source: serde_json::Error,
+    },
+    /// Steps must rise and numbers be finite.
+    #[error("event {index} of the recording {problem}")]
+    Event {
+        /// Place in the list.
+        index: usize,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+}
+
+impl Recording {
+    /// Reads a recording from text; `file` is for messages.
+    ///
+    /// # Errors
+    /// [`RecordingError`] where it is not one.
+    pub fn parse(text: &str, file: &str) -> Result<Self, RecordingError> {
+        let recording: Self = serde_json::from_str(text)
+            .map_err(|source| RecordingError::Unreadable { file: file.to_owned(), source })?;
+        recording.validate()?;
+        Ok(recording)
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`RecordingError`] with the file's name.
+    pub fn load(path: &Path) -> Result<Self, RecordingError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| RecordingError::File { file: file.clone(), source })?;
+        Self::parse(&text, &file)
+    }
+
+    /// Writes a file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`RecordingError`] with the file's name.
+    pub fn save(&self, path: &Path) -> Result<(), RecordingError> {
+        let fail = |source| RecordingError::File { file: path.display().to_string(), source };
+        let text = serde_json::to_string(self).map_err(std::io::Error::from).map_err(fail)?;
+        let beside = path.with_extension("unfinished");
+        std::fs::write(&beside, text).map_err(fail)?;
+        std::fs::rename(&beside, path).map_err(fail)
+    }
+
+    fn validate(&self) -> Result<(), RecordingError> {
+        let fail = |index, problem| Err(RecordingError::Event { index, problem });
+        for (index, event) in self.events.iter().enumerate() {
+            if !event.input.look.is_finite() {
+                return fail(index, "turns by a number that is not finite");
+            }
+            if index > 0 && event.step < self.events[index - 1].step {
+                return fail(index, "comes before the one above it; sort by step");
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes what a player does before a step, if it differs from what is held.
+    pub fn note(&mut self, step: u64, input: Input, actions: &[Action]) {
+        let held = self.events.last().map_or_else(Input::default, |event| event.input.held());
+        if input != held || !actions.is_empty() {
+            self.events.push(Event { step, input, actions: actions.to_vec() });
+        }
+        self.end = self.end.max(step + 1);
+    }
+
+    /// Plays it back, step by step.
+    pub fn player(&self) -> Playback<'_> {
+        Playback { recording: self, step: 0, next: 0, held: Input::default() }
+    }
+}
+
+/// A recording that is being played.
+#[derive(Clone, Debug)]
+pub struct Playback<'r> {
+    recording: &'r Recording,
+    step: u64,
+    next: usize,
+    held: Input,
+}
+
+impl Iterator for Playback<'_> {
+    type Item = (Input, Vec<Action>);
+
+    /// The input of the next step, and the commands before it.
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.step >= self.recording.end {
+            return None;
+        }
+        let (mut look, mut actions) = (glam::DVec2::ZERO, Vec::new());
+        while let Some(event) = self.recording.events.get(self.next).filter(|event| event.step <= self.step) {
+            look += event.input.look;
+            actions.extend(&event.actions);
+            self.held = event.input.held();
+            self.next += 1;
+        }
+        self.step += 1;
+        Some((Input { look, ..self.held }, actions))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    #[test]
+    fn what_is_noted_is_played_back() {
+        let forward = Input { forward: true, ..Input::default() };
+        let turning = Input { look: DVec2::new(0.25, 0.0), ..forward };
+        let script = [Input::default(), forward, forward, turning, turning, forward, Input::default()];
+        let mut recording = Recording::default();
+        for (step, input) in script.into_iter().enumerate() {
+            let actions: &[Action] = if step == 2 { &[Action::ToggleTorch] } else { &[] };
+            recording.note(step as u64, input, actions);
+        }
+        // Nothing is written while nothing changes: steps 1, 2 (a command), 3, 4, 6.
+        assert_eq!(recording.events.len(), 5);
+        let text = serde_json::to_string(&recording).unwrap();
+        let again = Recording::parse(&text, "test").unwrap();
+        let played: Vec<_> = again.player().collect();
+        assert_eq!(played.iter().map(|(input, _)| *input).collect::<Vec<_>>(), script);
+        assert_eq!(played[2].1, [Action::ToggleTorch]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let text = r#"{"events":[{"step":5},{"step":4}],"end":9}"#;
+        assert!(Recording::parse(text, "walk").unwrap_err().to_string().contains("event 1"));
+        assert!(Recording::parse("{}", "walk.json").unwrap_err().to_string().contains("walk.json"));
+        let missing = Recording::load(Path::new("no/such/walk.json")).unwrap_err();
+        assert!(missing.to_string().contains("walk.json"));
+    }
+}

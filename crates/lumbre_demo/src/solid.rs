@@ -1,0 +1,28 @@
+//! Which triangles of a level stop somebody. Not how: that is `walking`.
+
+use bevy_ecs::prelude::*;
+use glam::DVec3;
+use lumbre_scene::{Extras, GlobalTransform, Hidden, Mesh, StaticObject};
+
+/// The triangles of all static meshes in the world's space, metres, except those whose node says
+/// `extras.lumbre_demo.solid = false`. Global transforms must be up to date.
+pub fn level_triangles(world: &mut World) -> Vec<[DVec3; 3]> {
+    let mut meshes = world
+        .query_filtered::<(&Mesh, &GlobalTransform, Option<&ChildOf>), (With<StaticObject>, Without<Hidden>)>(
+        );
+    let mut extras = world.query::<&Extras>();
+    let mut triangles = Vec::new();
+    for (mesh, place, parent) in meshes.iter(world) {
+        let said = parent.and_then(|parent| extras.get(world, parent.parent()).ok());
+        if said.is_some_and(|extras| extras.0.pointer("/lumbre_demo/solid") == Some(&false.into())) {
+            continue;
+        }
+        for triangle in mesh.0.triangles() {
+            let corner = |index: u32| mesh.0.positions.get(index as usize);
+            if let [Some(a), Some(b), Some(c)] = triangle.map(corner) {
+                triangles.push([a, b, c].map(|corner| place.0.transform_point3(corner.as_dvec3())));
+            }
+        }
+    }
+    triangles
+}

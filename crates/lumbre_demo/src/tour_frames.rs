@@ -1,0 +1,41 @@
+//! The tour as pictures, for machines without a display.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use lumbre_render::{FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
+
+use crate::picture::write_png;
+use crate::{Game, Input, Tour};
+
+/// Game time between two pictures.
+const BETWEEN: Duration = Duration::from_millis(200);
+
+/// Flies through a level and writes `frames` pictures of `size` pixels (width, height) into `out_dir`, which is made if it is not
+/// there. Lights and props move as they do in the game. Returns the pictures' paths, in order.
+///
+/// # Errors
+/// The level cannot be loaded, there is no device, or a picture cannot be drawn or written.
+pub fn tour(level: &Path, out_dir: &Path, frames: u32, size: (u32, u32)) -> Result<Vec<PathBuf>> {
+    std::fs::create_dir_all(out_dir)
+        .with_context(|| format!("cannot make the folder {}", out_dir.display()))?;
+    let mut game = Game::load(level)?;
+    let bounds = game.level().bounds();
+    let tour = Tour::of(&mut game.world, bounds);
+    let gpu = Gpu::headless()?;
+    let mut renderer = Renderer::new(&gpu);
+    let picture = Offscreen::new(&gpu, size.0, size.1, OffscreenFormat::Rgba8)?;
+    let options = FrameOptions { multisample: true, ..FrameOptions::default() };
+    let mut paths = Vec::new();
+    for frame in 0..frames {
+        let part = f64::from(frame) / f64::from(frames.saturating_sub(1).max(1));
+        game.step(BETWEEN, &Input::default());
+        game.look_from(&tour.view(part));
+        renderer.render(&mut game.world, &picture.target(), &options)?;
+        let path = out_dir.join(format!("tour-{:03}.png", frame + 1));
+        write_png(&path, size.0, size.1, &picture.read_rgba8(&gpu)?)?;
+        paths.push(path);
+    }
+    Ok(paths)
+}

@@ -1,0 +1,82 @@
+//! How the player wants the level drawn. Not the drawing: that is the renderer's.
+
+use lumbre_optics::{ReflectionModel, Shading};
+
+use crate::input::Action;
+
+/// Choices that the keys change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ViewSettings {
+    /// Of every object; what the level itself asks for if there is none.
+    pub shading: Option<Shading>,
+    /// The specular model; the level's own if there is none.
+    pub reflection: Option<ReflectionModel>,
+    /// Whether baked light is shown.
+    pub lightmaps: bool,
+    /// Four samples per pixel.
+    pub multisample: bool,
+    /// Whether the overlay is shown.
+    pub overlay: bool,
+}
+
+impl Default for ViewSettings {
+    fn default() -> Self {
+        Self { shading: None, reflection: None, lightmaps: true, multisample: true, overlay: true }
+    }
+}
+
+impl ViewSettings {
+    /// Carries out an action; false if it is none of the view's.
+    pub fn apply(&mut self, action: Action) -> bool {
+        match action {
+            Action::ShadeFlat => self.shading = Some(Shading::Flat),
+            Action::ShadeGouraud => self.shading = Some(Shading::Gouraud),
+            Action::ShadePhong => self.shading = Some(Shading::Phong),
+            Action::CycleShading => self.shading = next(self.shading, Shading::ALL),
+            Action::CycleReflection => self.reflection = next(self.reflection, ReflectionModel::ALL),
+            Action::ToggleLightmaps => self.lightmaps = !self.lightmaps,
+            Action::ToggleMultisample => self.multisample = !self.multisample,
+            Action::ToggleOverlay => self.overlay = !self.overlay,
+            Action::ToggleTorch | Action::ToggleFlight | Action::Quit => return false,
+        }
+        true
+    }
+}
+
+/// The choice after this one; the level's own comes before the first and after the last.
+fn next<T: Copy + PartialEq>(choice: Option<T>, all: &[T]) -> Option<T> {
+    match choice {
+        None => all.first().copied(),
+        Some(choice) => all.iter().position(|&one| one == choice).and_then(|at| all.get(at + 1)).copied(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cycling_comes_back_to_the_level() {
+        let mut view = ViewSettings::default();
+        let mut seen = Vec::new();
+        for _ in 0..4 {
+            assert!(view.apply(Action::CycleShading));
+            seen.push(view.shading);
+        }
+        assert_eq!(seen, [Some(Shading::Flat), Some(Shading::Gouraud), Some(Shading::Phong), None]);
+        for _ in 0..ReflectionModel::ALL.len() + 1 {
+            view.apply(Action::CycleReflection);
+        }
+        assert_eq!(view.reflection, None);
+    }
+
+    #[test]
+    fn toggles_toggle_and_others_are_left_alone() {
+        let mut view = ViewSettings::default();
+        view.apply(Action::ToggleLightmaps);
+        view.apply(Action::ToggleMultisample);
+        view.apply(Action::ToggleOverlay);
+        assert!(!view.lightmaps && !view.multisample && !view.overlay);
+        assert!(!view.apply(Action::ToggleTorch));
+    }
+}

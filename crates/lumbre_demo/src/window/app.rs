@@ -1,0 +1,350 @@
+//! The application: winit's events on one side, the game and the stage on the other.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use lumbre_optics::Light;
+use lumbre_render::{FrameOptions, FrameReport, Measure};
+use winit::application::ApplicationHandler;
+use winit::dpi::LogicalSize;
+use winit::event::{DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow};
+use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::window::{Window, WindowId};
+
+use super::keys;
+use super::mouse::Grab;
+use super::overlay::{Facts, Overlay};
+use super::stage::{OverlayFrame, Shown, Stage};
+use super::{PlayOptions, Trial};
+use crate::picture::write_png;
+use crate::recording::STEPS_PER_SECOND;
+use crate::{Action, Game, Input, Recording};
+
+/// Devices that may be lost before the first frame of the next one is shown.
+const MOST_LOSSES: u32 = 3;
+/// How long to wait before the next look at a window that shows nothing.
+const IDLE: Duration = Duration::from_millis(50);
+/// Steps of a recording that are played per frame: 60 frames per second of game time.
+const STEPS_PER_FRAME: u32 = STEPS_PER_SECOND / 60;
+
+/// A game in a window.
+pub struct App {
+    game: Game,
+    options: PlayOptions,
+    replay: Option<std::vec::IntoIter<(Input, Vec<Action>)>>,
+    window: Option<Arc<Window>>,
+    stage: Option<Stage>,
+    overlay: Overlay,
+    egui: Option<egui_winit::State>,
+    report: Option<Box<FrameReport>>,
+    input: Input,
+    grab: Grab,
+    last: Option<Instant>,
+    frames: u64,
+    losses: u32,
+    /// Why the event loop ends, if not because the player wants it.
+    pub outcome: Result<()>,
+}
+
+impl App {
+    /// A game that will have a window once the event loop runs.
+    pub fn new(game: Game, options: PlayOptions, replay: Option<&Recording>) -> Self {
+        let replay = replay.map(|recording| recording.player().collect::<Vec<_>>().into_iter());
+        Self {
+            game,
+            options,
+            replay,
+            window: None,
+            stage: None,
+            overlay: Overlay::default(),
+            egui: None,
+            report: None,
+            input: Input::default(),
+            grab: Grab::default(),
+            last: None,
+            frames: 0,
+            losses: 0,
+            outcome: Ok(()),
+        }
+    }
+
+    /// The recording of what was played, if one was asked for.
+    pub fn take_recording(&mut self) -> Option<Recording> {
+        self.game.take_recording()
+    }
+
+    fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
+        let (width, height) = self.options.size;
+        let attributes = Window::default_attributes()
+            .with_title(self.options.title.clone())
+            .with_inner_size(LogicalSize::new(width.max(1), height.max(1)));
+        let window = Arc::new(event_loop.create_window(attributes).context("no window could be opened")?);
+        self.window = Some(window);
+        self.build_stage(event_loop)?;
+        let software = self
+            .stage
+            .as_ref()
+            .is_some_and(|stage| stage.gpu().adapter.get_info().device_type == wgpu::DeviceType::Cpu);
+        if software {
+            // Four samples cost a software rasterizer dearly; M turns them on.
+            self.game.view.multisample = false;
+        }
+        Ok(())
+    }
+
+    /// A new device for the window, and a new overlay context, whose fonts have to be uploaded to it.
+    fn build_stage(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
+        let Some(window) = self.window.clone() else { return Ok(()) };
+        self.stage = None;
+        let stage = Stage::new(event_loop, window.clone(), self.options.screenshot.is_some())?;
+        self.overlay.forget_device();
+        let side = stage.gpu().device.limits().max_texture_dimension_2d as usize;
+        let (context, scale) = (self.overlay.context.clone(), window.scale_factor() as f32);
+        let viewport = egui::ViewportId::ROOT;
+        self.egui = Some(egui_winit::State::new(
+            context,
+            viewport,
+            &*window,
+            Some(scale),
+            window.theme(),
+            Some(side),
+        ));
+        self.stage = Some(stage);
+        Ok(())
+    }
+
+    /// Lets the time since the last frame pass.
+    fn advance(&mut self) {
+        let now = Instant::now();
+        let passed = self.last.replace(now).map_or(Duration::ZERO, |last| now - last);
+        if !passed.is_zero() {
+            self.overlay.note_frame(passed.as_secs_f32() * 1000.0);
+        }
+        let Some(replay) = &mut self.replay else {
+            self.game.step(passed, &self.input);
+            self.input = self.input.held();
+            return;
+        };
+        for _ in 0..STEPS_PER_FRAME {
+            let Some((input, actions)) = replay.next() else { break };
+            actions.into_iter().for_each(|action| self.game.apply(action));
+            self.game.step_once(&input);
+        }
+    }
+
+    fn frame_options(&self) -> FrameOptions {
+        let view = &self.game.view;
+        FrameOptions {
+            shading: view.shading,
+            reflection: view.reflection,
+            lightmaps: view.lightmaps,
+            multisample: view.multisample,
+            measure: if view.overlay { Measure::Time } else { Measure::Nothing },
+            ..FrameOptions::default()
+        }
+    }
+
+    fn draw(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
+        self.advance();
+        let options = self.frame_options();
+        let facts = self.facts();
+        let (Some(window), Some(egui), Some(stage)) = (&self.window, &mut self.egui, &mut self.stage) else {
+            return Ok(());
+        };
+        let input = egui.take_egui_input(window);
+        let mut output = self.overlay.lay_out(input, &facts, self.report.as_deref());
+        if !self.grab.is_held() {
+            // It sets the pointer's shape, and with that shows it: not while it is hidden.
+            egui.handle_platform_output(window, std::mem::take(&mut output.platform_output));
+        }
+        let scale = output.pixels_per_point;
+        let triangles = self.overlay.context.tessellate(output.shapes, scale);
+        let frame = OverlayFrame { triangles, textures: output.textures_delta, scale };
+        match stage.show(&mut self.game.world, &options, frame)? {
+            Shown::Frame(report) => {
+                self.report = Some(report);
+                self.losses = 0;
+                self.frames += 1;
+            }
+            Shown::Nothing => event_loop.set_control_flow(ControlFlow::wait_duration(IDLE)),
+            Shown::DeviceLost => self.recover(event_loop)?,
+        }
+        self.grab.recentre(window_of(&self.window)?);
+        self.after_frame(event_loop, &options)
+    }
+
+    /// Makes a new device in place of one that is gone.
+    fn recover(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
+        self.losses += 1;
+        if self.losses > MOST_LOSSES {
+            bail!("the graphics device was lost {} times in a row; see the driver's log", self.losses);
+        }
+        tracing::warn!("the graphics device is lost; making another one");
+        self.report = None;
+        self.build_stage(event_loop)
+    }
+
+    /// What was asked to happen after so many frames.
+    fn after_frame(&mut self, event_loop: &ActiveEventLoop, options: &FrameOptions) -> Result<()> {
+        self.undergo_trials();
+        let played = self.replay.as_ref().is_some_and(|replay| replay.len() == 0);
+        let counted = self.options.quit_after.is_some_and(|after| self.frames >= u64::from(after));
+        if !(counted || (played && self.options.quit_after.is_none()) || self.game.wants_to_quit()) {
+            return Ok(());
+        }
+        if let (Some(path), Some(stage)) = (self.options.screenshot.take(), &mut self.stage) {
+            let (width, height, rgba) = stage.picture(&mut self.game.world, options)?;
+            write_png(&path, width, height, &rgba)?;
+        }
+        event_loop.exit();
+        Ok(())
+    }
+
+    fn undergo_trials(&mut self) {
+        let frames = self.frames;
+        let due: Vec<Trial> = self
+            .options
+            .trials
+            .extract_if(.., |(after, _)| *after <= frames)
+            .map(|(_, trial)| trial)
+            .collect();
+        for trial in due {
+            match (trial, &mut self.stage, &self.window) {
+                (Trial::LoseDevice, Some(stage), _) => stage.gpu().device.destroy(),
+                (Trial::Vanish, Some(stage), _) => stage.resize(0, 0),
+                (Trial::Resize(width, height), Some(stage), Some(window)) => {
+                    if let Some(size) = window.request_inner_size(LogicalSize::new(width, height)) {
+                        stage.resize(size.width, size.height);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        let lit = self.game.world.get::<Light>(self.game.torch()).is_some_and(|light| light.enabled);
+        Facts {
+            device: self.stage.as_ref().map(|stage| stage.gpu().describe()).unwrap_or_default(),
+            size: self.stage.as_ref().map(Stage::size).unwrap_or_default(),
+            view: self.game.view,
+            torch: lit,
+            flying: self.game.player().flying,
+            grabbed: self.grab.is_held(),
+            feet: self.game.player().body.feet,
+        }
+    }
+
+    fn key(&mut self, event: &KeyEvent) {
+        let PhysicalKey::Code(key) = event.physical_key else { return };
+        let down = event.state == ElementState::Pressed;
+        keys::hold(&mut self.input, key, down);
+        if !down || event.repeat {
+            return;
+        }
+        match keys::action(key) {
+            Some(action) => self.game.apply(action),
+            None if key == KeyCode::Escape => self.release(),
+            None => {}
+        }
+    }
+
+    fn release(&mut self) {
+        if let (true, Some(window)) = (self.grab.is_held(), &self.window) {
+            self.grab.release(window);
+        }
+    }
+
+    /// Ends the event loop with an error.
+    fn fail(&mut self, event_loop: &ActiveEventLoop, result: Result<()>) {
+        if result.is_err() {
+            self.outcome = result;
+            event_loop.exit();
+        }
+    }
+}
+
+fn window_of(window: &Option<Arc<Window>>) -> Result<&Window> {
+    window.as_deref().context("the window is gone")
+}
+
+impl ApplicationHandler for App {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.window.is_none() {
+            let opened = self.open(event_loop);
+            self.fail(event_loop, opened);
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let consumed = match (&self.window, &mut self.egui) {
+            (Some(window), Some(egui)) if !self.grab.is_held() => {
+                egui.on_window_event(window, &event).consumed
+            }
+            _ => false,
+        };
+        match event {
+            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::Resized(size) => {
+                if let Some(stage) = &mut self.stage {
+                    stage.resize(size.width, size.height);
+                }
+            }
+            WindowEvent::Focused(false) => {
+                // Keys that are released elsewhere are not heard of.
+                self.input = Input::default();
+                self.release();
+            }
+            // A recording plays undisturbed; Q still quits.
+            WindowEvent::KeyboardInput { event, .. } if self.replay.is_none() || is_quit(&event) => {
+                self.key(&event)
+            }
+            WindowEvent::MouseInput { state: ElementState::Pressed, button: MouseButton::Left, .. }
+                if !consumed && self.replay.is_none() =>
+            {
+                if let (false, Some(window)) = (self.grab.is_held(), &self.window) {
+                    self.grab = Grab::take(window);
+                }
+            }
+            WindowEvent::RedrawRequested => {
+                let drawn = self.draw(event_loop);
+                self.fail(event_loop, drawn);
+            }
+            _ => {}
+        }
+    }
+
+    fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
+        if let DeviceEvent::MouseMotion { delta } = event
+            && self.replay.is_none()
+        {
+            self.input.look += self.grab.look(delta);
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        let minimised = self.stage.as_ref().is_some_and(|stage| stage.size().0 == 0 || stage.size().1 == 0);
+        let pause = minimised
+            || matches!(event_loop.control_flow(), ControlFlow::WaitUntil(until) if until > Instant::now());
+        if pause {
+            event_loop.set_control_flow(ControlFlow::wait_duration(IDLE));
+        } else {
+            event_loop.set_control_flow(ControlFlow::Poll);
+        }
+        if let Some(window) = &self.window {
+            window.request_redraw();
+        }
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        self.release();
+        // The surface before the window.
+        self.stage = None;
+    }
+}
+
+fn is_quit(event: &KeyEvent) -> bool {
+    matches!(event.physical_key, PhysicalKey::Code(key) if keys::action(key) == Some(Action::Quit))
+}

@@ -1,0 +1,268 @@
+//! What the overlay says: frame times, passes, counts, choices. Not how it is painted: that is `overlay_painter`.
+
+use std::collections::VecDeque;
+
+use egui::{Color32, RichText, Sense, Stroke, Ui, pos2, vec2};
+use lumbre_graph::{GpuTime, PassExplanation, PassReport};
+use lumbre_render::FrameReport;
+
+use crate::ViewSettings;
+
+/// Frames in the graph: two seconds at 60 per second.
+const GRAPH_FRAMES: usize = 120;
+/// Size of the graph in points.
+const GRAPH_SIZE: egui::Vec2 = vec2(330.0, 56.0);
+const DIM: Color32 = Color32::from_gray(150);
+const GOOD: Color32 = Color32::from_rgb(140, 210, 120);
+const WARM: Color32 = Color32::from_rgb(235, 180, 90);
+
+/// What the overlay is about, beside the frame itself.
+#[derive(Clone, Debug, Default)]
+pub struct Facts {
+    /// The adapter and its driver.
+    pub device: String,
+    /// Width and height of the frame in pixels.
+    pub size: (u32, u32),
+    /// What the keys chose.
+    pub view: ViewSettings,
+    /// Whether the torch is lit.
+    pub torch: bool,
+    /// Whether the player flies.
+    pub flying: bool,
+    /// Whether the mouse turns the view.
+    pub grabbed: bool,
+    /// The player's feet, metres.
+    pub feet: glam::DVec3,
+}
+
+/// The overlay and what it remembers.
+#[derive(Default)]
+pub struct Overlay {
+    /// Its own state; made anew with every device, as the fonts live there.
+    pub context: egui::Context,
+    frame_ms: VecDeque<f32>,
+}
+
+impl Overlay {
+    /// Notes how long a frame took, milliseconds.
+    pub fn note_frame(&mut self, milliseconds: f32) {
+        self.frame_ms.push_back(milliseconds);
+        while self.frame_ms.len() > GRAPH_FRAMES {
+            self.frame_ms.pop_front();
+        }
+    }
+
+    /// Forgets the fonts that were uploaded to a device that is gone.
+    pub fn forget_device(&mut self) {
+        self.context = egui::Context::default();
+    }
+
+    /// Lays out one frame. Whoever takes the output applies its textures.
+    #[must_use]
+    pub fn lay_out(
+        &self,
+        input: egui::RawInput,
+        facts: &Facts,
+        report: Option<&FrameReport>,
+    ) -> egui::FullOutput {
+        self.context.run_ui(input, |root| {
+            if !facts.view.overlay {
+                return;
+            }
+            let frame = egui::Frame::window(root.style()).fill(Color32::from_black_alpha(190));
+            egui::Window::new("Lumbre")
+                .frame(frame)
+                .default_pos([10.0, 10.0])
+                .resizable(false)
+                .default_width(GRAPH_SIZE.x)
+                .show(root.ctx(), |ui| self.contents(ui, facts, report));
+        })
+    }
+
+    fn contents(&self, ui: &mut Ui, facts: &Facts, report: Option<&FrameReport>) {
+        let mean = self.frame_ms.iter().sum::<f32>() / self.frame_ms.len().max(1) as f32;
+        let worst = self.frame_ms.iter().copied().fold(0.0, f32::max);
+        let rate = if mean > 0.0 { 1000.0 / mean } else { 0.0 };
+        ui.label(
+            RichText::new(format!("{mean:.2} ms  ({rate:.0} per second, worst {worst:.1} ms)")).strong(),
+        );
+        graph(ui, &self.frame_ms, mean);
+        ui.label(
+            RichText::new(format!("{}, {} x {}", facts.device, facts.size.0, facts.size.1))
+                .color(DIM)
+                .small(),
+        );
+        if let Some(report) = report {
+            ui.separator();
+            passes(ui, report);
+            ui.separator();
+            counts(ui, report);
+        }
+        ui.separator();
+        choices(ui, facts);
+    }
+}
+
+/// The last frames as a line, with the lines of 60 and 30 frames per second where they fit.
+fn graph(ui: &mut Ui, frame_ms: &VecDeque<f32>, mean: f32) {
+    let (response, painter) = ui.allocate_painter(GRAPH_SIZE, Sense::hover());
+    let area = response.rect;
+    painter.rect_filled(area, 2.0, Color32::from_black_alpha(120));
+    let top = (2.0 * mean).max(20.0);
+    let height = |milliseconds: f32| area.bottom() - area.height() * (milliseconds / top).min(1.0);
+    for mark in [1000.0 / 60.0, 1000.0 / 30.0] {
+        if mark < top {
+            painter.hline(area.x_range(), height(mark), Stroke::new(1.0, Color32::from_gray(70)));
+        }
+    }
+    let step = area.width() / (GRAPH_FRAMES - 1) as f32;
+    let first = area.right() - step * frame_ms.len().saturating_sub(1) as f32;
+    let line =
+        frame_ms.iter().enumerate().map(|(i, &ms)| pos2(first + step * i as f32, height(ms))).collect();
+    painter.line(line, Stroke::new(1.5, GOOD));
+}
+
+/// Every pass of the plan: how long it took, or why it does not run.
+fn passes(ui: &mut Ui, report: &FrameReport) {
+    let explanation = report.plan.explain();
+    let measured = report.measured.as_ref();
+    egui::Grid::new("passes").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
+        for heading in ["pass", "CPU ms", "GPU ms", ""] {
+            ui.label(RichText::new(heading).color(DIM).small());
+        }
+        ui.end_row();
+        for pass in &explanation.passes {
+            let times = measured.and_then(|frame| frame.passes.iter().find(|one| *one.name == *pass.name));
+            pass_row(ui, pass, times);
+        }
+        if let Some(frame) = measured {
+            ui.label(RichText::new("whole frame").strong());
+            ui.label(milliseconds(frame.cpu_ms));
+            ui.label(milliseconds(frame.gpu_ms));
+            ui.end_row();
+        }
+    });
+}
+
+fn pass_row(ui: &mut Ui, pass: &PassExplanation, times: Option<&PassReport>) {
+    if pass.status.runs() {
+        ui.label(RichText::new(&pass.name).color(GOOD));
+        ui.label(milliseconds(times.and_then(|times| times.cpu_ms)));
+        let shared = matches!(times.map(|times| times.gpu), Some(GpuTime::Group { .. }));
+        let mark = if shared { " (with others)" } else { "" };
+        ui.label(milliseconds(times.and_then(|times| times.gpu.ms())) + mark);
+        ui.label(RichText::new(pass.status.reason()).color(DIM).small());
+    } else {
+        ui.label(RichText::new(&pass.name).color(DIM));
+        ui.label("");
+        ui.label("");
+        let reason = format!("{}: {}", pass.status.word(), pass.status.reason());
+        ui.label(RichText::new(reason).color(WARM).small());
+    }
+    ui.end_row();
+}
+
+fn milliseconds(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
+}
+
+fn counts(ui: &mut Ui, report: &FrameReport) {
+    let counts = &report.statistics;
+    let lights = counts.lights;
+    ui.label(format!("{lights} lights, {} of them static", counts.static_lights));
+    ui.label(format!(
+        "{} triangles of {} objects in {} draw calls",
+        counts.triangles, counts.objects, counts.draws
+    ));
+    let (outside, variants, bytes) = (counts.objects_outside, counts.variants, counts.uploaded_bytes);
+    let rest = format!("{outside} objects out of view, {variants} shader variants, {bytes} bytes uploaded");
+    ui.label(RichText::new(rest).color(DIM).small());
+    for note in report.measured.iter().flat_map(|frame| &frame.notes) {
+        ui.label(RichText::new(note).color(WARM).small());
+    }
+}
+
+/// What can be changed, with its key.
+fn choices(ui: &mut Ui, facts: &Facts) {
+    let view = &facts.view;
+    let shading = view.shading.map_or("as the level asks", |shading| shading.name());
+    let reflection = view.reflection.map_or("as the level asks", |model| model.name());
+    let switch = |on: bool| if on { "on" } else { "off" };
+    egui::Grid::new("choices").num_columns(3).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (key, what, state) in [
+            ("1 2 3, G", "shading", shading),
+            ("R", "reflection", reflection),
+            ("L", "lightmaps", switch(view.lightmaps)),
+            ("M", "multisampling", switch(view.multisample)),
+            ("T", "torch", switch(facts.torch)),
+            ("F", "flight", switch(facts.flying)),
+            ("Tab, F1", "this overlay", "on"),
+        ] {
+            ui.label(RichText::new(key).color(WARM));
+            ui.label(what);
+            ui.label(state);
+            ui.end_row();
+        }
+    });
+    let feet = facts.feet;
+    let hint = if facts.grabbed { "Esc frees the mouse" } else { "click to look around" };
+    let keys = format!("{hint}; W A S D walk, Shift runs, Space jumps, Q quits");
+    ui.label(RichText::new(keys).color(DIM).small());
+    ui.label(RichText::new(format!("at {:.1}, {:.1}, {:.1} m", feet.x, feet.y, feet.z)).color(DIM).small());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(overlay: &Overlay, facts: &Facts) -> String {
+        fn collect(shape: &egui::Shape, text: &mut String) {
+            match shape {
+                egui::Shape::Text(one) => {
+                    text.push_str(one.galley.text());
+                    text.push('\n');
+                }
+                egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, text)),
+                _ => {}
+            }
+        }
+        let input = || egui::RawInput {
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, vec2(1280.0, 900.0))),
+            ..egui::RawInput::default()
+        };
+        // A window is laid out on its first frame and shown on its second.
+        overlay.lay_out(input(), facts, None).drop_without_applying_deltas();
+        let mut text = String::new();
+        let output = overlay.lay_out(input(), facts, None);
+        for clipped in &output.shapes {
+            collect(&clipped.shape, &mut text);
+        }
+        output.drop_without_applying_deltas();
+        text
+    }
+
+    #[test]
+    fn says_how_long_frames_take_and_what_is_chosen() {
+        let mut overlay = Overlay::default();
+        for _ in 0..500 {
+            overlay.note_frame(20.0);
+        }
+        assert_eq!(overlay.frame_ms.len(), GRAPH_FRAMES);
+        let mut facts = Facts { device: "a test device".into(), size: (640, 480), ..Facts::default() };
+        facts.view.shading = Some(lumbre_optics::Shading::Gouraud);
+        facts.torch = true;
+        let text = texts(&overlay, &facts);
+        for wanted in
+            ["20.00 ms  (50 per second", "a test device, 640 x 480", "gouraud", "torch", "as the level asks"]
+        {
+            assert!(text.contains(wanted), "{wanted} is not in:\n{text}");
+        }
+    }
+
+    #[test]
+    fn says_nothing_when_it_is_off() {
+        let facts =
+            Facts { view: ViewSettings { overlay: false, ..ViewSettings::default() }, ..Facts::default() };
+        assert_eq!(texts(&Overlay::default(), &facts), "");
+    }
+}
