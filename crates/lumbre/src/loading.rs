@@ -48,8 +48,7 @@ pub fn frame_options(
 fn camera(world: &mut World, asked: Option<&str>, aspect: f64) -> anyhow::Result<Entity> {
     let order = world.remove_resource::<FileOrder>().map_or(Vec::new(), |order| order.0);
     let place = |entity: Entity| order.iter().position(|node| *node == entity).unwrap_or(usize::MAX);
-    let mut query =
-        world.query_filtered::<(Entity, Option<&Name>), (With<Camera>, With<GlobalTransform>)>();
+    let mut query = world.query_filtered::<(Entity, Option<&Name>), (With<Camera>, With<GlobalTransform>)>();
     let mut cameras: Vec<(usize, Entity, String)> = query
         .iter(world)
         .map(|(entity, name)| (place(entity), entity, name.map_or(String::new(), ToString::to_string)))

@@ -280,12 +280,7 @@ impl Census {
             mesh("vertex colours", self.vertex_colors, "with COLOR_0", "no mesh has COLOR_0"),
             mesh("alpha mask", self.alpha_mask, "cut out by alpha", "no material is masked"),
             mesh("alpha blending", self.alpha_blend, "blended", "no material is blended"),
-            mesh(
-                "two-sided",
-                self.two_sided,
-                "lit from both sides",
-                "no surface is lit from both sides",
-            ),
+            mesh("two-sided", self.two_sided, "lit from both sides", "no surface is lit from both sides"),
             mesh(
                 "back materials",
                 self.back_materials,

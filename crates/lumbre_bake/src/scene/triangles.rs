@@ -159,7 +159,12 @@ fn extract(
     let (mut not_finite, mut without_area) = (0, 0);
     for (part, mesh) in object.parts.iter().zip(&map.meshes) {
         let surface = surfaces.len() as u32;
-        check_reflectance(&part.material.front.diffuse, &object.name, warnings);
+        // A texture brings its factor down; what is above the limit after that is clamped texel by texel.
+        let textured = part
+            .textures
+            .as_ref()
+            .is_some_and(|textures| textures.base_color.is_some() || textures.metallic_roughness.is_some());
+        check_reflectance(&part.material.front.diffuse, textured, &object.name, warnings);
         surfaces.push(SurfaceMaterial {
             material: part.material.clone(),
             textures: part.textures.clone(),
@@ -235,8 +240,8 @@ fn extract(
     }
 }
 
-fn check_reflectance(diffuse: &Vec3, name: &str, warnings: &mut Vec<String>) {
-    if diffuse.max_element() > LARGEST_REFLECTANCE {
+fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut Vec<String>) {
+    if diffuse.max_element() > LARGEST_REFLECTANCE && !textured {
         warnings.push(format!(
             "{name}: diffuse reflectance {diffuse} is above {LARGEST_REFLECTANCE} and was clamped to it"
         ));

@@ -206,9 +206,8 @@ impl Object {
         if let Some(mesh) = meshes.get(self.mesh) {
             let half = mesh.half_size;
             self.center = transform.0.transform_point3(mesh.center);
-            self.half_size = matrix.x_axis.abs() * half.x
-                + matrix.y_axis.abs() * half.y
-                + matrix.z_axis.abs() * half.z;
+            self.half_size =
+                matrix.x_axis.abs() * half.x + matrix.y_axis.abs() * half.y + matrix.z_axis.abs() * half.z;
             self.radius = self.half_size.length();
         }
     }
