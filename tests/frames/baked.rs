@@ -83,9 +83,8 @@ fn colour_bleeds_and_nothing_inside_is_black() {
     assert!(left.x > 2.0 * left.y, "the side towards the red wall is {left}");
     let right = mean(of("small_box", false));
     assert!(right.y > 1.5 * right.x, "the side towards the green wall is {right}");
-    let black = (0..SIZE * SIZE)
-        .filter(|&at| frame.surface[at].is_some() && pixels[at].max_element() < 1e-4)
-        .count();
+    let black =
+        (0..SIZE * SIZE).filter(|&at| frame.surface[at].is_some() && pixels[at].max_element() < 1e-4).count();
     assert_eq!(black, 0, "{black} pixels of surfaces are black");
 }
 
@@ -98,7 +97,10 @@ fn static_lights_of_a_baked_level_are_not_counted_twice() {
     world.spawn((Mesh(floor), Material::matt(glam::Vec3::splat(0.5)), StaticObject));
     let lamp = Light { bake: BakeMode::Static, ..Light::point(glam::Vec3::splat(4.0)) };
     world.spawn((lamp, Transform::from_xyz(0.0, 2.0, 0.0)));
-    world.spawn((Camera::default(), Transform::from_xyz(0.0, 3.0, 0.01).looking_at(DVec3::ZERO, DVec3::NEG_Z)));
+    world.spawn((
+        Camera::default(),
+        Transform::from_xyz(0.0, 3.0, 0.01).looking_at(DVec3::ZERO, DVec3::NEG_Z),
+    ));
     let center = |world: &mut World| draw(world, 33, 33, &linear()).0[16 * 33 + 16].x;
     let shaded = center(&mut world);
     let options =
