@@ -1,16 +1,26 @@
 //! One device for all tests of this binary, and frames drawn on it with the finite-value probe on.
 
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use bevy_ecs::world::World;
 use glam::DVec3;
-use lumbre_render::{Display, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{
+    Display, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer,
+};
+
+/// What wgpu's validation complained about, and nobody caught.
+static COMPLAINTS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// The device. Without a driver the tests fail, and say what to install.
 pub fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
     GPU.get_or_init(|| match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => {
+            gpu.device.on_uncaptured_error(Arc::new(|error| {
+                COMPLAINTS.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{error}"));
+            }));
+            gpu
+        }
         Err(error) => panic!("{error}"),
     })
 }
@@ -22,18 +32,50 @@ pub fn linear() -> FrameOptions {
 
 /// Draws a frame of linear floats; fails if any pass left a value that is not finite.
 pub fn draw(world: &mut World, width: u32, height: u32, options: &FrameOptions) -> (Vec<DVec3>, FrameReport) {
-    // One at a time: the software rasterizer uses every core anyway, and a test's time is then its own.
-    static ONE: Mutex<()> = Mutex::new(());
-    let _guard = ONE.lock();
-    let gpu = gpu();
-    let mut renderer = Renderer::new(gpu);
-    let frame = Offscreen::new(gpu, width, height, OffscreenFormat::LinearFloat).unwrap();
-    let report = renderer.render(world, &frame.target(), options).unwrap();
-    if options.probe {
-        let measured = renderer.wait().unwrap().expect("a frame was drawn");
-        assert!(measured.probed);
-        assert_eq!(measured.non_finite, None);
+    Canvas::new(width, height).draw(world, options)
+}
+
+/// One renderer and one target for several frames, so that what it keeps from frame to frame is under test too.
+pub struct Canvas {
+    renderer: Renderer,
+    frame: Offscreen,
+}
+
+impl Canvas {
+    /// A fresh renderer and a target of linear floats.
+    pub fn new(width: u32, height: u32) -> Self {
+        let gpu = gpu();
+        let frame = Offscreen::new(gpu, width, height, OffscreenFormat::LinearFloat).unwrap();
+        Self { renderer: Renderer::new(gpu), frame }
     }
-    let pixels = frame.read_linear(gpu).unwrap();
-    (pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(), report)
+
+    /// Draws a frame; fails if any pass left a value that is not finite, or if wgpu's validation complained.
+    pub fn draw(&mut self, world: &mut World, options: &FrameOptions) -> (Vec<DVec3>, FrameReport) {
+        let _guard = one_at_a_time();
+        let report = self.renderer.render(world, &self.frame.target(), options).unwrap();
+        if options.probe {
+            let measured = self.renderer.wait().unwrap().expect("a frame was drawn");
+            assert!(measured.probed);
+            assert_eq!(measured.non_finite, None);
+        }
+        let pixels = self.frame.read_linear(gpu()).unwrap();
+        let complaints = std::mem::take(&mut *COMPLAINTS.lock().unwrap_or_else(PoisonError::into_inner));
+        assert!(complaints.is_empty(), "wgpu complains: {complaints:#?}");
+        (pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(), report)
+    }
+
+    /// Tries to draw what cannot be drawn.
+    pub fn refuse(&mut self, world: &mut World, options: &FrameOptions) -> RenderError {
+        let _guard = one_at_a_time();
+        match self.renderer.render(world, &self.frame.target(), options) {
+            Err(error) => error,
+            Ok(_) => panic!("a frame was drawn"),
+        }
+    }
+}
+
+/// The software rasterizer uses every core anyway, and a test's time is then its own. Held by a test that failed, it still serves.
+fn one_at_a_time() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,7 +1,19 @@
 //! Headless frame tests: frames of the GPU against the f64 twin. docs/testing.md says what each file proves.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
 mod adapter;
 mod baked;
 mod balls;
+mod changes;
 mod conformance;
+mod degenerate;
+mod faces;
+mod level;
+mod materials;
 mod models;
+mod multisampling;
+mod settings;
+mod textures;
+mod transforms;
+mod transparency;

@@ -18,6 +18,7 @@
 //! ```
 
 pub mod compare;
+pub mod panes;
 pub mod scenes;
 pub mod shared_files;
 pub mod twin;

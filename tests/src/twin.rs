@@ -7,7 +7,8 @@ use bevy_ecs::prelude::*;
 use glam::{DMat3, DVec2, DVec3};
 use lumbre_optics::{
     Contribution, Light, LightKind, LightSample, Material, ReflectionModel, Shading, SurfaceSample,
-    add_emission, apply_fog, evaluate_light, facing_normal, fog_weight, light_contribution, viewer_direction,
+    add_emission, apply_fog, evaluate_light, facing_normal, fog_weight, light_contribution, safe_normalize,
+    viewer_direction,
 };
 use lumbre_scene::{
     Camera, GlobalTransform, Hidden, Lightmap, LightmapImage, Mesh, Projection, SceneSettings,
@@ -155,6 +156,18 @@ impl TwinFrame {
     }
 }
 
+impl TwinFrame {
+    /// As [`interior`](Self::interior), without the background: that agrees too easily to be counted.
+    pub fn inside_surfaces(&self, one_triangle: bool) -> Vec<Option<DVec3>> {
+        let interior = self.interior(one_triangle);
+        interior
+            .iter()
+            .zip(&self.surface)
+            .map(|(color, surface)| color.filter(|_| surface.is_some()))
+            .collect()
+    }
+}
+
 fn collect(world: &mut World, settings: &SceneSettings, options: TwinOptions) -> Vec<Object> {
     let mut query = world.query_filtered::<(
         &Mesh,
@@ -170,13 +183,16 @@ fn collect(world: &mut World, settings: &SceneSettings, options: TwinOptions) ->
         Option<&Shading>,
         Option<&Lightmap>,
     )| {
+        // Of unit size, so that what counts as no normal does not depend on the scale.
         let normals = place.normal_matrix();
+        let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let normals = if largest > 0.0 { normals * (1.0 / largest) } else { normals };
         let vertex = |index: u32| {
             let index = index as usize;
             let normal = mesh.0.normals.get(index).map_or(DVec3::ZERO, |normal| normal.as_dvec3());
             Vertex {
                 point: place.0.transform_point3(mesh.0.positions[index].as_dvec3()),
-                normal: (normals * normal).try_normalize().unwrap_or(DVec3::ZERO),
+                normal: safe_normalize(normals * normal),
                 uv1: mesh.0.uv1.get(index).map_or(DVec2::ZERO, |uv| uv.as_dvec2()),
             }
         };
@@ -232,7 +248,7 @@ impl<'a> ShadedTriangle<'a> {
             Some(colors) => mix(colors),
             None => {
                 let normal = mix(vertices.each_ref().map(|vertex| vertex.normal));
-                self.lit(point, normal.try_normalize().unwrap_or(DVec3::ZERO))
+                self.lit(point, safe_normalize(normal))
             }
         };
         if let Some(lightmap) = &self.object.lightmap {
@@ -273,7 +289,7 @@ impl<'a> ShadedTriangle<'a> {
                 added = Contribution::ZERO;
             }
             if mapped && light.bake == lumbre_optics::BakeMode::Static {
-                added = Contribution { specular: added.specular, ..Contribution::ZERO };
+                added.diffuse = DVec3::ZERO;
             }
             sum = sum + added;
         }

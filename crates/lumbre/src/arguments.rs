@@ -1,6 +1,7 @@
 //! The command line: what can be asked for. Not what is done about it.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{ReflectionModel, Shading};
@@ -52,7 +53,7 @@ Examples:
     Explain(Explain),
 }
 
-#[derive(Args, Debug, Default)]
+#[derive(Args, Debug)]
 pub struct Play {
     /// A level; without one the demo level, baked first if it is not baked.
     pub level: Option<PathBuf>,
@@ -76,6 +77,17 @@ pub struct Play {
     pub quit_after: Option<u32>,
 }
 
+impl Play {
+    /// What `lumbre play` says without a word more.
+    pub fn parse_from_defaults() -> Self {
+        match Arguments::parse_from(["lumbre", "play"]).command {
+            Some(Command::Play(play)) => play,
+            // The line above names the command.
+            _ => unreachable!("`lumbre play` is the play command"),
+        }
+    }
+}
+
 #[derive(Args, Debug)]
 pub struct Bake {
     /// The level: .glb or .gltf.
@@ -87,8 +99,8 @@ pub struct Bake {
     #[arg(long, default_value_t = 0.01, value_parser = positive)]
     pub error: f64,
     /// Seconds after which no further samples are begun.
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
-    pub time: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub time: Option<Duration>,
     /// Texels along a metre of surface; chosen from the scene's area without this.
     #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "map_size")]
     pub texels_per_meter: Option<f64>,
@@ -121,7 +133,7 @@ pub enum BakeQuality {
 pub struct Render {
     /// The scene: .glb or .gltf, baked or not.
     pub input: PathBuf,
-    /// The frame: .png (eight bits) or .exr (floats). Several frames are numbered.
+    /// The frame: .png (eight bits) or .exr (floats).
     #[arg(short, long, value_name = "OUT.png|OUT.exr")]
     pub output: PathBuf,
     /// Width and height in pixels.
@@ -180,14 +192,25 @@ pub struct Frame {
     #[arg(long)]
     pub msaa: bool,
     /// Factor on radiance before it is shown, instead of the camera's.
-    #[arg(long, value_name = "X", value_parser = positive)]
-    pub exposure: Option<f64>,
+    #[arg(long, value_name = "X", value_parser = factor)]
+    pub exposure: Option<f32>,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("a number greater than 0 is wanted".into()),
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    Duration::try_from_secs_f64(positive(text)?).map_err(|error| error.to_string())
+}
+
+fn factor(text: &str) -> Result<f32, String> {
+    match positive(text)? as f32 {
+        value if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("a number that 32 bits hold is wanted".into()),
     }
 }
 

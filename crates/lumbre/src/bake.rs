@@ -2,17 +2,19 @@
 
 use std::io::Write;
 use std::ops::ControlFlow;
-use std::time::Duration;
+use std::path::Path;
 
+use anyhow::{Context, bail};
 use lumbre::bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre::scene::save;
 
 use crate::arguments::{Bake, BakeQuality};
-use crate::loading::load;
+use crate::loading::{extension, load};
 use crate::output::progress_bar;
 
 /// Runs the command.
 pub fn run(asked: &Bake) -> anyhow::Result<()> {
+    check_output(&asked.output)?;
     let mut world = load(&asked.input)?;
     if asked.resume {
         eprintln!(
@@ -28,7 +30,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let options = BakeOptions {
         density,
         error: asked.error,
-        time: asked.time.map(Duration::from_secs_f64),
+        time: asked.time,
         quality: match asked.quality {
             BakeQuality::Draft => Quality::Draft,
             BakeQuality::Final => Quality::Final,
@@ -43,7 +45,9 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         ControlFlow::Continue(())
     })?;
     bar.finish_and_clear();
-    save(&mut world, &asked.output)?;
+    for note in save(&mut world, &asked.output)?.notes {
+        eprintln!("lumbre: note: {}: {note}", asked.output.display());
+    }
     for warning in &report.warnings {
         eprintln!("lumbre: warning: {warning}");
     }
@@ -55,6 +59,18 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         write!(out, "{}", summary(&report))?;
     }
     Ok(())
+}
+
+/// What would be wrong with the output is said before the work, not after it.
+fn check_output(path: &Path) -> anyhow::Result<()> {
+    let extension = extension(path)?;
+    if !["glb", "gltf"].contains(&extension.as_str()) {
+        bail!("{}: .{extension} is not written, only .glb and .gltf", path.display());
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::tempfile_in(folder)
+        .map(drop)
+        .with_context(|| format!("{}: the folder {} cannot be written to", path.display(), folder.display()))
 }
 
 /// The report for people.

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::bail;
 use bevy_ecs::prelude::*;
 use lumbre::render::{Display, FrameOptions};
-use lumbre::scene::{self, Camera, GlobalTransform, Name};
+use lumbre::scene::{self, ActiveCamera, Camera, GlobalTransform, Name};
 
 use crate::arguments::Frame;
 
@@ -38,7 +38,7 @@ pub fn frame_options(
         lightmaps: !frame.no_lightmaps,
         multisample: frame.msaa,
         display,
-        exposure: frame.exposure.map(|exposure| exposure as f32),
+        exposure: frame.exposure,
         full_precision: display != Display::Srgb,
         ..FrameOptions::default()
     })
@@ -48,15 +48,23 @@ pub fn frame_options(
 fn camera(world: &mut World, asked: Option<&str>, aspect: f64) -> anyhow::Result<Entity> {
     let order = world.remove_resource::<FileOrder>().map_or(Vec::new(), |order| order.0);
     let place = |entity: Entity| order.iter().position(|node| *node == entity).unwrap_or(usize::MAX);
-    let mut query = world.query_filtered::<(Entity, Option<&Name>), (With<Camera>, With<GlobalTransform>)>();
-    let mut cameras: Vec<(usize, Entity, String)> = query
+    let mut query = world
+        .query_filtered::<(Entity, Option<&Name>, Has<ActiveCamera>), (With<Camera>, With<GlobalTransform>)>(
+        );
+    let mut cameras: Vec<(usize, Entity, String, bool)> = query
         .iter(world)
-        .map(|(entity, name)| (place(entity), entity, name.map_or(String::new(), ToString::to_string)))
+        .map(|(entity, name, active)| {
+            (place(entity), entity, name.map_or(String::new(), ToString::to_string), active)
+        })
         .collect();
     cameras.sort();
+    let active = cameras.iter().find(|(.., active)| *active).map(|(_, entity, ..)| *entity);
     let cameras: Vec<(Entity, String)> =
-        cameras.into_iter().map(|(_, entity, name)| (entity, name)).collect();
+        cameras.into_iter().map(|(_, entity, name, _)| (entity, name)).collect();
     let Some(asked) = asked else {
+        if let Some(active) = active {
+            return Ok(active);
+        }
         return Ok(match cameras.first() {
             Some((entity, _)) => *entity,
             None => {

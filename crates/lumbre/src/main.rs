@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn,wgpu_hal=error,wgpu_core=error"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
     let outcome = match arguments.command {
-        None => play::run(&arguments::Play::default()),
+        None => play::run(&arguments::Play::parse_from_defaults()),
         Some(Command::Play(options)) => play::run(&options),
         Some(Command::Bake(options)) => bake::run(&options),
         Some(Command::Render(options)) => render::run(&options),

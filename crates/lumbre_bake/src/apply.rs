@@ -1,10 +1,10 @@
-//! Writes a finished bake into the World: meshes with `uv1`, lightmaps, static lights. The only place that changes it.
+//! Writes a finished bake into the World: meshes with `uv1`, and lightmaps. The only place that changes it.
 
 use std::collections::HashSet;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use bevy_ecs::world::World;
+use bevy_ecs::prelude::{Entity, With, World};
 use glam::Vec3;
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, Mesh};
 
@@ -13,6 +13,7 @@ use crate::scene::{LightmapLayout, Object};
 
 /// Gives every object its map: E/π, and 0 where nothing is known.
 pub(crate) fn apply(world: &mut World, objects: &[Object], layout: &LightmapLayout, irradiance: &[Vec3]) {
+    forget_lightmaps(world, objects);
     let mut names = HashSet::new();
     for (index, object) in objects.iter().enumerate() {
         let map = &layout.maps[index];
@@ -34,6 +35,16 @@ pub(crate) fn apply(world: &mut World, objects: &[Object], layout: &LightmapLayo
             }
             entity.insert(Lightmap { image: Arc::clone(&image) });
         }
+    }
+}
+
+/// Takes away the lightmaps of an earlier bake from everything but `objects`: their light would count twice.
+pub(crate) fn forget_lightmaps(world: &mut World, objects: &[Object]) {
+    let kept: HashSet<_> = objects.iter().flat_map(|object| &object.parts).map(|part| part.entity).collect();
+    let mut mapped = world.query_filtered::<Entity, With<Lightmap>>();
+    let stale: Vec<Entity> = mapped.iter(world).filter(|entity| !kept.contains(entity)).collect();
+    for entity in stale {
+        world.entity_mut(entity).remove::<Lightmap>();
     }
 }
 

@@ -58,6 +58,8 @@ fn run(
     let placed = lights(world);
     if objects.is_empty() {
         report.skipped.push("everything: the scene has no static mesh".into());
+        apply::forget_lightmaps(world, &[]);
+        report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
     let points =
@@ -71,6 +73,8 @@ fn run(
     report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
     if sources.is_empty() {
         report.skipped.push("everything: no surface emits, and no light is static or mixed".into());
+        apply::forget_lightmaps(world, &[]);
+        report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
     name_what_is_missing(&sources, &mut report);

@@ -28,6 +28,15 @@ pub enum BakeError {
         /// What is wrong.
         source: lumbre_mesh::MeshError,
     },
+    /// A material reads the coordinates that the lightmap would have to replace.
+    #[error(
+        "{object}: a texture of its material uses TEXCOORD_1, which overlaps or tiles and so cannot hold a lightmap; put the texture's \
+         coordinates into TEXCOORD_0, or give the mesh a TEXCOORD_1 without overlaps"
+    )]
+    CoordinatesInUse {
+        /// The node's name.
+        object: String,
+    },
     /// A mesh got no lightmap coordinates.
     #[error("{object} cannot be unwrapped: {source}")]
     Unwrap {

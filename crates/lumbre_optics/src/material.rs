@@ -76,7 +76,7 @@ pub struct Material {
     pub alpha_mode: AlphaMode,
     /// Back faces are drawn, lit with the reversed normal.
     pub double_sided: bool,
-    /// Shows `front.emission + front.diffuse` whatever the light (KHR_materials_unlit).
+    /// Shows `front.diffuse` (times texture and vertex colour) whatever the light, and no emission (KHR_materials_unlit).
     pub unlit: bool,
     /// k_r of the ray tree, linear RGB.
     pub mirror: Vec3,

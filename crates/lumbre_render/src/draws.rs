@@ -76,6 +76,7 @@ impl Draws {
                 mirrored: object.mirrored,
                 double_sided: traits.double_sided,
                 blend: pass == LitPass::Transparent,
+                texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
             };
             visible.push(Visible { pass, slot, distance: distance(object, view.eye), object, pipeline });
         }

@@ -26,6 +26,12 @@ pub enum RenderError {
     /// The device is gone (driver reset, unplugged): a new `Gpu` and `Renderer` are needed.
     #[error("the graphics device is lost; create a new Gpu and Renderer")]
     DeviceLost,
+    /// The device refused a command: out of memory, or a fault of ours.
+    #[error("the graphics device refused a command: {message}")]
+    Refused {
+        /// The device's words.
+        message: String,
+    },
     /// A window's surface could not be made.
     #[error("the window gives no surface to draw on: {0}")]
     Surface(#[from] wgpu::CreateSurfaceError),
@@ -65,6 +71,22 @@ pub enum RenderError {
         height: u32,
         /// The device's limit for either side.
         limit: u32,
+    },
+    /// A texture that is no picture.
+    #[error(
+        "image `{name}`: {width}x{height} texels, but {found} values instead of {expected}; sizes start at 1"
+    )]
+    BadImage {
+        /// Name of the image.
+        name: String,
+        /// Width in texels.
+        width: u32,
+        /// Height in texels.
+        height: u32,
+        /// Values there are.
+        found: usize,
+        /// Values there should be.
+        expected: u64,
     },
     /// More than a storage buffer holds.
     #[error("{what}: {bytes} bytes are beyond this device's storage buffers of {limit}; have fewer of them")]

@@ -68,14 +68,12 @@ impl FramePlan {
         let wide = wgpu::TextureFormat::Rgba32Float;
         let features = gpu.device.features();
         // Without these features WebGPU promises neither blending nor multisampling of 32-bit floats.
-        let wide_works = (!self.transparent || features.contains(wgpu::Features::FLOAT32_BLENDABLE))
-            && (self.samples == 1
-                || features.contains(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
-                    && gpu
-                        .adapter
-                        .get_texture_format_features(wide)
-                        .flags
-                        .sample_count_supported(self.samples));
+        let flags = gpu.adapter.get_texture_format_features(wide).flags;
+        let resolves = features.contains(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
+            && flags.sample_count_supported(self.samples)
+            && flags.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
+        let blends = features.contains(wgpu::Features::FLOAT32_BLENDABLE);
+        let wide_works = (!self.transparent || blends) && (self.samples == 1 || resolves);
         let linear = options.display == Display::Linear && exposure == 1.0;
         self.direct = wide_works && target.format == wide && linear;
         if self.direct || options.full_precision && wide_works {

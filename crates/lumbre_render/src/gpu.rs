@@ -1,7 +1,7 @@
 //! The device that everything is drawn with. Not a window: a surface is made from one in `window_surface`.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use crate::RenderError;
 
@@ -17,6 +17,7 @@ pub struct Gpu {
     /// The queue.
     pub queue: wgpu::Queue,
     lost: Arc<AtomicBool>,
+    fault: Arc<Mutex<Option<String>>>,
 }
 
 /// Features that are used where they exist: queries to measure with, and what full-precision frames need.
@@ -76,13 +77,34 @@ impl Gpu {
             tracing::warn!("the GPU device is lost ({reason:?}): {message}");
             flag.store(true, Ordering::Relaxed);
         });
-        device.on_uncaptured_error(Arc::new(|error| tracing::error!("GPU error: {error}")));
-        Ok(Self { instance, adapter, device, queue, lost })
+        let fault = Arc::new(Mutex::new(None));
+        let first = Arc::clone(&fault);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            tracing::error!("GPU error: {error}");
+            if let Ok(mut first) = first.lock() {
+                first.get_or_insert_with(|| error.to_string());
+            }
+        }));
+        Ok(Self { instance, adapter, device, queue, lost, fault })
     }
 
     /// Whether the device is gone: make another `Gpu` and another renderer.
     pub fn is_lost(&self) -> bool {
         self.lost.load(Ordering::Relaxed)
+    }
+
+    /// What the device refused since this was asked last (out of memory, or a fault of ours): the frame is not to be trusted.
+    ///
+    /// # Errors
+    /// [`RenderError::DeviceLost`], [`RenderError::Refused`].
+    pub fn check(&self) -> Result<(), RenderError> {
+        if self.is_lost() {
+            return Err(RenderError::DeviceLost);
+        }
+        match self.fault.lock().ok().and_then(|mut fault| fault.take()) {
+            Some(message) => Err(RenderError::Refused { message }),
+            None => Ok(()),
+        }
     }
 
     /// Name and driver of the adapter, for reports: figures mean little without them.

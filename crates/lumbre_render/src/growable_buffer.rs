@@ -60,12 +60,14 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
     pub fn upload(&mut self, gpu: &Gpu) -> Result<bool, RenderError> {
         let mut renewed = false;
         if self.buffer.is_none() || self.values.len() > self.capacity {
-            self.capacity = self.values.len().next_power_of_two().max(1);
-            let size = (self.capacity * size_of::<T>()) as u64;
             let limit = gpu.device.limits().max_storage_buffer_binding_size;
-            if size > limit {
-                return Err(RenderError::BufferTooLarge { what: self.label, bytes: size, limit });
+            let bytes = size_of_val(self.values.as_slice()) as u64;
+            if bytes > limit {
+                return Err(RenderError::BufferTooLarge { what: self.label, bytes, limit });
             }
+            let most = usize::try_from(limit).unwrap_or(usize::MAX) / size_of::<T>();
+            self.capacity = self.values.len().next_power_of_two().max(1).min(most);
+            let size = (self.capacity * size_of::<T>()) as u64;
             self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(self.label),
                 size,

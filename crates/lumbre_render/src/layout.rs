@@ -60,6 +60,12 @@ impl ObjectData {
     }
 }
 
+/// A colour made in code that holds no number is black where it does: no frame holds NaN. Files are checked when they are loaded.
+pub(crate) fn finite(color: Vec3) -> Vec3 {
+    let channel = |value: f32| if value.is_finite() { value } else { 0.0 };
+    Vec3::new(channel(color.x), channel(color.y), channel(color.z))
+}
+
 /// `Side`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -81,13 +87,13 @@ impl SideData {
             _ => 0.0,
         };
         Self {
-            ambient: surface.ambient,
+            ambient: finite(surface.ambient),
             shininess: surface.shininess_in_range(),
-            diffuse: surface.diffuse,
-            alpha: material.alpha,
-            specular: surface.specular,
+            diffuse: finite(surface.diffuse),
+            alpha: if material.alpha.is_finite() { material.alpha } else { 1.0 },
+            specular: finite(surface.specular),
             ior: material.ior,
-            emission: surface.emission,
+            emission: finite(surface.emission),
             alpha_cutoff,
         }
     }

@@ -123,6 +123,7 @@ fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, RenderErr
         texture.size(),
     );
     gpu.queue.submit([encoder.finish()]);
+    gpu.check()?;
     let slice = buffer.slice(..);
     let (sender, receiver) = std::sync::mpsc::channel();
     slice.map_async(wgpu::MapMode::Read, move |result| {

@@ -1,6 +1,7 @@
 //! Render pipelines of the forward shader's variants, made when a draw first asks for one. Which draw asks for which: `draws`.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use lumbre_optics::Shading;
 
@@ -22,6 +23,8 @@ pub(crate) struct PipelineKey {
     pub mirrored: bool,
     pub double_sided: bool,
     pub blend: bool,
+    /// The material textures that are bound: the layout of their group. An unlit variant does not read all of them.
+    pub texture_mask: u8,
 }
 
 /// A pipeline and the attributes that it reads, in the order of its vertex buffers.
@@ -62,17 +65,15 @@ impl Pipelines {
         gpu: &Gpu,
         sets: &mut TextureSets,
         key: PipelineKey,
-        texture_mask: u8,
     ) -> Result<(), RenderError> {
         if self.pipelines.contains_key(&key) {
             return Ok(());
         }
-        if !self.modules.contains_key(&key.variant) {
-            let module = shader::compile(&gpu.device, "forward", &key.variant.flags())?;
-            self.modules.insert(key.variant, module);
-        }
-        let module = &self.modules[&key.variant];
-        let textures = sets.layout(gpu, texture_mask);
+        let module = match self.modules.entry(key.variant) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(new) => new.insert(shader::compile(&gpu.device, "forward", &key.variant.flags())?),
+        };
+        let textures = sets.layout(gpu, key.texture_mask);
         let lightmap = key.variant.has(Feature::Lightmap).then(|| sets.lightmap_layout(gpu));
         let pipeline = make(gpu, module, &self.frame_layout, [textures.as_ref(), lightmap.as_ref()], key)?;
         self.pipelines.insert(key, pipeline);
@@ -181,7 +182,7 @@ fn make(
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
             depth_write_enabled: Some(!key.blend),
-            // Reversed-Z: nearer is greater. Equal passes, so that of coplanar faces the one drawn last is seen, as in the file.
+            // Reversed-Z: nearer is greater. Equal passes: of coplanar faces the one drawn last is seen.
             depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
             stencil: Default::default(),
             bias: Default::default(),

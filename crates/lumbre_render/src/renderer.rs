@@ -10,7 +10,7 @@ use crate::draws::Draws;
 use crate::extract::{CameraView, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
 use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
 use crate::growable_buffer::GrowableBuffer;
-use crate::layout::{FrameData, InstanceData, LightData};
+use crate::layout::{FrameData, InstanceData, LightData, finite};
 use crate::light_lists::LightLists;
 use crate::mesh_buffers::MeshBuffers;
 use crate::pipelines::{Pipelines, attributes, is_flat};
@@ -92,7 +92,9 @@ impl Renderer {
     /// # Errors
     /// [`RenderError::Run`] if the device was lost.
     pub fn wait(&mut self) -> Result<Option<&lumbre_graph::FrameReport>, RenderError> {
-        Ok(self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?)
+        let measured = self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?;
+        self.gpu.check()?;
+        Ok(measured)
     }
 
     fn draw(
@@ -102,9 +104,7 @@ impl Renderer {
         options: &FrameOptions,
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
-        if self.gpu.is_lost() {
-            return Err(RenderError::DeviceLost);
-        }
+        self.gpu.check()?;
         // The system cannot fail: it has no parameter that may be missing.
         let _ = world.run_system_cached(propagate_transforms);
         let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
@@ -117,13 +117,17 @@ impl Renderer {
             &mut self.textures,
             &mut self.sets,
             view.eye,
-        );
+        )?;
         let (mut lights, mut reaches) = extract_lights(world, &mut self.lights, self.objects.origin);
         if !options.lightmaps {
             lights.dynamic = lights.all;
             reaches.iter_mut().for_each(|reach| reach.baked = false);
         }
         let exposure = options.exposure.unwrap_or(view.exposure);
+        if !(exposure > 0.0 && exposure.is_finite()) {
+            let (field, value, wanted) = ("exposure", f64::from(exposure), "greater than 0 and finite");
+            return Err(RenderError::BadCamera { entity: camera, field, value, wanted });
+        }
         let mut plan = FramePlan::new(self.objects.iter().map(|(_, object)| &object.traits), options);
         plan.choose_formats(&self.gpu, target, options, exposure);
         let features = FrameFeatures {
@@ -141,8 +145,7 @@ impl Renderer {
         let uploaded_bytes = self.upload(&view, &settings, &lights, exposure)?;
         let mut triangles = 0;
         for batch in draws.batches() {
-            let mask = batch.texture_set.as_ref().map_or(0, |set| set.mask);
-            self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline, mask)?;
+            self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline)?;
             let variant = &batch.pipeline.variant;
             if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
                 mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant));
@@ -178,9 +181,10 @@ impl Renderer {
             frame_group: self.frame_group.as_ref(),
             display: &self.display,
             display_key,
-            background: settings.background,
+            background: finite(settings.background),
         };
         let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
+        self.gpu.check()?;
         let measured = self.executor.latest_report().cloned();
         Ok(FrameReport { statistics, plan: frame.plan, measured })
     }
@@ -201,7 +205,7 @@ impl Renderer {
             exposure,
             backward: view.basis.z_axis.as_vec3(),
             padding: 0.0,
-            ambient: settings.ambient + lights.ambient,
+            ambient: finite(settings.ambient) + lights.ambient,
             padding_2: 0.0,
             fog_color: fog.map_or(glam::Vec3::ZERO, |fog| fog.color),
             padding_3: 0.0,
@@ -213,13 +217,19 @@ impl Renderer {
             + self.lights.pending_bytes()
             + self.instances.pending_bytes()
             + self.light_list.pending_bytes();
-        let mut renewed = self.frame_group.is_none();
-        renewed |= self.objects.transforms.upload(&self.gpu)?;
-        renewed |= self.objects.materials.upload(&self.gpu)?;
-        renewed |= self.instances.upload(&self.gpu)?;
-        renewed |= self.lights.upload(&self.gpu)?;
-        renewed |= self.light_list.upload(&self.gpu)?;
-        if renewed {
+        let renewed = [
+            self.objects.transforms.upload(&self.gpu),
+            self.objects.materials.upload(&self.gpu),
+            self.instances.upload(&self.gpu),
+            self.lights.upload(&self.gpu),
+            self.light_list.upload(&self.gpu),
+        ];
+        if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
+            // Whatever fails below, the old group names buffers that are gone.
+            self.frame_group = None;
+        }
+        renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
+        if self.frame_group.is_none() {
             let buffers = [
                 Some(&self.frame_uniform),
                 self.objects.transforms.buffer(),

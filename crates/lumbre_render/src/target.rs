@@ -14,7 +14,12 @@ impl FrameTarget {
     /// The first layer and mip level of a texture with RENDER_ATTACHMENT usage.
     pub fn from_texture(texture: &wgpu::Texture) -> Self {
         Self {
-            view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            view: texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                mip_level_count: Some(1),
+                array_layer_count: Some(1),
+                ..Default::default()
+            }),
             format: texture.format(),
             width: texture.width(),
             height: texture.height(),

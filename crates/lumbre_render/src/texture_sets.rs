@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use lumbre_scene::{Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
 
-use crate::Gpu;
 use crate::shader::Feature;
 use crate::textures::Textures;
+use crate::{Gpu, RenderError};
 
 /// The slots of a set in binding order: the feature that reads it, and whether its bytes are sRGB-encoded.
 const SLOTS: [(Feature, bool); 3] = [
@@ -71,27 +71,24 @@ impl TextureSets {
         gpu: &Gpu,
         textures: &mut Textures,
         material: &MaterialTextures,
-    ) -> Option<Arc<TextureSet>> {
+    ) -> Result<Option<Arc<TextureSet>>, RenderError> {
         let mask = mask(material);
-        let layout = self.layout(gpu, mask)?;
+        let Some(layout) = self.layout(gpu, mask) else { return Ok(None) };
         let slots = slots(material);
         let key = slots.map(|slot| slot.map(|t| (Arc::as_ptr(&t.image) as usize, t.sampler)));
         if let Some(set) = self.sets.get(&key) {
-            return Some(Arc::clone(set));
+            return Ok(Some(Arc::clone(set)));
         }
-        let bound: Vec<_> = slots
-            .iter()
-            .zip(SLOTS)
-            .enumerate()
-            .filter_map(|(index, (slot, (_, srgb)))| {
-                let texture = (*slot)?;
-                let view = textures.image(gpu, &texture.image, srgb);
-                Some((index as u32 * 2, view, textures.sampler(gpu, &texture.sampler)))
-            })
-            .collect();
+        let mut bound = Vec::new();
+        for ((slot, (_, srgb)), binding) in slots.iter().zip(SLOTS).zip((0..).step_by(2)) {
+            if let Some(texture) = slot {
+                let view = textures.image(gpu, &texture.image, srgb)?;
+                bound.push((binding, view, textures.sampler(gpu, &texture.sampler)));
+            }
+        }
         let set = Arc::new(TextureSet { mask, bind_group: bind(gpu, &layout, &bound) });
         self.sets.insert(key, Arc::clone(&set));
-        Some(set)
+        Ok(Some(set))
     }
 
     /// The layout of a lightmap's group.
@@ -105,19 +102,19 @@ impl TextureSets {
         gpu: &Gpu,
         textures: &mut Textures,
         lightmap: &Lightmap,
-    ) -> Arc<wgpu::BindGroup> {
+    ) -> Result<Arc<wgpu::BindGroup>, RenderError> {
         let key = Arc::as_ptr(&lightmap.image) as usize;
         if let Some(group) = self.lightmaps.get(&key) {
-            return Arc::clone(group);
+            return Ok(Arc::clone(group));
         }
         let layout = self.lightmap_layout(gpu);
-        let view = textures.lightmap(gpu, &lightmap.image);
+        let view = textures.lightmap(gpu, &lightmap.image)?;
         let (wrap_u, wrap_v) = (Wrap::ClampToEdge, Wrap::ClampToEdge);
         let sampler =
             textures.sampler(gpu, &Sampler { wrap_u, wrap_v, mipmap: Mipmap::None, ..Sampler::default() });
         let group = Arc::new(bind(gpu, &layout, &[(0, view, sampler)]));
         self.lightmaps.insert(key, Arc::clone(&group));
-        group
+        Ok(group)
     }
 
     /// Forgets what no object holds. Before `Textures::sweep`, which the groups would keep from forgetting.

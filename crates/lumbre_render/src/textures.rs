@@ -6,7 +6,7 @@ use std::sync::Arc;
 use half::f16;
 use lumbre_scene::{Image, LightmapImage, Mipmap, Sampler, Wrap};
 
-use crate::Gpu;
+use crate::{Gpu, RenderError};
 
 /// Textures and samplers in use, by the address of the shared image.
 #[derive(Debug, Default)]
@@ -18,17 +18,32 @@ pub(crate) struct Textures {
 
 impl Textures {
     /// The view of an image, whose bytes are sRGB-encoded or linear.
-    pub fn image(&mut self, gpu: &Gpu, image: &Arc<Image>, srgb: bool) -> wgpu::TextureView {
+    pub fn image(
+        &mut self,
+        gpu: &Gpu,
+        image: &Arc<Image>,
+        srgb: bool,
+    ) -> Result<wgpu::TextureView, RenderError> {
+        check(&image.name, image.width, image.height, image.rgba.len(), 4)?;
         let key = (Arc::as_ptr(image) as usize, srgb);
         let entry = self.images.entry(key);
-        entry.or_insert_with(|| (Arc::clone(image), upload(gpu, image, srgb))).1.clone()
+        Ok(entry.or_insert_with(|| (Arc::clone(image), upload(gpu, image, srgb))).1.clone())
     }
 
     /// The view of a lightmap: E/π, f16 per channel.
-    pub fn lightmap(&mut self, gpu: &Gpu, image: &Arc<LightmapImage>) -> wgpu::TextureView {
+    pub fn lightmap(
+        &mut self,
+        gpu: &Gpu,
+        image: &Arc<LightmapImage>,
+    ) -> Result<wgpu::TextureView, RenderError> {
+        check(&image.name, image.width, image.height, image.texels.len(), 1)?;
+        let limit = gpu.device.limits().max_texture_dimension_2d;
+        if image.width > limit || image.height > limit {
+            return Err(RenderError::TargetTooLarge { width: image.width, height: image.height, limit });
+        }
         let key = Arc::as_ptr(image) as usize;
         let entry = self.lightmaps.entry(key);
-        entry.or_insert_with(|| (Arc::clone(image), upload_lightmap(gpu, image))).1.clone()
+        Ok(entry.or_insert_with(|| (Arc::clone(image), upload_lightmap(gpu, image))).1.clone())
     }
 
     /// A sampler.
@@ -41,6 +56,15 @@ impl Textures {
         self.images.retain(|_, (image, _)| Arc::strong_count(image) > 1);
         self.lightmaps.retain(|_, (image, _)| Arc::strong_count(image) > 1);
     }
+}
+
+/// Whether an image made in code holds what its size says.
+fn check(name: &str, width: u32, height: u32, found: usize, per_texel: u64) -> Result<(), RenderError> {
+    let expected = u64::from(width) * u64::from(height) * per_texel;
+    if expected == 0 || found as u64 != expected {
+        return Err(RenderError::BadImage { name: name.to_owned(), width, height, found, expected });
+    }
+    Ok(())
 }
 
 fn make_sampler(gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
@@ -60,7 +84,9 @@ fn make_sampler(gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
             Mipmap::Linear => wgpu::MipmapFilterMode::Linear,
             Mipmap::None | Mipmap::Nearest => wgpu::MipmapFilterMode::Nearest,
         },
-        lod_max_clamp: if sampler.mipmap == Mipmap::None { 0.0 } else { 32.0 },
+        // Without mip levels: at level 0 exactly the filter for magnification would be taken, so the clamp stands a little above, where
+        // the nearest level is still the first (the Vulkan specification's way to OpenGL's filters without mip levels).
+        lod_max_clamp: if sampler.mipmap == Mipmap::None { 0.25 } else { 32.0 },
         ..Default::default()
     })
 }

@@ -25,6 +25,14 @@ pub struct MaterialTextures {
     pub metallic_roughness: Option<MetallicRoughnessTexture>,
 }
 
+impl MaterialTextures {
+    /// The textures that there are.
+    pub fn references(&self) -> impl Iterator<Item = &TextureReference> {
+        let mapped = self.metallic_roughness.as_ref().map(|mapped| &mapped.texture);
+        [self.base_color.as_ref(), self.emissive.as_ref(), mapped].into_iter().flatten()
+    }
+}
+
 /// A metallic-roughness texture with the factors that the per-texel mapping to Phong needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetallicRoughnessTexture {
@@ -80,7 +88,7 @@ pub enum Projection {
     Perspective {
         /// Vertical field of view in radians, in (0, π).
         vertical_fov: f64,
-        /// Width by height; the target's if absent.
+        /// Width by height as the file gave it, kept for export: a frame has its target's.
         aspect: Option<f64>,
         /// Near plane in metres, greater than 0. There is no far plane (reversed-Z, infinite); `far` is kept for export only.
         near: f64,

@@ -7,7 +7,9 @@ use glam::{DAffine3, Vec2, Vec3};
 use lumbre_mesh::uv_validation::validate_uv1;
 use lumbre_mesh::{TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
 
-use super::{Canonical, Object};
+use lumbre_scene::MaterialTextures;
+
+use super::{Canonical, Object, Part};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The texels of one object.
@@ -168,6 +170,13 @@ fn lay_out_object(
             )),
             Err(error) => warnings.push(format!("{}: {error}; it was unwrapped anew", object.name)),
         }
+    }
+    let reads_uv1 = |part: &Part| {
+        let textures = part.textures.iter();
+        textures.flat_map(MaterialTextures::references).any(|texture| texture.tex_coord == 1)
+    };
+    if object.parts.iter().any(reads_uv1) {
+        return Err(BakeError::CoordinatesInUse { object: object.name.clone() });
     }
     let (unwrapped, width, height) = match options.density {
         Density::MapSize(side) => (fit(object, &placed, side, options.gap)?, side, side),

@@ -10,9 +10,7 @@ mod occlusion;
 mod texture;
 mod triangles;
 
-#[cfg(test)]
-pub(crate) use collect::Part;
-pub(crate) use collect::{Object, PlacedLight, collect, lights};
+pub(crate) use collect::{Object, Part, PlacedLight, collect, lights};
 pub(crate) use lightmap_layout::{LightmapLayout, lay_out, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;

@@ -1,3 +1,5 @@
+//! The level is closed, walkable and what is shipped.
+
 use std::collections::BTreeMap;
 
 use glam::DVec3;

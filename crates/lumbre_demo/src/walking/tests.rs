@@ -1,3 +1,5 @@
+//! Walls stop, steps lift, nothing tunnels.
+
 use super::*;
 
 const STEP: f64 = 1.0 / 120.0;

@@ -40,6 +40,9 @@ impl CameraView {
         if !eye.is_finite() {
             return Err(bad("translation", eye.x + eye.y + eye.z, "finite"));
         }
+        if !(camera.exposure > 0.0 && camera.exposure.is_finite()) {
+            return Err(bad("exposure", f64::from(camera.exposure), "greater than 0 and finite"));
+        }
         let clip_from_view = match camera.projection {
             Projection::Perspective { vertical_fov, near, .. } => {
                 if !(vertical_fov > 0.0 && vertical_fov < std::f64::consts::PI) {

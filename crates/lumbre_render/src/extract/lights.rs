@@ -17,6 +17,8 @@ pub(crate) struct LightSet {
     pub all: u32,
     /// Sum of the ambient lights.
     pub ambient: Vec3,
+    /// Whether a baked light has an ambient colour.
+    pub static_ambient: bool,
     pub directional: bool,
     pub point: bool,
     pub spot: bool,
@@ -38,6 +40,7 @@ impl LightSet {
         }
         self.dynamic += u32::from(light.bake != BakeMode::Static);
         self.all += 1;
+        self.static_ambient |= light.bake == BakeMode::Static && light.ambient != Vec3::ZERO;
         self.directional |= light.kind == LightKind::Directional;
         self.point |= light.kind == LightKind::Point;
         self.spot |= light.spot.is_some_and(|cone| !cone.is_everywhere());
@@ -73,7 +76,9 @@ pub(crate) fn extract_lights(
 ) -> (LightSet, Vec<LightReach>) {
     let mut set = LightSet::default();
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
-    let mut found: Vec<_> = query.iter(world).filter(|(_, light, _)| shines(light)).collect();
+    let somewhere = |transform: &GlobalTransform| transform.0.is_finite();
+    let mut found: Vec<_> =
+        query.iter(world).filter(|(_, light, at)| shines(light) && somewhere(at)).collect();
     found.sort_by_key(|(entity, light, _)| (light.bake == BakeMode::Static, entity.index_u32()));
     found.iter().for_each(|(_, light, _)| set.add(light));
     found.retain(|(_, light, _)| light.kind != LightKind::Ambient);

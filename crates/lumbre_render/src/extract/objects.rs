@@ -12,12 +12,12 @@ use lumbre_optics::{Material, Shading};
 use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh};
 
 use super::Traits;
-use crate::Gpu;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{MaterialData, ObjectData};
 use crate::mesh_buffers::{MeshBuffers, MeshKey};
 use crate::texture_sets::{TextureSet, TextureSets};
 use crate::textures::Textures;
+use crate::{Gpu, RenderError};
 
 /// What the draws need to know of one object.
 #[derive(Debug)]
@@ -61,6 +61,8 @@ pub(crate) struct Objects {
     pub transforms: GrowableBuffer<ObjectData>,
     pub materials: GrowableBuffer<MaterialData>,
     frame: u64,
+    /// Something that the GPU holds may be in use no longer.
+    stale: bool,
     /// Where frame space has its origin in the world.
     pub origin: DVec3,
 }
@@ -78,6 +80,7 @@ impl Objects {
             transforms: GrowableBuffer::new("objects"),
             materials: GrowableBuffer::new("materials"),
             frame: 0,
+            stale: false,
             origin: DVec3::ZERO,
         }
     }
@@ -91,18 +94,18 @@ impl Objects {
         textures: &mut Textures,
         sets: &mut TextureSets,
         eye: DVec3,
-    ) {
+    ) -> Result<(), RenderError> {
         self.frame += 1;
         if self.state.as_ref().is_none_or(|(id, _)| *id != world.id()) {
             // Another World: nothing of the old one is left.
-            *self = Self { frame: self.frame, ..Self::new() };
+            *self = Self { frame: self.frame, stale: true, ..Self::new() };
             self.state = Some((world.id(), SystemState::new(world)));
         }
         let moved = (eye - self.origin).length() > ORIGIN_REACH;
         if moved {
             self.origin = eye;
         }
-        let Some((id, mut state)) = self.state.take() else { return };
+        let Some((id, mut state)) = self.state.take() else { return Ok(()) };
         if let Ok(query) = state.get(world) {
             let found = query.iter().filter(|found| found.3.0.is_finite());
             for (entity, mesh, material, transform, maps, lightmap, shading) in found {
@@ -123,6 +126,7 @@ impl Objects {
                     || material.is_changed()
                     || maps_changed
                     || object.traits.texture_mask != traits.texture_mask;
+                self.stale |= !new && (remeshed || rematerialized || map_changed);
                 if remeshed {
                     object.mesh = meshes.insert(&mesh.0);
                 }
@@ -134,10 +138,16 @@ impl Objects {
                 }
                 if rematerialized {
                     self.materials.set(slot, MaterialData::new(&material, maps));
-                    object.texture_set = maps.and_then(|maps| sets.set(gpu, textures, maps));
+                    object.texture_set = match maps {
+                        Some(maps) => sets.set(gpu, textures, maps)?,
+                        None => None,
+                    };
                 }
                 if new || map_changed || object.lightmap.is_some() != lightmap.is_some() {
-                    object.lightmap = lightmap.map(|map| sets.lightmap(gpu, textures, map));
+                    object.lightmap = match lightmap {
+                        Some(map) => Some(sets.lightmap(gpu, textures, map)?),
+                        None => None,
+                    };
                 }
                 object.traits = traits;
                 object.seen = self.frame;
@@ -146,6 +156,7 @@ impl Objects {
         }
         self.state = Some((id, state));
         self.release(meshes, textures, sets);
+        Ok(())
     }
 
     fn slot(&mut self, entity: Entity) -> (usize, bool) {
@@ -172,7 +183,7 @@ impl Objects {
             }
             alive
         });
-        if self.slots.len() != before {
+        if self.slots.len() != before || std::mem::take(&mut self.stale) {
             sets.sweep();
             textures.sweep();
             meshes.sweep();

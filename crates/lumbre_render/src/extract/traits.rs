@@ -107,10 +107,11 @@ impl Traits {
         variant.set(Feature::Lightmap, lightmapped);
         variant.set(Feature::TwoSided, self.double_sided && settings.two_sided);
         variant.set(Feature::Lit, lit);
-        let LightSet { dynamic, all, directional, point, spot, .. } = frame.lights;
+        let LightSet { dynamic, all, directional, point, spot, static_ambient, .. } = frame.lights;
         variant.set(Feature::DynamicLights, dynamic > 0);
-        // Of a baked light only the highlight is left, if the material has one.
-        variant.set(Feature::StaticLights, all > dynamic && (!lightmapped || self.specular));
+        // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
+        let left = !lightmapped || self.specular || static_ambient;
+        variant.set(Feature::StaticLights, all > dynamic && left);
         variant.set(Feature::DirectionalLights, directional);
         variant.set(Feature::PointLights, point);
         variant.set(Feature::SpotLights, spot);

@@ -11,8 +11,7 @@ use lumbre_optics::{FogError, LightError, MaterialError};
 pub struct LoadError {
     /// The file, or the name given to its bytes.
     pub file: String,
-    /// What is wrong, and where.
-    #[source]
+    /// What is wrong, and where; part of the message, so that a chain of causes does not say it twice.
     pub problem: Box<LoadProblem>,
 }
 
@@ -226,7 +225,7 @@ impl Notes {
     pub(crate) fn add(&mut self, place: impl Into<String>, text: impl Into<String>) {
         let note = Note { place: place.into(), text: text.into() };
         if !self.0.contains(&note) {
-            tracing::warn!("{note}");
+            tracing::debug!("{note}");
             self.0.push(note);
         }
     }

@@ -45,7 +45,8 @@ pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Va
     }
     let reread = PunctualLight::deserialize_value(&written)
         .and_then(|source| import_light::light(&source, place).ok());
-    if reread.as_ref() != Some(light) {
+    // A static light is marked as such in so many words: that is how a baked file says what is in its lightmaps.
+    if reread.as_ref() != Some(light) || light.bake == BakeMode::Static {
         let phong = serde_json::to_value(phong(light, reread.and_then(|light| light.spot)));
         let phong = phong.map_err(|source| SaveError::Json { source })?;
         written["extensions"] = json!({"LUMBRE_lights_phong": phong});

@@ -1,5 +1,7 @@
 //! glTF materials into Phong ones, with their textures. Not the mapping's equations: those are in `lumbre_optics`.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use lumbre_optics::{AlphaMode, Material, Surface};
 
@@ -8,7 +10,7 @@ use super::error::{LoadProblem, Notes};
 use super::extensions::{EmissiveStrength, PhongMaterial, PhongSurface};
 use super::import_image::Images;
 use super::value::{color, number};
-use crate::{MaterialTextures, MetallicRoughnessTexture};
+use crate::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 
 /// Reads one material. Textures that only other renderings use (normal, occlusion) are left out with a note.
 pub(crate) fn material(
@@ -51,6 +53,17 @@ pub(crate) fn material(
             metallic,
             roughness,
         });
+    }
+    // A metal's highlight has the colour of its base texture: that takes the per-texel mapping, here with factors alone.
+    if textures.metallic_roughness.is_none()
+        && metallic > 0.0
+        && phong.is_none()
+        && let Some(base_texture) = &textures.base_color
+    {
+        let white = Image { name: "white".into(), width: 1, height: 1, rgba: vec![255; 4] };
+        let texture = TextureReference { image: Arc::new(white), ..base_texture.clone() };
+        textures.metallic_roughness =
+            Some(MetallicRoughnessTexture { texture, base_color: base, metallic, roughness });
     }
     for (unused, what) in [(&source.normal_texture, "normal"), (&source.occlusion_texture, "occlusion")] {
         if unused.is_some() {

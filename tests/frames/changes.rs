@@ -1,0 +1,236 @@
+//! Changes between frames: a renderer that has drawn before shows what a fresh one shows, bit for bit, and uploads only what changed.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use lumbre_mesh::shapes;
+use lumbre_optics::{Light, Material, Shading};
+use lumbre_render::FrameReport;
+use lumbre_scene::{Camera, Hidden, MaterialTextures, Mesh, SceneSettings, Transform};
+use lumbre_tests::panes::{image, sharp};
+
+use crate::adapter::{Canvas, draw, linear};
+
+const SIZE: u32 = 48;
+/// Objects of the scene.
+const OBJECTS: usize = 60;
+
+// Bytes that the shaders read of one of each (crates/lumbre_render/src/layout.rs asserts these sizes).
+const OBJECT: u64 = 96;
+const MATERIAL: u64 = 256;
+const LIGHT: u64 = 96;
+/// Per object in view: which it is, and where its lights stand.
+const INSTANCE: u64 = 16;
+/// Per light in a list.
+const INDEX: u64 = 4;
+
+struct Scene {
+    world: World,
+    objects: Vec<Entity>,
+    lights: Vec<Entity>,
+    canvas: Canvas,
+}
+
+/// A grid of balls and boxes under five lamps, drawn once.
+fn scene() -> Scene {
+    let mut world = World::new();
+    let shapes = [Arc::new(shapes::uv_sphere(0.3, 12, 8)), Arc::new(shapes::cuboid(Vec3::splat(0.45), 1))];
+    let mut objects = Vec::new();
+    for number in 0..OBJECTS {
+        let (x, y) = ((number % 10) as f64 * 0.6 - 2.7, (number / 10) as f64 * 0.6 - 1.5);
+        let mut material = Material::matt(Vec3::new(0.1 + 0.015 * number as f32, 0.5, 0.3));
+        material.front.specular = Vec3::splat(0.3);
+        let object = (Mesh(Arc::clone(&shapes[number % 2])), material, Transform::from_xyz(x, y, 0.0));
+        objects.push(world.spawn(object).id());
+    }
+    let lights = (0..5)
+        .map(|number| {
+            let place = Transform::from_xyz(f64::from(number) - 2.0, 1.5, 2.0);
+            world.spawn((Light::point(Vec3::splat(1.0)), place)).id()
+        })
+        .collect();
+    let eye = Transform::from_xyz(0.4, 0.3, 5.5).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Camera::default(), eye));
+    world.insert_resource(SceneSettings { ambient: Vec3::splat(0.1), ..SceneSettings::default() });
+    let mut scene = Scene { world, objects, lights, canvas: Canvas::new(SIZE, SIZE) };
+    let (_, report) = scene.canvas.draw(&mut scene.world, &linear());
+    assert_eq!(report.statistics.objects, OBJECTS, "all are in view");
+    let all = OBJECTS as u64 * (OBJECT + MATERIAL + INSTANCE) + 5 * (LIGHT + INDEX);
+    assert_eq!(report.statistics.uploaded_bytes, all, "the first frame uploads everything once");
+    scene
+}
+
+impl Scene {
+    /// Draws with the old renderer and a fresh one.
+    fn redrawn(&mut self) -> (Vec<DVec3>, FrameReport) {
+        let (kept, report) = self.canvas.draw(&mut self.world, &linear());
+        let (fresh, _) = draw(&mut self.world, SIZE, SIZE, &linear());
+        let differ = kept.iter().zip(&fresh).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "{differ} pixels differ from a fresh renderer's");
+        (kept, report)
+    }
+
+    /// Applies a change, checks that it is seen and that it costs no more than `bytes`.
+    fn change(&mut self, bytes: u64, change: impl FnOnce(&mut Self)) -> FrameReport {
+        let (before, _) = self.canvas.draw(&mut self.world, &linear());
+        change(self);
+        let (after, report) = self.redrawn();
+        assert!(before != after, "negative control: the change is seen");
+        let uploaded = report.statistics.uploaded_bytes;
+        assert!(uploaded <= bytes, "{uploaded} bytes were uploaded, not {bytes}");
+        // Whatever changed, it is uploaded once.
+        let (_, report) = self.canvas.draw(&mut self.world, &linear());
+        assert_eq!(report.statistics.uploaded_bytes, 0);
+        report
+    }
+}
+
+#[test]
+fn a_frame_in_which_nothing_changed_uploads_nothing() {
+    // Of components, that is: the uniform of the frame (the camera, 144 bytes) is written every time and not counted.
+    let mut scene = scene();
+    let (first, report) = scene.redrawn();
+    assert_eq!(report.statistics.uploaded_bytes, 0);
+    let (second, report) = scene.redrawn();
+    assert_eq!(report.statistics.uploaded_bytes, 0);
+    assert!(first == second);
+}
+
+#[test]
+fn a_moved_object_uploads_its_transform() {
+    let mut scene = scene();
+    scene.change(OBJECT, |scene| {
+        let moved = scene.objects[34];
+        // Along the plane of the grid and so little that the order of the draws stays.
+        scene.world.get_mut::<Transform>(moved).unwrap().translation.y += 0.02;
+    });
+    // Far to the front: the order of the draws changes too, at most all of it.
+    scene.change(OBJECT + OBJECTS as u64 * INSTANCE, |scene| {
+        let moved = scene.objects[34];
+        scene.world.get_mut::<Transform>(moved).unwrap().translation.z += 2.0;
+    });
+}
+
+#[test]
+fn a_turned_light_and_a_dimmed_one_upload_themselves() {
+    let mut scene = scene();
+    scene.change(LIGHT, |scene| {
+        let light = scene.lights[2];
+        scene.world.get_mut::<Transform>(light).unwrap().translation += DVec3::new(0.3, -0.2, 0.5);
+    });
+    scene.change(LIGHT, |scene| {
+        let light = scene.lights[4];
+        scene.world.get_mut::<Light>(light).unwrap().diffuse = Vec3::new(0.1, 0.2, 3.0);
+    });
+    // The first one switched off: those after it move up, and every list is one shorter.
+    let rest = 4 * (LIGHT + INDEX) + OBJECTS as u64 * INSTANCE;
+    scene.change(rest, |scene| {
+        let light = scene.lights[0];
+        scene.world.get_mut::<Light>(light).unwrap().enabled = false;
+    });
+    scene.change(rest + LIGHT, |scene| {
+        let light = scene.lights[0];
+        scene.world.get_mut::<Light>(light).unwrap().enabled = true;
+    });
+}
+
+#[test]
+fn a_changed_material_uploads_itself() {
+    let mut scene = scene();
+    scene.change(MATERIAL, |scene| {
+        let object = scene.objects[12];
+        scene.world.get_mut::<Material>(object).unwrap().front.diffuse = Vec3::new(0.9, 0.1, 0.0);
+    });
+    let texture = sharp(&image(2, &[[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255; 4]]));
+    let textures = MaterialTextures { base_color: Some(texture), ..MaterialTextures::default() };
+    scene.change(MATERIAL, |scene| {
+        let object = scene.objects[35];
+        scene.world.entity_mut(object).insert(textures);
+    });
+    scene.change(MATERIAL, |scene| {
+        let object = scene.objects[35];
+        scene.world.entity_mut(object).remove::<MaterialTextures>();
+    });
+    // Its technique is a matter of pipelines, not of bytes.
+    scene.change(0, |scene| {
+        let object = scene.objects[34];
+        scene.world.entity_mut(object).insert(Shading::Flat);
+    });
+}
+
+#[test]
+fn a_changed_mesh_shows() {
+    let mut scene = scene();
+    let taller = Arc::new(shapes::cuboid(Vec3::new(0.3, 0.9, 0.3), 2));
+    scene.change(OBJECTS as u64 * INSTANCE, |scene| {
+        let object = scene.objects[34];
+        scene.world.entity_mut(object).insert(Mesh(taller));
+    });
+}
+
+#[test]
+fn despawned_hidden_and_spawned_objects() {
+    let mut scene = scene();
+    let instances = OBJECTS as u64 * INSTANCE;
+    let report = scene.change(instances, |scene| {
+        let object = scene.objects[34];
+        scene.world.despawn(object);
+    });
+    assert_eq!(report.statistics.objects, OBJECTS - 1);
+    scene.change(instances, |scene| {
+        let object = scene.objects[25];
+        scene.world.entity_mut(object).insert(Hidden);
+    });
+    // Back again, it is an object like a new one.
+    scene.change(instances + OBJECT + MATERIAL, |scene| {
+        let object = scene.objects[25];
+        scene.world.entity_mut(object).remove::<Hidden>();
+    });
+    let report = scene.change(instances + OBJECT + MATERIAL, |scene| {
+        let added = (
+            Mesh(Arc::new(shapes::torus(0.3, 0.1, 16, 8))),
+            Material::default(),
+            Transform::from_xyz(0.0, 0.0, 1.0),
+        );
+        scene.world.spawn(added);
+    });
+    assert_eq!(report.statistics.objects, OBJECTS);
+}
+
+#[test]
+fn growing_beyond_every_buffer_keeps_what_was_there() {
+    // 60 objects have room for 64: 200 more make every buffer anew.
+    let mut scene = scene();
+    let mesh = scene.world.get::<Mesh>(scene.objects[0]).unwrap().clone();
+    for number in 0..200 {
+        let place =
+            Transform::from_xyz(f64::from(number % 20) * 0.3 - 3.0, f64::from(number / 20) * 0.3 - 1.5, -1.0);
+        scene.world.spawn((mesh.clone(), Material::matt(Vec3::new(0.2, 0.004 * number as f32, 0.9)), place));
+    }
+    for number in 0..40 {
+        let place = Transform::from_xyz(f64::from(number) * 0.1 - 2.0, -1.0, 1.0);
+        scene.world.spawn((Light::point(Vec3::new(0.1, 0.02, 0.05)), place));
+    }
+    let (_, report) = scene.redrawn();
+    assert_eq!(report.statistics.lights, 45);
+    let (_, report) = scene.redrawn();
+    assert_eq!(report.statistics.uploaded_bytes, 0);
+}
+
+#[test]
+fn one_renderer_serves_two_worlds_in_turn() {
+    let (mut first, mut second) = (scene(), scene());
+    let object = second.objects[34];
+    second.world.get_mut::<Transform>(object).unwrap().translation.z += 1.0;
+    for light in second.lights.drain(1..) {
+        second.world.despawn(light);
+    }
+    for _ in 0..2 {
+        for world in [&mut first.world, &mut second.world] {
+            let (kept, _) = first.canvas.draw(world, &linear());
+            let (fresh, _) = draw(world, SIZE, SIZE, &linear());
+            assert!(kept == fresh);
+        }
+    }
+}
