@@ -1,5 +1,7 @@
 //! The command line as its users meet it: exit statuses, messages, files, pipes.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Arc;
