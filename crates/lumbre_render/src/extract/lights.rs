@@ -28,8 +28,11 @@ impl LightSet {
     /// The lights of a World, counted.
     pub fn of(world: &mut World) -> Self {
         let mut set = Self::default();
-        let mut query = world.query::<&Light>();
-        query.iter(world).filter(|light| shines(light)).for_each(|light| set.add(light));
+        let mut query = world.query::<(&Light, &GlobalTransform)>();
+        query
+            .iter(world)
+            .filter(|(light, transform)| shines(light, transform))
+            .for_each(|(light, _)| set.add(light));
         set
     }
 
@@ -76,9 +79,8 @@ pub(crate) fn extract_lights(
 ) -> (LightSet, Vec<LightReach>) {
     let mut set = LightSet::default();
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
-    let somewhere = |transform: &GlobalTransform| transform.0.is_finite();
     let mut found: Vec<_> =
-        query.iter(world).filter(|(_, light, at)| shines(light) && somewhere(at)).collect();
+        query.iter(world).filter(|(_, light, transform)| shines(light, transform)).collect();
     found.sort_by_key(|(entity, light, _)| (light.bake == BakeMode::Static, entity.index_u32()));
     found.iter().for_each(|(_, light, _)| set.add(light));
     found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
@@ -88,7 +90,11 @@ pub(crate) fn extract_lights(
 }
 
 /// Whether a light adds anything; one whose numbers are out of range is left out rather than let into a frame.
-fn shines(light: &Light) -> bool {
+fn shines(light: &Light, transform: &GlobalTransform) -> bool {
     let colors = [light.ambient, light.diffuse, light.specular];
-    light.enabled && colors.iter().any(|color| *color != Vec3::ZERO) && light.validate("light").is_ok()
+    let placed = transform.0.is_finite();
+    placed
+        && light.enabled
+        && colors.iter().any(|color| *color != Vec3::ZERO)
+        && light.validate("light").is_ok()
 }
