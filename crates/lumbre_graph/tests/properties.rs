@@ -283,8 +283,9 @@ fn ten_passes() -> Graph<'static> {
     graph
 }
 
+/// Prints what ten passes cost (the aim is 50 microseconds in a release build); times are never asserted.
 #[test]
-fn declaring_and_compiling_ten_passes_is_cheap() {
+fn ten_passes_compile_and_six_of_them_merge() {
     // The best of many: the machine may do other things meanwhile.
     let best = |work: &dyn Fn()| {
         (0..200)
@@ -299,6 +300,8 @@ fn declaring_and_compiling_ten_passes_is_cheap() {
     let declare = best(&|| drop(ten_passes()));
     let both = best(&|| drop(ten_passes().compile().expect("valid")));
     eprintln!("ten passes: declare {declare:?}, declare and compile {both:?}");
-    // The aim is 50 microseconds in a release build; four times that leaves room for this one, which is not optimized.
-    assert!(both.as_micros() < 200, "{both:?}");
+    let plan = ten_passes().compile().expect("valid");
+    assert_eq!(plan.running().count(), 10);
+    // The six that draw into the same attachments are one wgpu pass.
+    assert_eq!(plan.groups().next().map(|group| group.len()), Some(6));
 }
