@@ -9,6 +9,7 @@ mod changes;
 mod conformance;
 mod degenerate;
 mod faces;
+mod highlights;
 mod level;
 mod materials;
 mod models;

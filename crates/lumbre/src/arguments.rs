@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use lumbre::optics::{ReflectionModel, Shading};
+use lumbre::optics::{FlatRule, ReflectionModel, Shading};
 use lumbre::render::Display;
 
 /// Lighting for games that tells you what it costs.
@@ -182,6 +182,12 @@ pub struct Frame {
     /// Takes this specular model instead of the file's: phong, blinn, blinn-4n, blinn-matched, torrance-sparrow.
     #[arg(long, value_name = "MODEL", value_parser = reflection)]
     pub reflection: Option<ReflectionModel>,
+    /// Where flat shading evaluates a polygon, whatever the file says.
+    #[arg(long, value_name = "centroid|first-vertex|last-vertex", value_parser = flat_rule)]
+    pub flat_rule: Option<FlatRule>,
+    /// Filters highlights within pixels under Phong shading, whatever the file says.
+    #[arg(long, value_name = "on|off", value_parser = on_or_off)]
+    pub specular_antialiasing: Option<bool>,
     /// From radiance to numbers: srgb for people (the default for PNG), linear as it is (for EXR), clamp as OpenGL.
     #[arg(long, value_name = "linear|clamp|srgb", value_parser = display)]
     pub display: Option<Display>,
@@ -234,6 +240,18 @@ fn shading(text: &str) -> Result<Shading, String> {
 
 fn reflection(text: &str) -> Result<ReflectionModel, String> {
     named(ReflectionModel::from_name(text), ReflectionModel::ALL.iter().map(|choice| choice.name()))
+}
+
+fn flat_rule(text: &str) -> Result<FlatRule, String> {
+    named(FlatRule::from_name(text), FlatRule::ALL.iter().map(|choice| choice.name()))
+}
+
+fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("on or off is wanted".into()),
+    }
 }
 
 fn display(text: &str) -> Result<Display, String> {

@@ -35,6 +35,8 @@ pub fn frame_options(
         camera: Some(camera(world, frame.camera.as_deref(), aspect)?),
         shading: frame.shading,
         reflection: frame.reflection,
+        flat_rule: frame.flat_rule,
+        specular_antialiasing: frame.specular_antialiasing,
         lightmaps: !frame.no_lightmaps,
         multisample: frame.msaa,
         display,

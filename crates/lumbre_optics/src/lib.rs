@@ -56,6 +56,7 @@ mod roughness;
 mod shade;
 mod shading;
 mod snell;
+mod specular_antialiasing;
 mod spot;
 mod torrance_sparrow;
 mod two_sided;
@@ -86,10 +87,13 @@ pub use phong::{phong, reflected_direction};
 pub use power::{cosine_lobe, power_of_cosine, safe_pow};
 pub use roughness::{MAX_SHININESS, shininess_from_roughness};
 pub use shade::{Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, shade, specular_factor};
-pub use shading::{ReflectionModel, Shading};
+pub use shading::{FlatRule, ReflectionModel, Shading};
 pub use snell::{
     critical_angle, is_totally_reflected, transmitted_cosine, transmitted_direction, transmitted_highlight,
     try_transmitted_direction,
+};
+pub use specular_antialiasing::{
+    FILTER_VARIANCE, FilteredLobe, LARGEST_WIDENING, filtered_lobe, lobe_widening,
 };
 pub use spot::{MINIMUM_COSINE_DIFFERENCE, SpotCone, SpotCosines, spot_factor};
 pub use torrance_sparrow::{

@@ -14,6 +14,18 @@ pub enum Shading {
     Phong,
 }
 
+/// Where flat shading evaluates a polygon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum FlatRule {
+    /// At its centroid with the face's normal: document \[M\].
+    #[default]
+    Centroid,
+    /// At its first vertex with that vertex's normal and colour: document \[I\].
+    FirstVertex,
+    /// At its last vertex with that vertex's normal and colour: OpenGL's `GL_FLAT`.
+    LastVertex,
+}
+
 /// The specular model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum ReflectionModel {
@@ -50,6 +62,7 @@ macro_rules! names {
 }
 
 names!(Shading, Flat => "flat", Gouraud => "gouraud", Phong => "phong");
+names!(FlatRule, Centroid => "centroid", FirstVertex => "first-vertex", LastVertex => "last-vertex");
 names!(ReflectionModel, Phong => "phong", Blinn => "blinn", Blinn4n => "blinn-4n",
     BlinnMatched => "blinn-matched", TorranceSparrow => "torrance-sparrow");
 
@@ -77,6 +90,9 @@ mod tests {
         }
         for &shading in Shading::ALL {
             assert_eq!(Shading::from_name(shading.name()), Some(shading));
+        }
+        for &rule in FlatRule::ALL {
+            assert_eq!(FlatRule::from_name(rule.name()), Some(rule));
         }
         assert_eq!(ReflectionModel::from_name("Phong"), None);
     }

@@ -41,6 +41,7 @@ pub fn explain(
     let features = FrameFeatures {
         shading: options.shading,
         reflection: options.reflection.unwrap_or(settings.reflection),
+        specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
         lightmaps: options.lightmaps,
         clamp: options.display == Display::Clamp,
         lights,

@@ -4,6 +4,7 @@ use glam::Vec3;
 use lumbre_graph::{
     Executor, Frame, Graph, Imports, LoadOp, RasterContext, TextureDescriptor, TextureHandle,
 };
+use lumbre_optics::FlatRule;
 
 use crate::display::DisplayPass;
 use crate::draws::{Batch, Draws};
@@ -36,6 +37,7 @@ pub(crate) struct Prepared<'a> {
     pub draws: &'a Draws,
     pub pipelines: &'a Pipelines,
     pub meshes: &'a MeshBuffers,
+    pub flat_rule: FlatRule,
     pub frame_group: Option<&'a wgpu::BindGroup>,
     pub display: &'a DisplayPass,
     pub display_key: Option<(DisplayVariant, wgpu::TextureFormat)>,
@@ -209,7 +211,7 @@ fn draw_batches<'a>(
         else {
             continue;
         };
-        let slices = mesh.slices(&pipeline.attributes, pipeline.flat);
+        let slices = mesh.slices(&pipeline.attributes, pipeline.flat.then_some(prepared.flat_rule));
         if slices.count == 0 {
             continue;
         }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3, Vec4};
 use lumbre_mesh::TriangleMesh;
+use lumbre_optics::FlatRule;
 use wgpu::util::DeviceExt;
 
 use crate::Gpu;
@@ -45,8 +46,8 @@ pub(crate) struct GpuMesh {
     source: Arc<TriangleMesh>,
     indexed: VertexBuffers,
     indices: Option<wgpu::Buffer>,
-    /// Three vertices per triangle, for flat shading.
-    expanded: VertexBuffers,
+    /// Three vertices per triangle, for flat shading by each rule.
+    expanded: [VertexBuffers; FlatRule::ALL.len()],
     /// Middle of the bounding box in mesh space.
     pub center: DVec3,
     /// Half its sides.
@@ -76,7 +77,7 @@ impl GpuMesh {
             source,
             indexed: VertexBuffers::default(),
             indices: None,
-            expanded: VertexBuffers::default(),
+            expanded: Default::default(),
             center,
             half_size,
         }
@@ -88,32 +89,34 @@ impl GpuMesh {
     }
 
     /// Makes what is missing of these attributes.
-    pub fn prepare(&mut self, gpu: &Gpu, attributes: &[Attribute], flat: bool) {
-        let buffers = if flat { &mut self.expanded } else { &mut self.indexed };
+    pub fn prepare(&mut self, gpu: &Gpu, attributes: &[Attribute], flat: Option<FlatRule>) {
+        let buffers = match flat {
+            Some(rule) => &mut self.expanded[rule as usize],
+            None => &mut self.indexed,
+        };
         for &attribute in attributes {
             let slot = &mut buffers.attributes[attribute as usize];
             if slot.is_none() {
-                let bytes = if flat {
-                    expanded_attribute(&self.source, attribute)
-                } else {
-                    indexed_attribute(&self.source, attribute)
+                let bytes = match flat {
+                    Some(rule) => expanded_attribute(&self.source, attribute, rule),
+                    None => indexed_attribute(&self.source, attribute),
                 };
                 *slot = Some(vertex_buffer(gpu, &bytes, wgpu::BufferUsages::VERTEX));
             }
         }
-        if !flat && self.indices.is_none() {
+        if flat.is_none() && self.indices.is_none() {
             let bytes = bytemuck::cast_slice(&self.source.indices);
             self.indices = Some(vertex_buffer(gpu, bytes, wgpu::BufferUsages::INDEX));
         }
     }
 
     /// The buffers that `prepare` made, in order.
-    pub fn slices(&self, attributes: &[Attribute], flat: bool) -> MeshSlices<'_> {
-        let buffers = if flat { &self.expanded } else { &self.indexed };
+    pub fn slices(&self, attributes: &[Attribute], flat: Option<FlatRule>) -> MeshSlices<'_> {
+        let buffers = flat.map_or(&self.indexed, |rule| &self.expanded[rule as usize]);
         let found = attributes.iter().filter_map(|a| buffers.attributes[*a as usize].as_ref()).collect();
         MeshSlices {
             attributes: found,
-            indices: if flat { None } else { self.indices.as_ref() },
+            indices: if flat.is_some() { None } else { self.indices.as_ref() },
             count: u32::try_from(self.source.triangle_count() * 3).unwrap_or(u32::MAX),
         }
     }
@@ -147,26 +150,55 @@ fn filled<T: bytemuck::Pod>(values: &[T], neutral: T, count: usize) -> Vec<u8> {
     }
 }
 
-/// One attribute with three vertices per triangle: the normal is the face's, the centroid the triangle's, both computed in f64.
-fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute) -> Vec<u8> {
-    fn spread<T: bytemuck::Pod>(mesh: &TriangleMesh, values: &[T], neutral: T) -> Vec<u8> {
-        let at = |index: u32| values.get(index as usize).copied().unwrap_or(neutral);
-        bytemuck::cast_slice(&mesh.indices.iter().map(|&index| at(index)).collect::<Vec<T>>()).to_vec()
+/// One attribute with three vertices per triangle. What flat shading evaluates once for a polygon, all three have: under the centroid
+/// rule the face's normal, the centroid and the mean colour, computed in f64; else what one of the vertices has.
+fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule) -> Vec<u8> {
+    fn value<T: Copy>(values: &[T], neutral: T, index: u32) -> T {
+        values.get(index as usize).copied().unwrap_or(neutral)
     }
-    let per_face = |value: &dyn Fn([DVec3; 3]) -> DVec3| -> Vec<u8> {
-        let corner = |index: u32| mesh.positions.get(index as usize).copied().unwrap_or_default().as_dvec3();
-        let faces = mesh.triangles().flat_map(|triangle| [value(triangle.map(corner)).as_vec3(); 3]);
-        bytemuck::cast_slice(&faces.collect::<Vec<Vec3>>()).to_vec()
+    fn spread<T: bytemuck::Pod>(mesh: &TriangleMesh, per_corner: impl Fn([u32; 3], usize) -> T) -> Vec<u8> {
+        let corners =
+            mesh.triangles().flat_map(|triangle| [0, 1, 2].map(|corner| per_corner(triangle, corner)));
+        bytemuck::cast_slice(&corners.collect::<Vec<T>>()).to_vec()
+    }
+    let place = |index| value(&mesh.positions, Vec3::ZERO, index).as_dvec3();
+    // The corner that stands for the polygon; none under the centroid rule.
+    let provoking = match rule {
+        FlatRule::Centroid => None,
+        FlatRule::FirstVertex => Some(0),
+        FlatRule::LastVertex => Some(2),
     };
-    match attribute {
-        Attribute::Position => spread(mesh, &mesh.positions, Vec3::ZERO),
-        Attribute::Normal => {
-            per_face(&|[a, b, c]| (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::ZERO))
+    match (attribute, provoking) {
+        (Attribute::Position, _) => {
+            spread(mesh, |triangle, corner| value(&mesh.positions, Vec3::ZERO, triangle[corner]))
         }
-        Attribute::Centroid => per_face(&|[a, b, c]| (a + b + c) / 3.0),
-        Attribute::Uv0 => spread(mesh, &mesh.uv0, glam::Vec2::ZERO),
-        Attribute::Uv1 => spread(mesh, &mesh.uv1, glam::Vec2::ZERO),
-        Attribute::Color => spread(mesh, &mesh.colors, Vec4::ONE),
+        (Attribute::Normal, None) => spread(mesh, |triangle, _| {
+            let [a, b, c] = triangle.map(place);
+            (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::ZERO).as_vec3()
+        }),
+        (Attribute::Normal, Some(first)) => {
+            spread(mesh, |triangle, _| value(&mesh.normals, Vec3::ZERO, triangle[first]))
+        }
+        (Attribute::Centroid, None) => spread(mesh, |triangle, _| {
+            let [a, b, c] = triangle.map(place);
+            ((a + b + c) / 3.0).as_vec3()
+        }),
+        (Attribute::Centroid, Some(first)) => spread(mesh, |triangle, _| place(triangle[first]).as_vec3()),
+        (Attribute::Uv0, _) => {
+            spread(mesh, |triangle, corner| value(&mesh.uv0, glam::Vec2::ZERO, triangle[corner]))
+        }
+        (Attribute::Uv1, _) => {
+            spread(mesh, |triangle, corner| value(&mesh.uv1, glam::Vec2::ZERO, triangle[corner]))
+        }
+        (Attribute::Color, provoking) => spread(mesh, |triangle, corner| {
+            let color = |corner: usize| value(&mesh.colors, Vec4::ONE, triangle[corner]);
+            let flat = match provoking {
+                Some(first) => color(first),
+                None => (color(0) + color(1) + color(2)) / 3.0,
+            };
+            // Coverage is not lit: it stays the corner's own.
+            flat.truncate().extend(color(corner).w)
+        }),
     }
 }
 

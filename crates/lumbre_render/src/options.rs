@@ -1,7 +1,7 @@
 //! What a caller chooses for one frame. What the scene calls for is not chosen here: the census decides it.
 
 use bevy_ecs::entity::Entity;
-use lumbre_optics::{ReflectionModel, Shading};
+use lumbre_optics::{FlatRule, ReflectionModel, Shading};
 
 /// How linear radiance becomes the numbers of the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -55,6 +55,10 @@ pub struct FrameOptions {
     pub shading: Option<Shading>,
     /// Takes this specular model instead of the scene's.
     pub reflection: Option<ReflectionModel>,
+    /// Evaluates flat shading by this rule instead of the scene's.
+    pub flat_rule: Option<FlatRule>,
+    /// Filters highlights within pixels under Phong shading, or not, whatever the scene says.
+    pub specular_antialiasing: Option<bool>,
     /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
     pub lightmaps: bool,
     /// Four samples per pixel instead of one.
@@ -77,6 +81,8 @@ impl Default for FrameOptions {
             camera: None,
             shading: None,
             reflection: None,
+            flat_rule: None,
+            specular_antialiasing: None,
             lightmaps: true,
             multisample: false,
             display: Display::Srgb,

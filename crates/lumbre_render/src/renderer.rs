@@ -133,10 +133,12 @@ impl Renderer {
         let features = FrameFeatures {
             shading: options.shading,
             reflection: options.reflection.unwrap_or(settings.reflection),
+            specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
             lightmaps: options.lightmaps,
             clamp: options.display == Display::Clamp,
             lights,
         };
+        let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
         let mut lists = LightLists::new(&reaches);
         let target_kind = (plan.format, plan.samples);
         let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
@@ -148,7 +150,7 @@ impl Renderer {
             self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline)?;
             let variant = &batch.pipeline.variant;
             if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
-                mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant));
+                mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant).then_some(flat_rule));
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
@@ -174,6 +176,7 @@ impl Renderer {
         });
         self.executor.enable_probe(options.probe);
         let prepared = Prepared {
+            flat_rule,
             gpu: &self.gpu,
             draws: &draws,
             pipelines: &self.pipelines,

@@ -2,7 +2,7 @@
 
 use bevy_ecs::resource::Resource;
 use glam::Vec3;
-use lumbre_optics::{Fog, ReflectionModel, Shading};
+use lumbre_optics::{FlatRule, Fog, ReflectionModel, Shading};
 
 /// Scene-wide choices.
 #[derive(Resource, Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,11 @@ pub struct SceneSettings {
     pub reflection: ReflectionModel,
     /// The shading of objects that do not choose their own.
     pub shading: Shading,
+    /// Where flat shading evaluates a polygon.
+    pub flat_rule: FlatRule,
+    /// Phong shading widens highlights by what the normals change within a pixel, so that small and curved surfaces do not
+    /// sparkle (see `lumbre_optics::filtered_lobe`). Off: the bare equation.
+    pub specular_antialiasing: bool,
     /// Fog, if any.
     pub fog: Option<Fog>,
 }
@@ -34,6 +39,8 @@ impl Default for SceneSettings {
             two_sided: true,
             reflection: ReflectionModel::Phong,
             shading: Shading::Phong,
+            flat_rule: FlatRule::Centroid,
+            specular_antialiasing: false,
             fog: None,
         }
     }

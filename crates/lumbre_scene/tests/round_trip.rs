@@ -60,6 +60,8 @@ fn everything() -> World {
         two_sided: true,
         reflection: ReflectionModel::BlinnMatched,
         shading: Shading::Gouraud,
+        flat_rule: FlatRule::FirstVertex,
+        specular_antialiasing: true,
         fog: Some(Fog {
             mode: FogMode::DepthCue { start: 1.1, end: 20.3, near_weight: 0.9, far_weight: 0.2 },
             color: Vec3::new(0.7, 0.1, 0.2),

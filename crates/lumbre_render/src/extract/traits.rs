@@ -35,6 +35,7 @@ pub(crate) struct FrameFeatures {
     pub shading: Option<Shading>,
     pub reflection: lumbre_optics::ReflectionModel,
     pub lightmaps: bool,
+    pub specular_antialiasing: bool,
     pub clamp: bool,
     pub lights: LightSet,
 }
@@ -128,6 +129,9 @@ impl Traits {
             variant.set(feature, true);
         }
         let per_vertex = lit && shading != Shading::Phong;
+        // Only a highlight that is evaluated per fragment can fall between pixels.
+        let filtered = frame.specular_antialiasing && lit && !per_vertex && self.specular;
+        variant.set(Feature::SpecularAntialiasing, filtered);
         variant.set(Feature::Clamp, frame.clamp);
         variant.set(Feature::ClampVertices, frame.clamp && per_vertex);
         variant.set(Feature::Modulated, per_vertex && variant.has(Feature::BaseColorTexture));

@@ -114,9 +114,16 @@ mod tests {
     #[test]
     fn what_is_not_called_for_leaves_no_instruction() {
         let plain = valid(&variant(Shading::Phong, &LIT));
-        for word in
-            ["textureSample", ": sampler", "lightmap", "fog_weight", "spot_factor", "discard", "phong_4n"]
-        {
+        for word in [
+            "textureSample",
+            ": sampler",
+            "lightmap",
+            "fog_weight",
+            "spot_factor",
+            "discard",
+            "phong_4n",
+            "dpdx",
+        ] {
             assert!(!plain.contains(word), "{word} is left in:\n{plain}");
         }
         let unlit = valid(&variant(Shading::Phong, &[Feature::Uv0, Feature::BaseColorTexture]));

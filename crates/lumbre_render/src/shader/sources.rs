@@ -31,6 +31,7 @@ modules!(
     "optics/roughness",
     "optics/shade",
     "optics/snell",
+    "optics/specular_antialiasing",
     "optics/spot",
     "optics/torrance_sparrow",
     "optics/two_sided",

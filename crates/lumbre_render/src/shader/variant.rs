@@ -78,6 +78,8 @@ features! {
     Modulated = 24 => "MODULATED",
     /// Takes the precise form of highlights with exponents above 256.
     SharpHighlights = 25 => "SHARP_HIGHLIGHTS",
+    /// Widens highlights by what the normals change within a pixel.
+    SpecularAntialiasing = 26 => "SPECULAR_ANTIALIASING",
 }
 
 /// A variant of the forward shader.
@@ -121,11 +123,16 @@ impl Variant {
             self.bits &= keep;
             (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
         }
+        if self.shading != Shading::Phong {
+            // No highlight is evaluated in a pixel.
+            self.bits &= !(Feature::SpecularAntialiasing as u32);
+        }
         if !self.has(Feature::DynamicLights) && !self.has(Feature::StaticLights) {
             self.bits &= !(Feature::DirectionalLights as u32
                 | Feature::PointLights as u32
                 | Feature::SpotLights as u32
-                | Feature::SharpHighlights as u32);
+                | Feature::SharpHighlights as u32
+                | Feature::SpecularAntialiasing as u32);
             self.reflection = ReflectionModel::Phong;
         }
         self

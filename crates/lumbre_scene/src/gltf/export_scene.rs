@@ -1,7 +1,7 @@
 //! Scene settings and cameras into JSON.
 
 use bevy_ecs::prelude::*;
-use lumbre_optics::FogMode;
+use lumbre_optics::{FlatRule, FogMode};
 use serde_json::{Value, json};
 
 use super::export::SaveError;
@@ -56,6 +56,8 @@ pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
         two_sided: Some(settings.two_sided),
         reflection: Some(settings.reflection.name().to_owned()),
         shading: Some(settings.shading.name().to_owned()),
+        flat_rule: (settings.flat_rule != FlatRule::default()).then(|| settings.flat_rule.name().to_owned()),
+        specular_antialiasing: settings.specular_antialiasing.then_some(true),
         fog,
     };
     serde_json::to_value(written).map(Some).map_err(|source| SaveError::Json { source })

@@ -93,6 +93,10 @@ pub(crate) struct SceneExtension {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shading: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub flat_rule: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular_antialiasing: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub fog: Option<FogExtension>,
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use lumbre_optics::{Fog, FogMode, ReflectionModel, Shading};
+use lumbre_optics::{FlatRule, Fog, FogMode, ReflectionModel, Shading};
 
 use super::document::{Document, extension, shortened};
 use super::error::LoadProblem;
@@ -45,6 +45,13 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     if let Some(name) = &found.shading {
         settings.shading = shading(name, &place, "LUMBRE_scene.shading")?;
     }
+    if let Some(name) = &found.flat_rule {
+        settings.flat_rule = FlatRule::from_name(name).ok_or_else(|| {
+            let names = FlatRule::ALL.iter().map(|rule| rule.name());
+            unknown(&place, "LUMBRE_scene.flatRule", name, names)
+        })?;
+    }
+    settings.specular_antialiasing = found.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
     if let Some(source) = &found.fog {
         let fog = fog(source, &place)?;
         fog.validate(&place).map_err(|source| LoadProblem::Fog { place, source })?;
