@@ -21,7 +21,7 @@ const RELATIVE_L2: f64 = 1e-5;
 
 fn against_twin(light: Light, shading: Shading, model: ReflectionModel) -> Difference {
     let mut world = ball(light);
-    let options = TwinOptions { shading: Some(shading), reflection: Some(model) };
+    let options = TwinOptions { shading: Some(shading), reflection: Some(model), ..TwinOptions::default() };
     let expected = twin::draw(&mut world, SIZE, SIZE, options).inside_surfaces(shading == Shading::Flat);
     let options = FrameOptions { shading: Some(shading), reflection: Some(model), ..linear() };
     let (got, _) = draw(&mut world, SIZE as u32, SIZE as u32, &options);

@@ -127,7 +127,7 @@ fn a_light_in_the_surface_is_finite_and_agrees_with_the_twin() {
             let options = FrameOptions { shading: Some(*shading), ..linear() };
             let (got, _) = draw(&mut world, LARGE as u32, LARGE as u32, &options);
             let got: Vec<_> = got.into_iter().map(Some).collect();
-            let options = TwinOptions { shading: Some(*shading), reflection: None };
+            let options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
             let expected = twin::draw(&mut world, LARGE, LARGE, options);
             let expected = expected.inside_surfaces(*shading == Shading::Flat);
             let difference = compare(&got, &expected);

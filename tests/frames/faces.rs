@@ -53,7 +53,7 @@ fn fronts_and_backs_agree_with_the_twin() {
     for (double_sided, two_sided) in [(true, true), (true, false), (false, true)] {
         let mut world = bowl_scene(double_sided, two_sided);
         for shading in Shading::ALL {
-            let options = TwinOptions { shading: Some(*shading), reflection: None };
+            let options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
             let expected = twin::draw(&mut world, SIZE, SIZE, options).inside_surfaces(true);
             let (got, _) = draw(
                 &mut world,

@@ -9,6 +9,7 @@ mod changes;
 mod conformance;
 mod degenerate;
 mod faces;
+mod flat_rules;
 mod highlights;
 mod level;
 mod materials;

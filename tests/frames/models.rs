@@ -27,8 +27,12 @@ fn the_bunny_in_three_shadings_agrees_with_the_twin() {
     for shading in Shading::ALL {
         let options = FrameOptions { shading: Some(*shading), ..linear() };
         let (got, _) = draw(&mut world, size as u32, size as u32, &options);
-        let expected =
-            twin::draw(&mut world, size, size, TwinOptions { shading: Some(*shading), reflection: None });
+        let expected = twin::draw(
+            &mut world,
+            size,
+            size,
+            TwinOptions { shading: Some(*shading), ..TwinOptions::default() },
+        );
         // Its triangles are smaller than a pixel: which of two a centre falls into is a matter of f32's rounding, and neighbouring
         // triangles differ in colour. So the bound is on the share of pixels, and the level is one eight-bit code.
         let apart = |i: usize| (got[i] - expected.color[i]).abs().max_element() > 1.0 / 255.0;

@@ -22,7 +22,7 @@ fn inside_a_surface_nothing_changes() {
         let (single, _) = draw(&mut world, SIZE as u32, SIZE as u32, &options);
         let (four, _) =
             draw(&mut world, SIZE as u32, SIZE as u32, &FrameOptions { multisample: true, ..options });
-        let twin_options = TwinOptions { shading: Some(*shading), reflection: None };
+        let twin_options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
         // One triangle: where two share a pixel it is shaded for each.
         let inside = twin::draw(&mut world, SIZE, SIZE, twin_options).inside_surfaces(true);
         let inside: Vec<usize> = (0..SIZE * SIZE).filter(|&at| inside[at].is_some()).collect();

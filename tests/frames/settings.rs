@@ -22,7 +22,7 @@ fn lamp() -> Light {
 }
 
 fn compared(world: &mut World, shading: Option<Shading>) -> Difference {
-    let options = TwinOptions { shading, reflection: None };
+    let options = TwinOptions { shading, ..TwinOptions::default() };
     let expected = twin::draw(world, SIZE, SIZE, options).inside_surfaces(shading == Some(Shading::Flat));
     let (got, _) = draw(world, SIZE as u32, SIZE as u32, &FrameOptions { shading, ..linear() });
     let difference = compare(&got.into_iter().map(Some).collect::<Vec<_>>(), &expected);

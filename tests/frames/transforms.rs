@@ -31,7 +31,7 @@ fn mesh_entity(world: &mut World) -> Entity {
 }
 
 fn against_twin(world: &mut World, shading: Shading) -> Difference {
-    let options = TwinOptions { shading: Some(shading), reflection: None };
+    let options = TwinOptions { shading: Some(shading), ..TwinOptions::default() };
     let expected = twin::draw(world, SIZE, SIZE, options).inside_surfaces(true);
     let (got, _) =
         draw(world, SIZE as u32, SIZE as u32, &FrameOptions { shading: Some(shading), ..linear() });
@@ -104,7 +104,7 @@ fn a_thousand_kilometres_away_the_frame_is_the_same() {
         let mut world = coarse_ball();
         let entity = mesh_entity(&mut world);
         let inside = {
-            let options = TwinOptions { shading: Some(*shading), reflection: None };
+            let options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
             twin::draw(&mut world, SIZE, SIZE, options).inside_surfaces(*shading == Shading::Flat)
         };
         let (near, _) = draw(&mut world, SIZE as u32, SIZE as u32, &options);
@@ -149,7 +149,7 @@ fn a_child_stands_where_its_parents_put_it() {
     }
     // The whole scene was moved, turned and scaled by 1: the picture is that of the scene left alone.
     for shading in Shading::ALL {
-        let options = TwinOptions { shading: Some(*shading), reflection: None };
+        let options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
         let expected =
             twin::draw(&mut coarse_ball(), SIZE, SIZE, options).inside_surfaces(*shading == Shading::Flat);
         let options = FrameOptions { shading: Some(*shading), ..linear() };

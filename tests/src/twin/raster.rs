@@ -1,0 +1,158 @@
+//! The twin's rasterizer: pixel centres, exactly, nearest surface first.
+
+use bevy_ecs::prelude::*;
+use glam::{DMat3, DVec2, DVec3};
+use lumbre_optics::Light;
+use lumbre_scene::{Camera, GlobalTransform, Projection, SceneSettings, update_transforms};
+
+use rayon::prelude::*;
+
+use super::scene::{Scene, Vertex, collect};
+use super::shading::{PixelWeights, ShadedTriangle};
+use super::{TwinFrame, TwinOptions};
+
+/// Draws `world` from its first camera.
+///
+/// # Panics
+/// Without a perspective camera: the tests' scenes have one.
+pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions) -> TwinFrame {
+    update_transforms(world);
+    let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+    let mut cameras = world.query::<(&Camera, &GlobalTransform)>();
+    let (camera, place) = cameras.iter(world).next().expect("the scene has a camera");
+    let Projection::Perspective { vertical_fov, near, .. } = camera.projection else {
+        panic!("the twin knows perspective cameras only")
+    };
+    let (eye, axes) = (place.translation(), place.0.matrix3);
+    let backward = axes.z_axis.normalize();
+    let right = axes.y_axis.cross(backward).normalize();
+    let basis = DMat3::from_cols(right, backward.cross(right), backward);
+    let mut lights = world.query::<(&Light, &GlobalTransform)>();
+    let lights =
+        lights.iter(world).map(|(light, at)| (light.clone(), at.translation(), at.forward())).collect();
+    let reflection = options.reflection.unwrap_or(settings.reflection);
+    let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
+    let specular_antialiasing = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
+    let scene = Scene { settings, reflection, flat_rule, specular_antialiasing, lights, eye, basis };
+    let objects = collect(world, &settings, &options);
+
+    let mut frame = TwinFrame {
+        width,
+        height,
+        color: vec![settings.background.as_dvec3(); width * height],
+        surface: vec![None; width * height],
+    };
+    let lens = Lens {
+        focal: 1.0 / (0.5 * vertical_fov).tan(),
+        near,
+        size: DVec2::new(width as f64, height as f64),
+        to_view: basis.transpose(),
+        eye,
+    };
+    let mut nearest = vec![f64::INFINITY; width * height];
+    for (index, object) in objects.iter().enumerate() {
+        for (number, triangle) in object.triangles.iter().enumerate() {
+            let Some(seen) = SeenTriangle::new(&lens, triangle) else { continue };
+            if !seen.front && !object.material.double_sided {
+                continue;
+            }
+            let low = seen.pixel[0].min(seen.pixel[1]).min(seen.pixel[2]).floor().max(DVec2::ZERO);
+            let high = seen.pixel[0].max(seen.pixel[1]).max(seen.pixel[2]).ceil();
+            for y in low.y as usize..(high.y as usize).min(height) {
+                for x in low.x as usize..(high.x as usize).min(width) {
+                    let Some(depth) = seen.depth_inside(center(x, y)) else { continue };
+                    let at = y * width + x;
+                    if depth < nearest[at] {
+                        nearest[at] = depth;
+                        frame.surface[at] = Some((index, number));
+                    }
+                }
+            }
+        }
+    }
+    let shade = |at: usize, surface: (usize, usize)| -> Option<DVec3> {
+        let object = &objects[surface.0];
+        let triangle = &object.triangles[surface.1];
+        let seen = SeenTriangle::new(&lens, triangle)?;
+        let (x, y) = (at % width, at / width);
+        let shaded = ShadedTriangle::new(&scene, object, triangle, seen.front);
+        // The neighbours of the two-by-two block that fine derivatives are taken in.
+        let (left, top) = (x & !1, y & !1);
+        let pixel = PixelWeights {
+            center: seen.weights(center(x, y)),
+            across: [left, left + 1].map(|x| seen.weights(center(x, y))),
+            down: [top, top + 1].map(|y| seen.weights(center(x, y))),
+        };
+        Some(shaded.at(&pixel))
+    };
+    let TwinFrame { color, surface, .. } = &mut frame;
+    color.par_iter_mut().zip(surface.par_iter()).enumerate().for_each(|(at, (color, surface))| {
+        if let Some(lit) = surface.and_then(|surface| shade(at, surface)) {
+            *color = lit;
+        }
+    });
+    frame
+}
+
+fn center(x: usize, y: usize) -> DVec2 {
+    DVec2::new(x as f64 + 0.5, y as f64 + 0.5)
+}
+
+/// How the camera sees.
+struct Lens {
+    focal: f64,
+    near: f64,
+    /// Of the frame, in pixels.
+    size: DVec2,
+    to_view: DMat3,
+    eye: DVec3,
+}
+
+/// A triangle in the frame.
+struct SeenTriangle {
+    /// Corners in pixels, rows running down.
+    pixel: [DVec2; 3],
+    /// Distances along the view axis, in metres.
+    depth: [f64; 3],
+    /// Twice the signed area in pixels.
+    area: f64,
+    front: bool,
+}
+
+impl SeenTriangle {
+    /// Nothing for a triangle without area and for one that crosses the near plane: the tests' scenes have none of those.
+    fn new(lens: &Lens, triangle: &[Vertex; 3]) -> Option<Self> {
+        let view = triangle.each_ref().map(|vertex| lens.to_view * (vertex.point - lens.eye));
+        if view.iter().any(|v| -v.z < lens.near) {
+            return None;
+        }
+        let aspect = lens.size.x / lens.size.y;
+        let pixel = view.map(|v| {
+            let (x, y) = (lens.focal * v.x / (aspect * -v.z), lens.focal * v.y / -v.z);
+            DVec2::new((x + 1.0) * 0.5, (1.0 - y) * 0.5) * lens.size
+        });
+        let area = (pixel[1] - pixel[0]).perp_dot(pixel[2] - pixel[0]);
+        // Pixel rows run down, so that counter-clockwise in the world is negative here.
+        (area != 0.0).then(|| Self { pixel, depth: view.map(|v| -v.z), area, front: area < 0.0 })
+    }
+
+    /// Weights on the screen, each divided by its corner's distance: what perspective interpolates with.
+    fn weighted(&self, center: DVec2) -> [f64; 3] {
+        let edge =
+            |a: usize, b: usize| (self.pixel[b] - self.pixel[a]).perp_dot(center - self.pixel[a]) / self.area;
+        let screen = [edge(1, 2), edge(2, 0), edge(0, 1)];
+        [0, 1, 2].map(|i| screen[i] / self.depth[i])
+    }
+
+    fn depth_inside(&self, center: DVec2) -> Option<f64> {
+        let weighted = self.weighted(center);
+        weighted.iter().all(|weight| *weight >= 0.0).then(|| 1.0 / weighted.iter().sum::<f64>())
+    }
+
+    /// Perspective-correct weights of the corners, outside of the triangle too.
+    fn weights(&self, center: DVec2) -> [f64; 3] {
+        let weighted = self.weighted(center);
+        let sum: f64 = weighted.iter().sum();
+        weighted.map(|weight| weight / sum)
+    }
+}
