@@ -18,7 +18,9 @@
 //! ```
 
 pub mod compare;
+pub mod kernel;
 pub mod panes;
+pub mod running_error;
 pub mod scenes;
 pub mod shared_files;
 pub mod twin;

@@ -419,6 +419,7 @@ fn scene_settings_and_cameras() {
         reflection: ReflectionModel::Blinn4n,
         shading: Shading::Flat,
         fog: Some(Fog { mode: FogMode::ExponentialSquared { density: 0.5 }, color: Vec3::Y }),
+        ..SceneSettings::default()
     };
     assert_eq!(*world.resource::<SceneSettings>(), expected);
     let projection = Projection::Perspective { vertical_fov: 0.5, aspect: Some(2.0), near: 0.25, far: None };

@@ -1,0 +1,209 @@
+//! Numbers with a bound on their error, and WGSL's accuracy of each operation (WGSL specification, section 15.7.4).
+
+/// Half a unit in the last place of 1: the relative error of one rounding to f32.
+const ROUNDING: f64 = 5.960_464_477_539_063e-8;
+/// Results below the smallest normal number may be flushed to zero.
+const FLUSHED: f64 = 1.175_494_350_822_287_5e-38;
+
+/// A real number and a bound on how far a device's f32 may be from it. Booleans are 0 and 1; a bound of 1 leaves them open.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Number {
+    /// What exact arithmetic gives.
+    pub value: f64,
+    /// The device's number is within this of it.
+    pub error: f64,
+}
+
+impl Number {
+    /// A number that the device has exactly; one below the normal numbers it may take for zero.
+    pub fn exact(value: f64) -> Self {
+        let error = if value.abs() < FLUSHED { value.abs() } else { 0.0 };
+        Self { value, error }
+    }
+
+    /// A constant of the source: rounded to f32, unless it has few binary digits.
+    pub(super) fn constant(value: f32) -> Self {
+        let rounded = value.to_bits() & 0xff != 0;
+        Self { value: value.into(), error: if rounded { ROUNDING * f64::from(value.abs()) } else { 0.0 } }
+    }
+
+    pub(super) fn boolean(value: bool, open: bool) -> Self {
+        Self { value: f64::from(u8::from(value)), error: f64::from(u8::from(open)) }
+    }
+
+    /// `value` with a propagated error and an own one of so many roundings.
+    fn rounded(value: f64, propagated: f64, roundings: f64) -> Self {
+        let size = value.abs() + propagated;
+        let error = propagated + roundings * ROUNDING * size + FLUSHED;
+        let overflows = !(size + error <= f64::from(f32::MAX));
+        Self { value, error: if overflows || error.is_nan() { f64::INFINITY } else { error } }
+    }
+
+    fn low(self) -> f64 {
+        self.value - self.error
+    }
+
+    fn high(self) -> f64 {
+        self.value + self.error
+    }
+
+    pub(super) fn is_true(self) -> bool {
+        self.value != 0.0
+    }
+
+    pub(super) fn is_open(self) -> bool {
+        self.error != 0.0
+    }
+
+    pub(super) fn negate(self) -> Self {
+        Self { value: -self.value, ..self }
+    }
+
+    pub(super) fn abs(self) -> Self {
+        Self { value: self.value.abs(), ..self }
+    }
+
+    pub(super) fn add(self, other: Self) -> Self {
+        let exact = self.error == 0.0 && other.error == 0.0 && (self.value == 0.0 || other.value == 0.0);
+        if exact {
+            return Self { value: self.value + other.value, error: 0.0 };
+        }
+        Self::rounded(self.value + other.value, self.error + other.error, 1.0)
+    }
+
+    pub(super) fn subtract(self, other: Self) -> Self {
+        self.add(other.negate())
+    }
+
+    pub(super) fn multiply(self, other: Self) -> Self {
+        if [self, other].contains(&Self { value: 1.0, error: 0.0 }) {
+            let factor = if self.value == 1.0 && self.error == 0.0 { other } else { self };
+            return factor;
+        }
+        Self::rounded(self.value * other.value, self.product_error(other), 1.0)
+    }
+
+    fn product_error(self, other: Self) -> f64 {
+        let terms =
+            [self.value.abs() * other.error, self.error * other.value.abs(), self.error * other.error];
+        // 0 times an unbounded error is still 0.
+        terms.iter().map(|term| if term.is_nan() { f64::INFINITY } else { *term }).sum()
+    }
+
+    /// 2.5 units in the last place, for divisors whose reciprocal is a normal number.
+    pub(super) fn divide(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        let least = other.value.abs() - other.error;
+        if !(least >= FLUSHED && other.value.abs() + other.error <= 1.0 / FLUSHED) {
+            return Self { value: if value.is_nan() { 0.0 } else { value }, error: f64::INFINITY };
+        }
+        Self::rounded(value, (self.error + value.abs() * other.error) / least, 5.0)
+    }
+
+    pub(super) fn minimum(self, other: Self) -> Self {
+        self.negate().maximum(other.negate()).negate()
+    }
+
+    pub(super) fn maximum(self, other: Self) -> Self {
+        if self.low() >= other.high() {
+            return self;
+        }
+        if other.low() >= self.high() {
+            return other;
+        }
+        Self { value: self.value.max(other.value), error: self.error.max(other.error) }
+    }
+
+    /// The sum of products, in any order, fused or not.
+    pub(super) fn dot(left: &[Self], right: &[Self]) -> Self {
+        let pairs = || left.iter().copied().zip(right.iter().copied());
+        let value = pairs().map(|(a, b)| a.value * b.value).sum();
+        let propagated: f64 = pairs().map(|(a, b)| a.product_error(b)).sum();
+        let size: f64 = pairs().map(|(a, b)| (a.value * b.value).abs()).sum::<f64>() + propagated;
+        // One rounding of each product and one fewer sum than there are terms.
+        let error = propagated + left.len() as f64 * (ROUNDING * size + FLUSHED);
+        Self {
+            value,
+            error: if error.is_nan() || size > f64::from(f32::MAX) { f64::INFINITY } else { error },
+        }
+    }
+
+    fn monotonic(self, function: impl Fn(f64) -> f64, roundings: f64) -> Self {
+        let value = function(self.value);
+        let propagated = (function(self.high()) - value).abs().max((value - function(self.low())).abs());
+        let propagated = if propagated.is_nan() { f64::INFINITY } else { propagated };
+        Self::rounded(value, propagated, roundings)
+    }
+
+    /// 2 units in the last place.
+    pub(super) fn inverse_square_root(self) -> Self {
+        if self.low() < FLUSHED {
+            return Self { value: self.value.max(FLUSHED).sqrt().recip(), error: f64::INFINITY };
+        }
+        self.monotonic(|x| x.sqrt().recip(), 4.0)
+    }
+
+    /// As 1/inverseSqrt: 4.5 units in the last place. Zero stays zero.
+    pub(super) fn square_root(self) -> Self {
+        if self == Self::exact(0.0) {
+            return self;
+        }
+        self.monotonic(|x| x.max(0.0).sqrt(), 9.0)
+    }
+
+    /// 3 + 2 |x| units in the last place.
+    pub(super) fn exponential(self) -> Self {
+        self.monotonic(f64::exp, 2.0 * (3.0 + 2.0 * (self.value.abs() + self.error)))
+    }
+
+    pub(super) fn exponential_2(self) -> Self {
+        self.monotonic(f64::exp2, 2.0 * (3.0 + 2.0 * (self.value.abs() + self.error)))
+    }
+
+    /// 2^-21 in [1/2, 2], else 3 units in the last place.
+    pub(super) fn logarithm_2(self) -> Self {
+        if self.low() < FLUSHED {
+            return Self { value: self.value.max(FLUSHED).log2(), error: f64::INFINITY };
+        }
+        let near_one = self.high() >= 0.5 && self.low() <= 2.0;
+        let mut result = self.monotonic(f64::log2, 6.0);
+        if near_one {
+            result.error += 2f64.powi(-21);
+        }
+        result
+    }
+
+    /// exp2(y log2(x)), as the specification has it.
+    pub(super) fn power(self, exponent: Self) -> Self {
+        exponent.multiply(self.logarithm_2()).exponential_2()
+    }
+
+    /// 4096 units in the last place.
+    pub(super) fn arc_tangent_2(self, x: Self) -> Self {
+        let value = self.value.atan2(x.value);
+        let distance = self.value.hypot(x.value) - self.error.hypot(x.error);
+        let turned = self.error.hypot(x.error) / distance;
+        let propagated = if distance > 0.0 { turned.min(std::f64::consts::PI) } else { std::f64::consts::PI };
+        Self::rounded(value, propagated, 8192.0)
+    }
+
+    /// Whether `self < other` (or `<=`); open where the errors overlap.
+    pub(super) fn less(self, other: Self, or_equal: bool) -> Self {
+        let value = if or_equal { self.value <= other.value } else { self.value < other.value };
+        let certain = self.high() < other.low() || other.high() < self.low();
+        let exact = self.error == 0.0 && other.error == 0.0;
+        Self::boolean(value, !(certain || exact))
+    }
+
+    pub(super) fn equal(self, other: Self) -> Self {
+        let apart = self.high() < other.low() || other.high() < self.low();
+        let exact = self.error == 0.0 && other.error == 0.0;
+        Self::boolean(self.value == other.value, !(apart || exact))
+    }
+
+    /// What covers both of two ways, with the value of the first.
+    pub(super) fn hull(self, other: Self) -> Self {
+        let error = self.error.max((other.value - self.value).abs() + other.error);
+        Self { value: self.value, error: if error.is_nan() { f64::INFINITY } else { error } }
+    }
+}
