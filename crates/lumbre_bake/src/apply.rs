@@ -4,15 +4,26 @@ use std::collections::HashSet;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use bevy_ecs::prelude::{Entity, With, World};
+use bevy_ecs::prelude::{Component, Entity, With, World};
 use glam::Vec3;
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, Mesh};
 
 use crate::bake::map_texels;
 use crate::scene::{LightmapLayout, Object};
 
-/// Gives every object its map: E/π, and 0 where nothing is known.
-pub(crate) fn apply(world: &mut World, objects: &[Object], layout: &LightmapLayout, irradiance: &[Vec3]) {
+/// How far each texel of an entity's [`Lightmap`] may be off: one standard error in the map's own unit (E/π, mean of the channels), row
+/// by row; NaN where the map shows no surface. Against a converged bake of the same map at least 95 % of the texels are within two.
+#[derive(Component, Clone, Debug)]
+pub struct LightmapError(pub Arc<[f32]>);
+
+/// Gives every object its map: E/π, and 0 where nothing is known; and its errors.
+pub(crate) fn apply(
+    world: &mut World,
+    objects: &[Object],
+    layout: &LightmapLayout,
+    irradiance: &[Vec3],
+    variances: &[f32],
+) {
     forget_lightmaps(world, objects);
     let mut names = HashSet::new();
     for (index, object) in objects.iter().enumerate() {
@@ -21,6 +32,9 @@ pub(crate) fn apply(world: &mut World, objects: &[Object], layout: &LightmapLayo
             .iter()
             .map(|e| if e.is_finite() { *e / PI } else { Vec3::ZERO })
             .collect();
+        let first = map.first;
+        let errors = &variances[first..first + (map.width * map.height) as usize];
+        let errors: Arc<[f32]> = errors.iter().map(|variance| variance.sqrt() / PI).collect();
         let image = Arc::new(LightmapImage {
             name: file_name(&object.name, &mut names),
             width: map.width,
@@ -33,7 +47,7 @@ pub(crate) fn apply(world: &mut World, objects: &[Object], layout: &LightmapLayo
             if !Arc::ptr_eq(&part.mesh, mesh) {
                 entity.insert(Mesh(Arc::clone(mesh)));
             }
-            entity.insert(Lightmap { image: Arc::clone(&image) });
+            entity.insert((Lightmap { image: Arc::clone(&image) }, LightmapError(Arc::clone(&errors))));
         }
     }
 }
@@ -44,7 +58,7 @@ pub(crate) fn forget_lightmaps(world: &mut World, objects: &[Object]) {
     let mut mapped = world.query_filtered::<Entity, With<Lightmap>>();
     let stale: Vec<Entity> = mapped.iter(world).filter(|entity| !kept.contains(entity)).collect();
     for entity in stale {
-        world.entity_mut(entity).remove::<Lightmap>();
+        world.entity_mut(entity).remove::<(Lightmap, LightmapError)>();
     }
 }
 

@@ -8,6 +8,7 @@ use glam::Vec3;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, world_points};
 use crate::texels::charts::charts;
+use crate::texels::error_estimate::variances;
 use crate::texels::fill::fill;
 use crate::texels::footprint::{Texel, footprints};
 use crate::texels::gather::Outgoing;
@@ -105,26 +106,32 @@ fn run(
                 direct: &total,
                 patch_direct: &exchange.direct,
                 patch_indirect: &exchange.indirect,
+                patch_error: &exchange.indirect_error,
                 near: exchange.near,
             };
-            let mean_direct = baked.iter().map(|e| f64::from(e.element_sum()) / 3.0).sum::<f64>()
-                / baked.len().max(1) as f64;
-            Some(rounds::gather(&outgoing, &texels, &charts, mean_direct, options, &mut watch, &mut report)?)
+            Some(rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?)
         }
     };
 
     watch.stage("texels", &mut report)?;
-    let values: Vec<Vec3> = match indirect {
-        Some(indirect) => baked.iter().zip(&indirect).map(|(direct, indirect)| *direct + *indirect).collect(),
-        None => {
-            report.error_reached = true;
-            baked
+    let (values, variances): (Vec<Vec3>, Vec<f32>) = match indirect {
+        Some((indirect, variances)) => {
+            let sum = baked.iter().zip(&indirect).map(|(direct, indirect)| *direct + *indirect);
+            (sum.collect(), variances)
         }
+        None => (baked, variances(&direct, None)),
     };
     note_mean(&texels, &values, &mut report);
+    if exchange.is_none() {
+        note_direct_error(&texels, &variances, options, &mut report);
+    }
     let filled = fill(&layout, &texels, &charts, &values, options.gap);
     watch.advance(1.0)?;
-    apply::apply(world, &objects, &layout, &filled);
+    let mut errors = vec![f32::NAN; layout.texels];
+    for (texel, variance) in texels.iter().zip(&variances).filter(|(texel, _)| !texel.is_hidden()) {
+        errors[texel.index as usize] = *variance;
+    }
+    apply::apply(world, &objects, &layout, &filled, &errors);
     report.maps = layout.maps.len();
     Ok(finish(report, &mut watch))
 }
@@ -164,6 +171,17 @@ fn note_mean(texels: &[Texel], values: &[Vec3], report: &mut BakeReport) {
         count += 1;
     }
     report.mean_irradiance = (sum / f64::from(count.max(1))).to_array();
+}
+
+/// The error of a map without bounces.
+fn note_direct_error(texels: &[Texel], variances: &[f32], options: &BakeOptions, report: &mut BakeReport) {
+    let open = texels.iter().zip(variances).filter(|(texel, _)| !texel.is_hidden());
+    let (sum, count) =
+        open.fold((0.0, 0u32), |(sum, count), (_, variance)| (sum + f64::from(*variance), count + 1));
+    let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
+    let error = (sum / f64::from(count.max(1))).sqrt();
+    report.estimated_error = if mean > 0.0 { error / mean } else { 0.0 };
+    report.error_reached = report.estimated_error <= options.error;
 }
 
 /// What the layout's maps hold, for tests and messages.

@@ -44,6 +44,7 @@ mod scene;
 mod texels;
 mod transport;
 
+pub use apply::LightmapError;
 pub use bake::bake;
 pub use error::BakeError;
 pub use options::{BakeOptions, Density, Quality};

@@ -26,6 +26,8 @@ pub enum Quality {
     /// For shipping.
     #[default]
     Final,
+    /// To judge the others by: patches, form factors and rays far beyond what a game needs. Minutes, not seconds.
+    Reference,
 }
 
 /// What a bake is asked for.
@@ -78,8 +80,8 @@ pub(crate) struct Effort {
     pub form_factor_rays: usize,
     /// Texels along a patch's side, at least.
     pub patch_texels: f32,
-    /// Shadow samples of a texel before and after a penumbra is found in it.
-    pub direct: [u32; 2],
+    /// Shadow samples of a texel before and after a penumbra is found in it, and at most.
+    pub direct: [u32; 3],
     /// Gather rays of a texel: first round and most.
     pub gather: [u32; 2],
 }
@@ -91,15 +93,22 @@ impl Quality {
                 patches: 3_000,
                 form_factor_rays: 600_000,
                 patch_texels: 6.0,
-                direct: [4, 16],
+                direct: [4, 16, 16],
                 gather: [16, 16],
             },
             Self::Final => Effort {
                 patches: 8_000,
                 form_factor_rays: 1_500_000,
                 patch_texels: 4.0,
-                direct: [8, 64],
+                direct: [8, 64, 1024],
                 gather: [32, 1024],
+            },
+            Self::Reference => Effort {
+                patches: 40_000,
+                form_factor_rays: 20_000_000,
+                patch_texels: 2.0,
+                direct: [64, 1024, 4096],
+                gather: [256, 8192],
             },
         }
     }

@@ -24,8 +24,37 @@ pub(crate) struct Outgoing<'a> {
     pub patch_direct: &'a [Vec3],
     /// Per patch, irradiance by bounces.
     pub patch_indirect: &'a [Vec3],
+    /// Per patch, the standard error of that.
+    pub patch_error: &'a [f32],
     /// Hits nearer than this get a real bounce more, canonical units.
     pub near: f32,
+}
+
+/// One in so many samples asks a real bounce beside the patch that it reads.
+pub(crate) const CHECKED: u32 = 16;
+
+/// What one ray of the gather found.
+#[derive(Default)]
+struct Reading {
+    light: Vec3,
+    /// What the form factors' errors leave in it.
+    error: f32,
+    /// Whether the patch that was read was checked, and by how much it is more than the real bounce.
+    checked: bool,
+    difference: Vec3,
+    /// Rays beyond the first.
+    rays: u32,
+}
+
+/// A surface that a ray has met.
+struct Met {
+    triangle: u32,
+    side: Side,
+    at: (f32, f32),
+    patch: u32,
+    reflectance: Vec3,
+    /// Direct irradiance there.
+    direct: Vec3,
 }
 
 /// What a texel has gathered: irradiance by bounces.
@@ -33,6 +62,12 @@ pub(crate) struct Outgoing<'a> {
 pub(crate) struct Gathered {
     /// Sum of the samples of each scramble.
     pub sums: [Vec3; SCRAMBLES],
+    /// Sum over all samples of what the patches' errors add.
+    pub patch_errors: f32,
+    /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
+    pub checks: u32,
+    pub differences: Vec3,
+    pub squared_differences: f32,
     /// Samples of each scramble.
     pub samples: u32,
     /// Rays cast.
@@ -43,6 +78,11 @@ impl Gathered {
     /// The estimate of each scramble.
     pub fn estimates(&self) -> [Vec3; SCRAMBLES] {
         self.sums.map(|sum| if self.samples > 0 { sum / self.samples as f32 } else { Vec3::ZERO })
+    }
+
+    /// What the patches' errors add to the mean of the scrambles.
+    pub fn patch_error(&self) -> f32 {
+        self.patch_errors / (self.samples.max(1) * SCRAMBLES as u32) as f32
     }
 }
 
@@ -62,51 +102,78 @@ impl Outgoing<'_> {
                     direction -= receiver.geometric_normal * (2.0 * below);
                 }
                 gathered.rays += 1;
-                *sum += self.towards(receiver.origin, direction, sequence, sample, &mut gathered.rays);
+                // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
+                let turn =
+                    (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
+                let checked = turn % CHECKED == 0;
+                let found = self.towards(receiver.origin, direction, sequence, sample, checked);
+                *sum += found.light;
+                gathered.rays += u64::from(found.rays);
+                gathered.patch_errors += found.error;
+                gathered.checks += u32::from(found.checked);
+                gathered.differences += found.difference;
+                gathered.squared_differences += (found.difference.element_sum() / 3.0).powi(2);
             }
         }
         gathered.samples = gathered.samples.max(samples);
     }
 
-    /// Radiosity of what a ray meets, emission apart.
+    /// What a ray meets: its radiosity, emission apart.
     fn towards(
         &self,
         origin: Vec3,
         direction: Vec3,
         sequence: Sequence,
         sample: u32,
-        rays: &mut u64,
-    ) -> Vec3 {
-        let SurfaceHit::Lit { triangle, side, at, distance } = self.scene.first_hit(origin, direction) else {
-            return Vec3::ZERO;
-        };
-        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
-        let reflectance = self.reflectance(triangle, side, at, patch);
-        if reflectance == Vec3::ZERO {
-            return Vec3::ZERO;
-        }
-        let direct = self.direct_at(triangle, side, at, patch);
-        let indirect = if distance < self.near {
+        checked: bool,
+    ) -> Reading {
+        let mut reading = Reading { checked, ..Reading::default() };
+        let Some((met, distance)) = self.meet(origin, direction) else { return reading };
+        let (mut light, mut weight, mut last) = (met.reflectance * met.direct, met.reflectance, met);
+        if distance < self.near {
             let [u, v, ..] = sequence.point(sample, 1);
-            *rays += 1;
-            self.one_bounce_more(triangle, side, at, u, v)
-        } else {
-            self.patch_indirect[patch as usize]
-        };
-        reflectance * (direct + indirect)
+            reading.rays += 1;
+            let Some(met) = self.bounce(&last, u, v) else {
+                reading.light = light;
+                return reading;
+            };
+            weight *= met.reflectance;
+            light += weight * met.direct;
+            last = met;
+        }
+        let indirect = self.patch_indirect[last.patch as usize];
+        let grey = |color: Vec3| color.element_sum() / 3.0;
+        if checked {
+            let [u, v, ..] = sequence.point(sample, 2);
+            reading.rays += 1;
+            let real = self.bounce(&last, u, v).map_or(Vec3::ZERO, |met| {
+                met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
+            });
+            reading.difference = weight * (indirect - real);
+        }
+        reading.light = light + weight * indirect;
+        reading.error = self.patch_error[last.patch as usize] * grey(weight);
+        reading
     }
 
-    /// One sample of the irradiance by bounces at a hit.
-    fn one_bounce_more(&self, triangle: u32, side: Side, at: (f32, f32), u: f32, v: f32) -> Vec3 {
-        let surface = &self.scene.triangles[triangle as usize];
-        let origin = self.scene.off_surface(triangle, side, surface.position(at.0, at.1));
-        let direction = cosine_about(surface.side_normal(side), u, v);
-        let SurfaceHit::Lit { triangle, side, at, .. } = self.scene.first_hit(origin, direction) else {
-            return Vec3::ZERO;
+    /// The surface that a ray meets, if it reflects at all, and how far it is.
+    fn meet(&self, origin: Vec3, direction: Vec3) -> Option<(Met, f32)> {
+        let SurfaceHit::Lit { triangle, side, at, distance } = self.scene.first_hit(origin, direction) else {
+            return None;
         };
-        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
-        let light = self.direct_at(triangle, side, at, patch) + self.patch_indirect[patch as usize];
-        self.reflectance(triangle, side, at, patch) * light
+        let patch = self.patches.at(triangle, side, at)?;
+        let reflectance = self.reflectance(triangle, side, at, patch);
+        let direct = self.direct_at(triangle, side, at, patch);
+        (reflectance != Vec3::ZERO)
+            .then_some((Met { triangle, side, at, patch, reflectance, direct }, distance))
+    }
+
+    /// What a surface's own light by bounces comes from: one sample.
+    fn bounce(&self, from: &Met, u: f32, v: f32) -> Option<Met> {
+        let surface = &self.scene.triangles[from.triangle as usize];
+        let position = surface.position(from.at.0, from.at.1);
+        let origin = self.scene.off_surface(from.triangle, from.side, position);
+        self.meet(origin, cosine_about(surface.side_normal(from.side), u, v)).map(|(met, _)| met)
     }
 
     fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {

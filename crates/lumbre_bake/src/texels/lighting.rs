@@ -21,7 +21,7 @@ pub(crate) fn direct_light(
     options: &BakeOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Direct>, BakeError> {
-    let [few, many] = options.quality.effort().direct;
+    let [few, many, most] = options.quality.effort().direct;
     let light = |texel: &Texel, samples: u32| {
         if texel.is_hidden() {
             return Direct::default();
@@ -34,11 +34,34 @@ pub(crate) fn direct_light(
     let mut direct = in_chunks(texels.len(), watch, |index| light(&texels[index], few))?;
     let again = in_doubt(layout, texels, &direct);
     let better = in_chunks(again.len(), watch, |place| light(&texels[again[place] as usize], many))?;
-    for (&index, better) in again.iter().zip(better) {
+    replace(&mut direct, &again, better);
+    // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
+    let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
+    let grey = |direct: &Direct| f64::from(direct.baked.element_sum()) / 3.0;
+    let mean = direct.iter().map(grey).sum::<f64>() / open;
+    let limit = (OWN_SHARE * options.error * mean).powi(2);
+    let mut samples = many;
+    while samples < most {
+        samples = (samples * 4).min(most);
+        let noisy = |index: &u32| f64::from(direct[*index as usize].variance) > limit;
+        let again: Vec<u32> = again.iter().copied().filter(noisy).collect();
+        if again.is_empty() {
+            break;
+        }
+        let better = in_chunks(again.len(), watch, |place| light(&texels[again[place] as usize], samples))?;
+        replace(&mut direct, &again, better);
+    }
+    Ok(direct)
+}
+
+/// Of the error asked for, what direct light may have for itself at a texel.
+const OWN_SHARE: f64 = 1.0;
+
+fn replace(direct: &mut [Direct], at: &[u32], better: Vec<Direct>) {
+    for (&index, better) in at.iter().zip(better) {
         let first = &mut direct[index as usize];
         *first = Direct { rays: first.rays + better.rays, ..better };
     }
-    Ok(direct)
 }
 
 /// Texels that saw a source partly, or near one that did, or next to one that saw other sources.

@@ -2,6 +2,7 @@
 //! that show none. Not the transport between patches that the gather reads.
 
 pub(crate) mod charts;
+pub(crate) mod error_estimate;
 pub(crate) mod fill;
 pub(crate) mod footprint;
 pub(crate) mod gather;

@@ -3,30 +3,41 @@
 
 use glam::Vec3;
 
+use super::error_estimate::{GatherErrors, PatchBias, patch_bias, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
 use super::in_chunks;
-use super::smooth::{Estimates, mean, smooth, variance};
+use super::smooth::{Estimates, Surroundings, mean, smooth};
 use crate::progress::Watch;
+use crate::transport::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport};
 
-/// Irradiance by bounces of every covered texel.
+/// Share of the squared error below which the gather's own noise is not worth more rays.
+const WORTH_RAYS: f64 = 0.1;
+/// And a round that leaves more than this of the squared error that it was to lower was the last.
+const STALLED: f64 = 0.95;
+
+/// Irradiance by bounces of every covered texel, and the variance of what the map then holds, mean of the channels.
 pub(crate) fn gather(
     outgoing: &Outgoing<'_>,
     texels: &[Texel],
     charts: &[u32],
-    mean_direct: f64,
+    direct: &[Direct],
     options: &BakeOptions,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
-) -> Result<Vec<Vec3>, BakeError> {
+) -> Result<(Vec<Vec3>, Vec<f32>), BakeError> {
     let [first, most] = options.quality.effort().gather.map(|samples| samples / SCRAMBLES as u32);
     let mut gathered = vec![Gathered::default(); texels.len()];
     let mut wanted: Vec<u32> =
         (0..texels.len() as u32).filter(|&i| !texels[i as usize].is_hidden()).collect();
     let open = wanted.len().max(1) as f64;
+    let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
+    let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
+    let surroundings = Surroundings::new(outgoing.scene, outgoing.layout, texels, charts);
     let mut samples = first;
-    let estimates = loop {
+    let mut helped_before = f64::INFINITY;
+    let (estimates, variances) = loop {
         let round = in_chunks(wanted.len(), watch, |place| {
             let index = wanted[place] as usize;
             let mut own = gathered[index];
@@ -37,24 +48,53 @@ pub(crate) fn gather(
             gathered[index as usize] = own;
         }
         let raw: Vec<Estimates> = gathered.iter().map(Gathered::estimates).collect();
-        let estimates =
-            if options.denoise { smooth(outgoing.scene, outgoing.layout, texels, charts, &raw) } else { raw };
-        let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
+        let (estimates, smoothing_bias) = match options.denoise {
+            true => smooth(&surroundings, &raw),
+            false => (raw, vec![0.0; texels.len()]),
+        };
+        let patch_bias = patch_bias(&surroundings, texels, &gathered, outgoing.patches.mean_reflectance());
+        let errors = GatherErrors {
+            gathered: &gathered,
+            estimates: &estimates,
+            smoothing_bias: &smoothing_bias,
+            patch_bias: &patch_bias,
+            residual_bound: report.residual_bound,
+        };
+        let variances = variances(direct, Some(&errors));
         let total = mean_direct + estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
-        let variances: Vec<f64> = estimates.iter().map(|e| channel_mean(variance(e))).collect();
-        let error = (variances.iter().sum::<f64>() / open).sqrt();
-        report.estimated_error = if total > 0.0 { error / total } else { 0.0 };
+        let sum: f64 = open_variances(texels, &variances).sum();
+        report.estimated_error = if total > 0.0 { (sum / open).sqrt() / total } else { 0.0 };
         report.error_reached = report.estimated_error <= options.error;
         let late = options.time.is_some_and(|time| watch.seconds() >= time.as_secs_f64());
-        if report.error_reached || samples >= most || late {
-            break estimates;
+        // Of the error, the part that more rays make smaller: what the patches leave stays.
+        let by_rays = errors.by_rays();
+        let helped: f64 = open_variances(texels, &by_rays).sum();
+        let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
+        helped_before = helped;
+        if report.error_reached || samples >= most || late || helpless {
+            break (corrected(&estimates, &patch_bias), variances);
         }
         samples = (samples * 2).min(most);
         let limit = (0.7 * options.error * total).powi(2);
-        wanted.retain(|&index| variances[index as usize] > limit);
+        wanted.retain(|&index| f64::from(by_rays[index as usize]) > limit);
+        if wanted.is_empty() {
+            break (corrected(&estimates, &patch_bias), variances);
+        }
     };
     report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
     let cast: u64 = gathered.iter().map(|own| u64::from(own.samples) * SCRAMBLES as u64).sum();
     report.gather_rays = cast as f64 / open;
-    Ok(estimates.iter().map(mean).collect())
+    Ok((estimates, variances))
+}
+
+/// The estimates without what is known to be the patches' fault.
+fn corrected(estimates: &[Estimates], bias: &[PatchBias]) -> Vec<Vec3> {
+    let corrected = estimates.iter().zip(bias).map(|(e, bias)| (mean(e) - bias.correction).max(Vec3::ZERO));
+    corrected.collect()
+}
+
+/// The variances of texels that show a surface.
+fn open_variances<'a>(texels: &'a [Texel], variances: &'a [f32]) -> impl Iterator<Item = f64> + 'a {
+    let open = texels.iter().zip(variances).filter(|(texel, _)| !texel.is_hidden());
+    open.map(|(_, variance)| f64::from(*variance))
 }

@@ -14,19 +14,9 @@ pub(crate) type Estimates = [Vec3; SCRAMBLES];
 /// Reach of the smoothing in texels.
 const RADIUS: i64 = 4;
 
-/// The estimates of every covered texel, smoothed.
-pub(crate) fn smooth(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
-    texels: &[Texel],
-    charts: &[u32],
-    estimates: &[Estimates],
-) -> Vec<Estimates> {
-    let mut place = vec![u32::MAX; layout.texels];
-    for (index, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
-        place[texel.index as usize] = index as u32;
-    }
-    let surroundings = Surroundings { scene, layout, texels, charts, place: &place };
+/// The estimates of every covered texel, smoothed, and the squared bias that the smoothing may have brought, mean of the channels.
+pub(crate) fn smooth(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> (Vec<Estimates>, Vec<f32>) {
+    let texels = surroundings.texels;
     // A single texel's spread of four is itself noise: the neighbourhood's mean is not.
     let variances: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum()).collect();
     let noise: Vec<f32> = texels
@@ -43,8 +33,8 @@ pub(crate) fn smooth(
     // Each half's weights come from the other half: noise that shaped the weights would pull the mean towards what is
     // most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
     let guides: Vec<[Vec3; 2]> =
-        texels.par_iter().map(|texel| guide(&surroundings, texel, estimates)).collect();
-    (0..texels.len())
+        texels.par_iter().map(|texel| guide(surroundings, texel, estimates)).collect();
+    let mut smoothed: Vec<Estimates> = (0..texels.len())
         .into_par_iter()
         .map(|index| {
             let texel = &texels[index];
@@ -67,6 +57,56 @@ pub(crate) fn smooth(
                 plane.at_center(&mut smoothed[half * HALF..][..HALF]);
             }
             smoothed
+        })
+        .collect();
+    let mut bias = squared_bias(surroundings, estimates, &smoothed);
+    // Where smoothing brings more than it takes away, the texel keeps what it gathered.
+    for (index, bias) in bias.iter_mut().enumerate() {
+        let raw = noise[index] / 3.0;
+        if *bias + variance(&smoothed[index]).element_sum() / 3.0 > raw {
+            (smoothed[index], *bias) = (estimates[index], 0.0);
+        }
+    }
+    (smoothed, bias)
+}
+
+/// Texels around one over which the bias is averaged, and the part of their noise that is left in it by chance.
+const BIAS_RADIUS: i64 = 3;
+const BIAS_NOISE: f32 = 0.2;
+
+/// The smoothed value of one half against the raw value of the other, which knows nothing of it: what their squared difference exceeds
+/// both variances by is the square of the bias.
+fn squared_bias(surroundings: &Surroundings<'_>, raw: &[Estimates], smoothed: &[Estimates]) -> Vec<f32> {
+    let grey_square = |v: Vec3| (v * v).element_sum() / 3.0;
+    // Mean of a half, and the variance of that mean.
+    let half_of = |estimates: &Estimates, half: usize| {
+        let [a, b] = [estimates[half * HALF], estimates[half * HALF + 1]];
+        (0.5 * (a + b), 0.25 * grey_square(a - b))
+    };
+    let own: Vec<(f32, f32)> = raw
+        .par_iter()
+        .zip(smoothed)
+        .map(|(raw, smoothed)| {
+            let excess = |half: usize| {
+                let (smoothed, smoothed_variance) = half_of(smoothed, half);
+                let (raw, raw_variance) = half_of(raw, 1 - half);
+                (grey_square(smoothed - raw) - smoothed_variance - raw_variance, raw_variance)
+            };
+            let [(a, noise_a), (b, noise_b)] = [excess(0), excess(1)];
+            (0.5 * (a + b), 0.5 * (noise_a + noise_b))
+        })
+        .collect();
+    surroundings
+        .texels
+        .par_iter()
+        .map(|texel| {
+            let (mut excess, mut noise, mut count) = (0.0, 0.0, 0u32);
+            for (_, _, other) in surroundings.of(texel, BIAS_RADIUS) {
+                excess += own[other].0;
+                noise += own[other].1;
+                count += 1;
+            }
+            ((excess - BIAS_NOISE * noise) / count.max(1) as f32).max(0.0)
         })
         .collect()
 }
@@ -94,18 +134,31 @@ fn guide(surroundings: &Surroundings<'_>, texel: &Texel, estimates: &[Estimates]
 }
 
 /// Who lies around whom.
-struct Surroundings<'a> {
+pub(crate) struct Surroundings<'a> {
     scene: &'a BakeScene,
     layout: &'a LightmapLayout,
     texels: &'a [Texel],
     charts: &'a [u32],
     /// Covered texel of each texel of all maps.
-    place: &'a [u32],
+    place: Vec<u32>,
 }
 
 impl<'a> Surroundings<'a> {
+    pub fn new(
+        scene: &'a BakeScene,
+        layout: &'a LightmapLayout,
+        texels: &'a [Texel],
+        charts: &'a [u32],
+    ) -> Self {
+        let mut place = vec![u32::MAX; layout.texels];
+        for (index, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
+            place[texel.index as usize] = index as u32;
+        }
+        Self { scene, layout, texels, charts, place }
+    }
+
     /// Texels of the same chart and about the same normal, with their offsets.
-    fn of(&'a self, texel: &'a Texel, radius: i64) -> impl Iterator<Item = (f64, f64, usize)> + 'a {
+    pub fn of(&'a self, texel: &'a Texel, radius: i64) -> impl Iterator<Item = (f64, f64, usize)> + 'a {
         let map = &self.layout.maps[texel.object as usize];
         let chart = self.charts[texel.triangle as usize];
         let normal = self.scene.triangles[texel.triangle as usize].normal;

@@ -32,6 +32,8 @@ pub(crate) struct Direct {
     pub baked: Vec3,
     /// From mixed lights: bounces only.
     pub mixed: Vec3,
+    /// Variance that sampling leaves in `baked`, mean of the channels.
+    pub variance: f32,
     /// Rays cast.
     pub rays: u32,
     /// What of the sources was seen.
@@ -68,11 +70,56 @@ pub(crate) struct Sources<'a> {
     pub lights: Vec<PlacedLight>,
 }
 
+/// Interleaved groups of samples whose spread tells the error of their mean. Points of a low-discrepancy sequence are spread better
+/// together than apart, so that the true error is smaller.
+const GROUPS: usize = EXACT_POINTS;
+
+/// Exact unoccluded light at some points of a receiver.
+#[derive(Default)]
+struct Unoccluded {
+    sum: Vec3,
+    grey: [f32; EXACT_POINTS],
+    count: u32,
+}
+
+impl Unoccluded {
+    fn wants_more(&self) -> bool {
+        if (self.count as usize) < EXACT_POINTS {
+            return true;
+        }
+        let mean = self.grey.iter().sum::<f32>() / self.count as f32;
+        // Sums of so many points: what one of them is apart from the mean.
+        let apart =
+            |sum: &f32| (sum / (self.count as f32 / EXACT_POINTS as f32) - mean).abs() > UNEVEN * mean;
+        self.grey.iter().any(apart)
+    }
+
+    fn add(&mut self, light: Vec3) {
+        self.grey[self.count as usize % EXACT_POINTS] += light.element_sum() / 3.0;
+        self.sum += light;
+        self.count += 1;
+    }
+
+    /// The mean, and its variance.
+    fn mean(&self) -> (Vec3, f32) {
+        let per_point = EXACT_POINTS as f32 / self.count.max(1) as f32;
+        (self.sum / self.count.max(1) as f32, variance_of_mean(self.grey.map(|sum| sum * per_point)))
+    }
+}
+
+/// Variance of the mean of all groups, from each group's mean.
+fn variance_of_mean(groups: [f32; GROUPS]) -> f32 {
+    let mean = groups.iter().sum::<f32>() / GROUPS as f32;
+    groups.iter().map(|group| (group - mean).powi(2)).sum::<f32>() / (GROUPS * (GROUPS - 1)) as f32
+}
+
 /// Up to this many emitters, the unoccluded light of all is summed exactly at each point.
 const EXACT_EMITTERS: usize = 48;
 
-/// Points of a receiver at which it is: stratified, so that what is left is of second order in the receiver's size.
-const EXACT_POINTS: u32 = 4;
+/// Points of a receiver at which it is: stratified, so that what is left is of second order in the receiver's size. More where they
+/// differ by this part of their mean: at a lamp's edge the light changes within a texel.
+const EXACT_POINTS: usize = 4;
+const UNEVEN: f32 = 0.05;
 
 impl<'a> Sources<'a> {
     pub fn new(scene: &'a BakeScene, lights: Vec<PlacedLight>) -> Self {
@@ -119,13 +166,16 @@ impl<'a> Sources<'a> {
         let Some(anchor) = point(0.5, 0.5) else { return Vec3::ZERO };
         let Some(choice) = Choice::new(&self.emitters, &anchor) else { return Vec3::ZERO };
         let exact = self.emitters.len() <= EXACT_EMITTERS;
-        let (mut unoccluded, mut all, mut seen) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        let (mut all, mut seen) = (Vec3::ZERO, Vec3::ZERO);
+        let mut unoccluded = Unoccluded::default();
         let (mut visible, mut hidden) = (0u32, 0u32);
+        let (mut group_all, mut group_seen) = ([0.0f32; GROUPS], [0.0f32; GROUPS]);
         for sample in 0..samples {
+            let group = sample as usize % GROUPS;
             let [x, y, u, v] = sequence.point(sample, 0);
             let Some(receiver) = point(x, y) else { continue };
-            if exact && sample < EXACT_POINTS {
-                unoccluded += self.unoccluded(&receiver);
+            if exact && unoccluded.wants_more() {
+                unoccluded.add(self.unoccluded(&receiver));
             }
             let (chosen, u, probability) = choice.pick(u);
             let emitter = &self.emitters[chosen];
@@ -145,6 +195,7 @@ impl<'a> Sources<'a> {
                 continue;
             }
             all += light;
+            group_all[group] += light.element_sum() / 3.0;
             direct.rays += 1;
             let target = self.scene.off_surface(emitter.triangle, emitter.side, target);
             if self.scene.blocked(receiver.origin, target) {
@@ -152,14 +203,24 @@ impl<'a> Sources<'a> {
             } else {
                 visible += 1;
                 seen += light;
+                group_seen[group] += light.element_sum() / 3.0;
             }
         }
         direct.seen.add(visible, hidden);
         if exact {
             let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
             let share = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
-            unoccluded / samples.clamp(1, EXACT_POINTS) as f32 * share
+            let (unoccluded, uneven) = unoccluded.mean();
+            let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
+                true => group_seen[at] / group_all[at],
+                false => share.element_sum() / 3.0,
+            });
+            direct.variance += (unoccluded.element_sum() / 3.0).powi(2) * variance_of_mean(shares);
+            direct.variance += uneven * (share.element_sum() / 3.0).powi(2);
+            unoccluded * share
         } else {
+            let per_group = GROUPS as f32 / samples.max(1) as f32;
+            direct.variance += variance_of_mean(group_seen.map(|seen| seen * per_group));
             seen / samples.max(1) as f32
         }
     }
@@ -184,6 +245,7 @@ impl<'a> Sources<'a> {
     ) -> Vec3 {
         let space = self.scene.space;
         let mut sum = Vec3::ZERO;
+        let mut group_sums = [0.0f32; GROUPS];
         let (mut visible, mut hidden) = (0u32, 0u32);
         for sample in 0..samples {
             let [x, y, ..] = sequence.point(sample, 1 + index % 32);
@@ -206,10 +268,16 @@ impl<'a> Sources<'a> {
                 hidden += 1;
             } else {
                 visible += 1;
-                sum += (arriving.diffuse * strength).as_vec3() * (PI * cosine);
+                let light = (arriving.diffuse * strength).as_vec3() * (PI * cosine);
+                sum += light;
+                group_sums[sample as usize % GROUPS] += light.element_sum() / 3.0;
             }
         }
         direct.seen.add(visible, hidden);
+        if light.light.bake == BakeMode::Static {
+            let per_group = GROUPS as f32 / samples.max(1) as f32;
+            direct.variance += variance_of_mean(group_sums.map(|sum| sum * per_group));
+        }
         sum / samples.max(1) as f32
     }
 }

@@ -21,6 +21,8 @@ pub(crate) struct Exchange {
     pub direct: Vec<Vec3>,
     /// Irradiance by bounces of each patch.
     pub indirect: Vec<Vec3>,
+    /// Standard error of that, with its sign: one sample of how the form factors' noise spreads. Mean of the channels.
+    pub indirect_error: Vec<f32>,
     /// Below this distance patches are too coarse to read, canonical units.
     pub near: f32,
 }
@@ -28,8 +30,8 @@ pub(crate) struct Exchange {
 /// Relative residual at which the solver stops: well below what form factors are known to.
 const TOLERANCE: f64 = 1e-5;
 
-/// Shadow rays of a patch to each source.
-const SHADOW_RAYS: u32 = 16;
+/// Shadow rays of a patch to each source, in each half.
+const SHADOW_RAYS: u32 = 8;
 
 impl Exchange {
     /// `None` where nothing bounces; the report then says why.
@@ -53,18 +55,25 @@ impl Exchange {
                 .push("form factors, radiosity and final gather: no surface reflects (rho = 0)".into());
             return Ok(None);
         }
-        let factors = FormFactors::sample(scene, &patches, effort.form_factor_rays, options.seed);
+        let (factors, halves) = FormFactors::sample(scene, &patches, effort.form_factor_rays, options.seed);
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
         report.energy_lost = factors.energy_lost;
 
         watch.stage("radiosity", report)?;
-        let direct: Vec<(Vec3, u32)> = (0..patches.list.len())
-            .into_par_iter()
-            .map(|index| patch_direct(scene, sources, &patches, index, factors.open[index], options.seed))
-            .collect();
-        report.rays += direct.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-        let direct: Vec<Vec3> = direct.into_iter().map(|(direct, _)| direct).collect();
+        let direct_halves = [5, 6].map(|purpose| {
+            let half: Vec<(Vec3, u32)> = (0..patches.list.len())
+                .into_par_iter()
+                .map(|index| {
+                    let sequence = Sequence::new(options.seed, purpose, index as u32);
+                    patch_direct(scene, sources, &patches, index, factors.open[index], sequence)
+                })
+                .collect();
+            report.rays += half.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+            half.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>()
+        });
+        let [even, odd] = &direct_halves;
+        let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();
         if direct.iter().zip(&patches.list).all(|(direct, patch)| *direct * patch.reflectance == Vec3::ZERO) {
             report
                 .skipped
@@ -73,7 +82,8 @@ impl Exchange {
         }
         watch.advance(0.5)?;
         let indirect = solve(options.solver, &factors, &patches.list, &direct, report);
-        Ok(Some(Self { patches, direct, indirect, near: 2.0 * side }))
+        let indirect_error = solution_error(options.solver, &halves, &direct_halves, &patches.list);
+        Ok(Some(Self { patches, direct, indirect, indirect_error, near: 2.0 * side }))
     }
 }
 
@@ -84,7 +94,7 @@ fn patch_direct(
     patches: &Patches,
     index: usize,
     open: f32,
-    seed: u32,
+    sequence: Sequence,
 ) -> (Vec3, u32) {
     let patch = &patches.list[index];
     if open <= 0.0 {
@@ -100,8 +110,26 @@ fn patch_direct(
         let smooth = if patch.side == Side::Front { smooth } else { -smooth };
         Some(Receiver { position, origin, geometric_normal: normal, normal: smooth })
     };
-    let direct = sources.irradiance(Sequence::new(seed, 5, index as u32), SHADOW_RAYS, &point);
+    let direct = sources.irradiance(sequence, SHADOW_RAYS, &point);
     (direct.total() / open, direct.rays)
+}
+
+/// Half the difference of the solutions by two independent halves of the rays, for grey light.
+fn solution_error(
+    solver: Solver,
+    halves: &[FormFactors; 2],
+    direct: &[Vec<Vec3>; 2],
+    patches: &[Patch],
+) -> Vec<f32> {
+    let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
+    let reflectance: Vec<f64> = patches.iter().map(|patch| grey(patch.reflectance)).collect();
+    let [a, b] = [0, 1].map(|half| {
+        let factors = &halves[half];
+        let lit = direct[half].iter().zip(patches);
+        let emission: Vec<f64> = lit.map(|(light, patch)| grey(*light * patch.reflectance)).collect();
+        solver::gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
+    });
+    a.iter().zip(&b).map(|(a, b)| (0.5 * (a - b)) as f32).collect()
 }
 
 /// Irradiance by bounces: Σ_j F_ij B_j, with B the solution for the light that direct light has left on the patches.

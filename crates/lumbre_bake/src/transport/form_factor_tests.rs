@@ -50,7 +50,7 @@ fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
 fn factor(objects: &[&[[Vec3; 3]]], side: f32) -> (f64, f64) {
     let scene = scene(objects);
     let patches = Patches::new(&scene, side * scene.space.scale as f32);
-    let factors = FormFactors::sample(&scene, &patches, 200_000, 7);
+    let (factors, _) = FormFactors::sample(&scene, &patches, 200_000, 7);
     let object = |patch: usize| scene.triangles[patches.list[patch].triangle as usize].object;
     let (mut exchange, mut area) = (0.0, 0.0);
     for i in (0..factors.len()).filter(|&i| object(i) == 0) {
@@ -122,7 +122,7 @@ fn room() -> Vec<[Vec3; 3]> {
 fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
     let scene = scene(&[&room()]);
     let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
-    let factors = FormFactors::sample(&scene, &patches, 100_000, 3);
+    let (factors, _) = FormFactors::sample(&scene, &patches, 100_000, 3);
     for i in 0..factors.len() {
         // Twelve rounds of scaling leave what f32 and their own convergence leave.
         assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "row {i}: {}", factors.row_sum(i));

@@ -31,23 +31,41 @@ pub(crate) struct FormFactors {
 const RAYS: (f64, f64) = (32.0, 65_536.0);
 
 impl FormFactors {
-    /// Casts about `rays` rays, in proportion to the patches' areas.
-    pub fn sample(scene: &BakeScene, patches: &Patches, rays: usize, seed: u32) -> Self {
+    /// Casts about `rays` rays, in proportion to the patches' areas. Beside the estimate from all rays come those of the even and of
+    /// the odd ones: half their difference is the standard error of the whole.
+    pub fn sample(scene: &BakeScene, patches: &Patches, rays: usize, seed: u32) -> (Self, [Self; 2]) {
         let total: f64 = patches.list.iter().map(|patch| f64::from(patch.area)).sum();
         let counts: Vec<u32> = patches
             .list
             .iter()
             .map(|patch| (rays as f64 * f64::from(patch.area) / total).round().clamp(RAYS.0, RAYS.1) as u32)
             .collect();
-        let cast: Vec<(Vec<(u32, u32)>, u32)> = (0..patches.list.len())
+        let cast: Vec<Cast> = (0..patches.list.len())
             .into_par_iter()
             .map(|index| cast(scene, patches, index as u32, counts[index], seed))
             .collect();
-        let (hits, inside): (Vec<_>, Vec<u32>) = cast.into_iter().unzip();
+        let whole =
+            Self::pooled(&cast, patches, &counts, |cast| (cast.whole(), cast.inside[0] + cast.inside[1]));
+        let halves = [0, 1].map(|half| {
+            // Of an odd number of rays the even ones are one more.
+            let counts: Vec<u32> = counts.iter().map(|&count| (count + 1 - half as u32) / 2).collect();
+            Self::pooled(&cast, patches, &counts, |cast| (cast.met[half].clone(), cast.inside[half]))
+        });
+        (whole, halves)
+    }
+
+    /// The matrix of some of the rays: of each patch those that `of` picks, `counts` altogether.
+    fn pooled(
+        cast: &[Cast],
+        patches: &Patches,
+        counts: &[u32],
+        of: impl Fn(&Cast) -> (Vec<(u32, u32)>, u32),
+    ) -> Self {
+        let (hits, inside): (Vec<_>, Vec<u32>) = cast.iter().map(of).unzip();
         let areas: Vec<f32> = patches.list.iter().map(|patch| patch.area).collect();
-        let mut factors = pool(&hits, &counts, areas);
+        let mut factors = pool(&hits, counts, areas);
         factors.open =
-            counts.iter().zip(&inside).map(|(&n, &inside)| (n - inside) as f32 / n as f32).collect();
+            counts.iter().zip(&inside).map(|(&n, &inside)| (n - inside) as f32 / n.max(1) as f32).collect();
         for (area, open) in factors.areas.iter_mut().zip(&factors.open) {
             // A patch wholly inside exchanges nothing; its area only divides that nothing.
             *area *= open.max(1e-3);
@@ -122,37 +140,63 @@ impl FormFactors {
     }
 }
 
-/// Rays of one patch: how many met each other patch, by index, and how many began inside other geometry.
-fn cast(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32) -> (Vec<(u32, u32)>, u32) {
+/// Rays of one patch, the even and the odd ones: how many met each other patch, by index, and how many began inside other geometry.
+struct Cast {
+    met: [Vec<(u32, u32)>; 2],
+    inside: [u32; 2],
+}
+
+impl Cast {
+    /// Both halves together.
+    fn whole(&self) -> Vec<(u32, u32)> {
+        let [even, odd] = &self.met;
+        let mut both = [even.as_slice(), odd].concat();
+        both.sort_unstable();
+        both.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            kept.1 += if same { next.1 } else { 0 };
+            same
+        });
+        both
+    }
+}
+
+fn cast(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32) -> Cast {
     let patch = &patches.list[index as usize];
     let triangle = &scene.triangles[patch.triangle as usize];
     let normal = triangle.side_normal(patch.side);
     let [p, q, r] = patches.corners(scene, patch);
     let sequence = Sequence::new(seed, 1, index);
-    let mut met = Vec::with_capacity(count as usize);
-    let mut inside = 0;
+    let mut met = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
+    let mut inside = [0; 2];
     for ray in 0..count {
+        let half = ray as usize % 2;
         let [a, b, c, d] = sequence.point(ray, 0);
         let (u, v) = triangle_point(a, b);
         let position = p + (q - p) * u + (r - p) * v;
         let origin = scene.off_surface(patch.triangle, patch.side, position);
         match scene.first_hit(origin, cosine_about(normal, c, d)) {
             SurfaceHit::Lit { triangle, side, at, .. } => {
-                met.extend(patches.at(triangle, side, at).filter(|&other| other != index));
+                met[half].extend(patches.at(triangle, side, at).filter(|&other| other != index));
             }
-            SurfaceHit::Inside => inside += 1,
+            SurfaceHit::Inside => inside[half] += 1,
             SurfaceHit::Back | SurfaceHit::None => {}
         }
     }
-    met.sort_unstable();
+    Cast { met: met.map(counted), inside }
+}
+
+/// How often each number occurs, in order.
+fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
+    numbers.sort_unstable();
     let mut row: Vec<(u32, u32)> = Vec::new();
-    for other in met {
+    for number in numbers {
         match row.last_mut() {
-            Some((last, n)) if *last == other => *n += 1,
-            _ => row.push((other, 1)),
+            Some((last, n)) if *last == number => *n += 1,
+            _ => row.push((number, 1)),
         }
     }
-    (row, inside)
+    row
 }
 
 /// Both directions of a pair count the same flux: N_ij has mean R_i G/A_i, N_ji has mean R_j G/A_j. The best estimate of

@@ -40,6 +40,15 @@ const TEXTURE_POINTS: [(f32, f32); 4] =
     [(1.0 / 3.0, 1.0 / 3.0), (2.0 / 3.0, 1.0 / 6.0), (1.0 / 6.0, 2.0 / 3.0), (1.0 / 6.0, 1.0 / 6.0)];
 
 impl Patches {
+    /// By area, mean of the channels, at most .999.
+    pub fn mean_reflectance(&self) -> f64 {
+        let (sum, area) = self.list.iter().fold((0.0, 0.0), |(sum, area), patch| {
+            let own = f64::from(patch.area);
+            (sum + own * f64::from(patch.reflectance.element_sum()) / 3.0, area + own)
+        });
+        if area > 0.0 { (sum / area).clamp(0.0, 0.999) } else { 0.0 }
+    }
+
     /// Cuts every triangle into patches of about `side` canonical units.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
         let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
