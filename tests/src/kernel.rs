@@ -1,11 +1,13 @@
 //! A lighting function run on the GPU over a buffer of inputs: a compute kernel around one call. Not a judge of what comes out: that
 //! is the caller's twin, with `running_error` for the bound.
 //!
-//! ```
-//! use lumbre_tests::kernel::Kernel;
+//! Inputs and results cross as bits, so that neither compiler nor driver may assume that no NaN comes by, and results that were
+//! never written are told from those that were.
 //!
-//! let call = "return array<f32, 1>(lambert(vec3<f32>(x[0], x[1], x[2]), vec3<f32>(x[3], x[4], x[5])));";
-//! let kernel = Kernel::new("lambert", &["lambert"], &[], 6, 1, call);
+//! ```
+//! use lumbre_tests::kernel::{Kernel, Type};
+//!
+//! let kernel = Kernel::of("lambert", "lambert", &[], &[Type::Vector, Type::Vector], Type::Number);
 //! let gpu = lumbre_render::Gpu::headless().expect("a Vulkan driver; the software one will do");
 //! let got = kernel.run(&gpu, &[0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0]);
 //! assert_eq!(got, [1.0, 0.0]);
@@ -20,16 +22,84 @@ use lumbre_render::Gpu;
 const WORKGROUP: usize = 64;
 const WORKGROUPS: usize = 65_535;
 
+/// What the result buffer holds before: a NaN with a payload that no arithmetic makes.
+const UNWRITTEN: u32 = 0x7fc0_dead;
+
+/// A kind of argument or result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Type {
+    /// `f32`.
+    Number,
+    /// `vec3<f32>`.
+    Vector,
+    /// `vec4<f32>`.
+    Vector4,
+    /// `bool`: given and taken as 0 or 1.
+    Flag,
+}
+
+impl Type {
+    /// How many numbers of a buffer it takes.
+    pub fn size(self) -> usize {
+        match self {
+            Self::Number | Self::Flag => 1,
+            Self::Vector => 3,
+            Self::Vector4 => 4,
+        }
+    }
+
+    /// The argument that starts at a place of `x`.
+    fn read(self, at: usize) -> String {
+        match self {
+            Self::Number => format!("x[{at}]"),
+            Self::Vector => format!("vec3<f32>(x[{at}], x[{}], x[{}])", at + 1, at + 2),
+            Self::Vector4 => format!("vec4<f32>(x[{at}], x[{}], x[{}], x[{}])", at + 1, at + 2, at + 3),
+            Self::Flag => format!("x[{at}] > 0.5"),
+        }
+    }
+
+    /// The numbers of a result called `r`.
+    fn write(self) -> &'static str {
+        match self {
+            Self::Number => "r",
+            Self::Vector => "r.x, r.y, r.z",
+            Self::Vector4 => "r.x, r.y, r.z, r.w",
+            Self::Flag => "select(0.0, 1.0, r)",
+        }
+    }
+}
+
 /// One function of `shaders/optics` as a compute kernel.
 #[derive(Clone, Debug)]
 pub struct Kernel {
     /// The whole program after imports and conditions, with `evaluate` as the call.
     pub wgsl: String,
+    /// The program before imports and conditions.
+    source: String,
+    features: Vec<String>,
     inputs: usize,
     outputs: usize,
 }
 
 impl Kernel {
+    /// A kernel around a `function` of the module `optics::module`, with arguments of these types one behind the other.
+    ///
+    /// # Panics
+    /// As [`Kernel::new`].
+    pub fn of(module: &str, function: &str, features: &[&str], arguments: &[Type], result: Type) -> Self {
+        let mut size = 0;
+        let passed: Vec<String> = arguments
+            .iter()
+            .map(|argument| {
+                size += argument.size();
+                argument.read(size - argument.size())
+            })
+            .collect();
+        let (passed, outputs) = (passed.join(", "), result.size());
+        let call = format!("let r = {function}({passed}); return array<f32, {outputs}>({});", result.write());
+        Self::new(module, &[function], features, size, outputs, &call)
+    }
+
     /// A kernel around a `call`: WESL statements that return an `array<f32, outputs>` from the numbers of `x`, an `array<f32, inputs>`.
     /// It knows the `imports` of the module `optics::module`, compiled with these `features` on and all others off.
     ///
@@ -50,64 +120,59 @@ impl Kernel {
         };
         let source = format!(
             "{imports}
-            @group(0) @binding(0) var<storage, read> input: array<f32>;
-            @group(0) @binding(1) var<storage, read_write> output: array<f32>;
+            @group(0) @binding(0) var<storage, read> input: array<u32>;
+            @group(0) @binding(1) var<storage, read_write> output: array<u32>;
             fn evaluate(x: array<f32, {inputs}>) -> array<f32, {outputs}> {{ {call} }}
             @compute @workgroup_size({WORKGROUP})
             fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
                 if id.x >= arrayLength(&output) / {outputs}u {{ return; }}
                 var x: array<f32, {inputs}>;
-                for (var i = 0u; i < {inputs}u; i++) {{ x[i] = input[id.x * {inputs}u + i]; }}
+                for (var i = 0u; i < {inputs}u; i++) {{ x[i] = bitcast<f32>(input[id.x * {inputs}u + i]); }}
                 var result = evaluate(x);
-                for (var i = 0u; i < {outputs}u; i++) {{ output[id.x * {outputs}u + i] = result[i]; }}
+                for (var i = 0u; i < {outputs}u; i++) {{ output[id.x * {outputs}u + i] = bitcast<u32>(result[i]); }}
             }}"
         );
-        let mut resolver = wesl::VirtualResolver::new();
-        let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders/optics");
-        let files = std::fs::read_dir(&shaders).unwrap_or_else(|error| panic!("{shaders:?}: {error}"));
-        for file in files {
-            let path = file.unwrap_or_else(|error| panic!("{shaders:?}: {error}")).path();
-            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path:?}: {error}"));
-            resolver.add_module(module_path(&format!("optics::{name}")), Cow::Owned(text));
-        }
-        resolver.add_module(module_path("kernel"), Cow::Owned(source));
-        let mut compiler = wesl::Wesl::new_barebones().set_custom_resolver(resolver);
-        compiler.set_mangler(wesl::ManglerKind::Escape).set_options(wesl::CompileOptions {
-            imports: true,
-            condcomp: true,
-            strip: true,
-            lazy: true,
-            ..Default::default()
+        let features: Vec<String> = features.iter().map(|feature| (*feature).to_owned()).collect();
+        let wgsl = compile(&source, &features, |_, text| text);
+        Self { wgsl, source, features, inputs, outputs }
+    }
+
+    /// The same kernel over a changed shader: in the module `optics::module`, `from` becomes `to`. For tests of the tests.
+    ///
+    /// # Panics
+    /// If the module has no `from`, or does not compile any more.
+    pub fn mutated(&self, module: &str, from: &str, to: &str) -> Self {
+        let wgsl = compile(&self.source, &self.features, |name, text| {
+            if name != module {
+                return text;
+            }
+            assert!(text.contains(from), "{module} has no {from:?}");
+            text.replace(from, to)
         });
-        for feature in features {
-            compiler.set_feature(feature, true);
-        }
-        match compiler.compile(&module_path("kernel")) {
-            Ok(program) => Self { wgsl: program.to_string(), inputs, outputs },
-            Err(error) => panic!("{module}: {error}"),
-        }
+        Self { wgsl, ..self.clone() }
+    }
+
+    /// How many numbers an input has.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// How many numbers a result has.
+    pub fn outputs(&self) -> usize {
+        self.outputs
     }
 
     /// The function over many inputs, `inputs` numbers each; `outputs` numbers come back for each.
     ///
     /// # Panics
-    /// If the device refuses: a test that cannot run has failed.
+    /// If the device refuses, or leaves a result unwritten: a test that cannot run has failed.
     pub fn run(&self, gpu: &Gpu, input: &[f32]) -> Vec<f32> {
         assert_eq!(input.len() % self.inputs, 0, "inputs come in groups of {}", self.inputs);
-        let chunk = WORKGROUP * WORKGROUPS * self.inputs;
-        input.chunks(chunk).flat_map(|part| self.run_once(gpu, part)).collect()
-    }
-
-    fn run_once(&self, gpu: &Gpu, input: &[f32]) -> Vec<f32> {
-        let device = &gpu.device;
-        let count = input.len() / self.inputs;
-        let bytes = (count * self.outputs * size_of::<f32>()) as u64;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("kernel"),
             source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&self.wgsl)),
         });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("kernel"),
             layout: None,
             module: &module,
@@ -115,6 +180,17 @@ impl Kernel {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
+        let limits = gpu.device.limits();
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let numbers = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<f32>();
+        let count = (WORKGROUP * WORKGROUPS).min(numbers / self.inputs.max(self.outputs));
+        input.chunks(count * self.inputs).flat_map(|part| self.run_once(gpu, &pipeline, part)).collect()
+    }
+
+    fn run_once(&self, gpu: &Gpu, pipeline: &wgpu::ComputePipeline, input: &[f32]) -> Vec<f32> {
+        let device = &gpu.device;
+        let count = input.len() / self.inputs;
+        let bytes = (count * self.outputs * size_of::<f32>()) as u64;
         let buffer = |size, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: None,
@@ -123,10 +199,11 @@ impl Kernel {
                 mapped_at_creation: false,
             })
         };
-        let usages = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let source = buffer((input.len() * size_of::<f32>()) as u64, usages);
+        let written = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let source = buffer(size_of_val(input) as u64, written);
         gpu.queue.write_buffer(&source, 0, bytemuck::cast_slice(input));
-        let target = buffer(bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+        let target = buffer(bytes, written | wgpu::BufferUsages::COPY_SRC);
+        gpu.queue.write_buffer(&target, 0, bytemuck::cast_slice(&vec![UNWRITTEN; count * self.outputs]));
         let readable = buffer(bytes, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
@@ -139,7 +216,7 @@ impl Kernel {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&pipeline);
+            pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &bind_group, &[]);
             pass.dispatch_workgroups(count.div_ceil(WORKGROUP) as u32, 1, 1);
         }
@@ -149,11 +226,73 @@ impl Kernel {
         device.poll(wgpu::PollType::wait_indefinitely()).unwrap_or_else(|error| panic!("{error}"));
         gpu.check().unwrap_or_else(|error| panic!("{error}"));
         let view = readable.slice(..).get_mapped_range().unwrap_or_else(|error| panic!("{error}"));
-        bytemuck::pod_collect_to_vec(&view)
+        let bits: Vec<u32> = bytemuck::pod_collect_to_vec(&view);
+        assert!(!bits.contains(&UNWRITTEN), "the kernel left results unwritten");
+        bits.into_iter().map(f32::from_bits).collect()
+    }
+}
+
+/// The program with the modules of `shaders/optics`, each as `edit` gives it by name and text.
+fn compile(source: &str, features: &[String], edit: impl Fn(&str, String) -> String) -> String {
+    let mut resolver = wesl::VirtualResolver::new();
+    let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders/optics");
+    let files = std::fs::read_dir(&shaders).unwrap_or_else(|error| panic!("{shaders:?}: {error}"));
+    for file in files {
+        let path = file.unwrap_or_else(|error| panic!("{shaders:?}: {error}")).path();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path:?}: {error}"));
+        let text = edit(&name, text);
+        resolver.add_module(module_path(&format!("optics::{name}")), Cow::Owned(text));
+    }
+    resolver.add_module(module_path("kernel"), Cow::Borrowed(source));
+    let mut compiler = wesl::Wesl::new_barebones().set_custom_resolver(resolver);
+    compiler.set_mangler(wesl::ManglerKind::Escape).set_options(wesl::CompileOptions {
+        imports: true,
+        condcomp: true,
+        strip: true,
+        lazy: true,
+        ..Default::default()
+    });
+    for feature in features {
+        compiler.set_feature(feature.as_str(), true);
+    }
+    match compiler.compile(&module_path("kernel")) {
+        Ok(program) => program.to_string(),
+        Err(error) => panic!("{error}\n{source}"),
     }
 }
 
 fn module_path(path: &str) -> wesl::syntax::ModulePath {
     let path = format!("package::{path}");
     path.parse().unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gpu() -> Gpu {
+        Gpu::headless().expect("a Vulkan driver; the software one will do")
+    }
+
+    #[test]
+    fn nan_and_infinity_arrive() {
+        let call =
+            "return array<f32, 2>(x[0] / x[1], sqrt(x[0]) + lambert(vec3<f32>(x[1]), vec3<f32>(0.0)));";
+        let kernel = Kernel::new("lambert", &["lambert"], &[], 2, 2, call);
+        let got = kernel.run(&gpu(), &[0.0, 0.0, 1.0, 0.0, -1.0, 1.0]);
+        assert!(got[0].is_nan() && got[1] == 0.0, "{got:?}");
+        assert!(got[2] == f32::INFINITY && got[3] == 1.0, "{got:?}");
+        assert!(got[4] == -1.0 && got[5].is_nan(), "{got:?}");
+    }
+
+    #[test]
+    fn more_inputs_than_one_dispatch_takes_keep_their_order() {
+        let call = "return array<f32, 1>(lambert(vec3<f32>(x[0]), vec3<f32>(1.0, 0.0, 0.0)));";
+        let kernel = Kernel::new("lambert", &["lambert"], &[], 1, 1, call);
+        let count = WORKGROUP * WORKGROUPS + 1000;
+        // Multiples of 2⁻²³ up to 1/2 are f32 and pass unrounded.
+        let input: Vec<f32> = (0..count).map(|i| i as f32 / (1 << 23) as f32).collect();
+        assert_eq!(kernel.run(&gpu(), &input), input);
+    }
 }

@@ -1,12 +1,17 @@
 //! Highlights: powers of cosines, Phong's and Blinn's lobes, their filtered forms, roughness.
 
+use glam::{DVec3, Vec3};
 use lumbre_optics::*;
+use lumbre_tests::kernel::{Kernel, Type};
 
+use crate::bounds::Allowed;
+use crate::bounds::lobes::{self, OffVector};
+use crate::bounds::powers::{self, Off};
 use crate::inputs::{EXPONENTS, Sequence, crossed, hard_directions, product};
-use crate::judge::{Kind, Twin};
+use crate::judge::Twin;
 use crate::vectors::vector;
 
-const LOBE: [Kind; 4] = [Kind::Vector, Kind::Vector, Kind::Vector, Kind::Number];
+const LOBE: [Type; 4] = [Type::Vector, Type::Vector, Type::Vector, Type::Number];
 
 /// Directions and an exponent.
 pub fn lobe(sequence: &mut Sequence) -> Vec<f32> {
@@ -22,107 +27,161 @@ pub fn hard_lobes() -> Vec<Vec<f32>> {
     crossed(&directions, &product(&[&EXPONENTS]))
 }
 
-/// Powers of the cosine keep the length that rounding gives to unit vectors, powers of the sine ignore it; the twin does the latter
-/// near the peak. That is n times the relative length, of at most 1 altogether. `turns` is how often the normal's length counts.
-fn lengths(x: &[f64], exponent: f64, turns: f64) -> f64 {
-    let off = |at| (0.5 * vector(x, at).length_squared().max(1e-30).ln()).abs();
-    let relative = turns * off(0) + off(3) + off(6);
-    if relative > 1e-3 {
-        // No unit vectors: the two are other functions then, and both in [0, 1].
-        return 1.0;
-    }
-    (exponent * relative).exp_m1().min(1.0)
+fn base_and_exponent(sequence: &mut Sequence) -> Vec<f32> {
+    // Half of them where the power is neither 0 nor 1.
+    let exponent = sequence.shininess();
+    let base =
+        if sequence.next() < 0.5 { sequence.next() } else { (-sequence.decades(-3.0, 1.0) / exponent).exp() };
+    vec![base, exponent]
 }
 
-/// The series of the logarithm stops at 2e-7 of it up to sin² = .19; x e^-x is at most 1/e.
-const SERIES: f64 = 2e-7 / std::f64::consts::E;
+fn powers_of_cosines() -> [Twin; 3] {
+    [
+        Twin::new("power", "safe_pow", &[], &[Type::Number, Type::Number], Type::Number)
+            .expect(|x| safe_pow(x[0], x[1]))
+            .within(|x| powers::safe_pow(Off::exact(x[0]), Off::exact(x[1])))
+            .random(base_and_exponent)
+            .corners(product(&[
+                &[-1.0, -0.0, 0.0, 1e-38, 1e-30, 1e-20, 0.1, 0.5, 0.9, 0.999_999, 1.0, 2.0],
+                &EXPONENTS,
+            ]))
+            .range(0.0, 1.0),
+        Twin::new("power", "logarithm_of_one_minus", &[], &[Type::Number], Type::Number)
+            .expect(|x| (-x[0]).ln_1p())
+            .within(|x| powers::logarithm_of_one_minus(x[0]))
+            .random(|s| vec![0.25 * s.next().powi(2)])
+            .corners(product(&[&[0.0, 1e-38, 1e-30, 1e-12, 1e-6, 1e-3, 0.1, 0.19, 0.249_999]])),
+        Twin::new("power", "power_of_cosine", &[], &[Type::Number; 3], Type::Number)
+            .expect(|x| power_of_cosine(x[0], x[1], x[2]))
+            .within(|x| powers::power_of_cosine(Off::exact(x[0]), Off::exact(x[1]), Off::exact(x[2])))
+            .random(|s| {
+                let angle = f64::from(s.decades(-6.0, 0.19));
+                let exponent = f64::from(s.decades(-2.0, 1.3)) / angle.powi(2);
+                vec![angle.cos() as f32, angle.sin().powi(2) as f32, exponent.min(1e6) as f32]
+            })
+            .corners(product(&[
+                &[-1.0, 0.0, 0.5, 0.899_999, 0.9, 0.900_001, 0.999, 1.0],
+                &[0.0, 1e-30, 1e-12, 1e-6, 1e-3, 0.19, 0.25, 1.0],
+                &EXPONENTS,
+            ]))
+            .range(0.0, 1.0),
+    ]
+}
 
-type Model = fn(glam::DVec3, glam::DVec3, glam::DVec3, f64) -> f64;
+/// One cosine lobe, around exact vectors, that is random near its peak.
+fn bare_lobe(sharp: bool) -> Twin {
+    let arguments = [Type::Vector, Type::Vector, Type::Number];
+    let corners: Vec<Vec<f32>> = hard_directions().iter().map(|numbers| numbers[3..].to_vec()).collect();
+    Twin::new("power", "cosine_lobe", features(sharp), &arguments, Type::Number)
+        .named(suffix(sharp))
+        .expect(|x| cosine_lobe(vector(x, 0), vector(x, 3), x[6]))
+        .within(move |x| {
+            let [axis, direction] = [0, 3].map(|at| OffVector::exact(vector(x, at)));
+            lobes::cosine_lobe(axis, direction, Off::exact(x[6]), sharp)
+        })
+        .random(move |s| {
+            let axis = s.unit();
+            let away = s.decades(-6.0, 0.3);
+            let direction =
+                (axis.as_dvec3() + f64::from(away) * s.unit().as_dvec3()).normalize_or_zero().as_vec3();
+            let exponent = plain(s.shininess(), sharp);
+            [&axis.to_array()[..], &direction.to_array(), &[exponent]].concat()
+        })
+        .corners(crossed(&corners, &product(&[&exponents(sharp)])))
+        .range_up_to(0.0, 1.0, 1e9)
+}
 
-fn highlight(module: &str, name: &str, model: Model, scale: f64, turns: f64, sharp: bool) -> Twin {
-    let features: &[&str] = if sharp { &["SHARP_HIGHLIGHTS"] } else { &[] };
-    let suffix = if sharp { "sharp" } else { "plain" };
-    Twin::new(module, name, features, &LOBE, Kind::Number)
-        .named(suffix)
-        .expect(move |x| vec![model(vector(x, 0), vector(x, 3), vector(x, 6), x[9])])
+fn features(sharp: bool) -> &'static [&'static str] {
+    if sharp { &["SHARP_HIGHLIGHTS"] } else { &[] }
+}
+
+fn suffix(sharp: bool) -> &'static str {
+    if sharp { "sharp" } else { "plain" }
+}
+
+/// The plain form is for exponents up to [`SHARP_SHININESS`].
+fn plain(exponent: f32, sharp: bool) -> f32 {
+    if sharp || exponent <= SHARP_SHININESS { exponent } else { exponent.rem_euclid(SHARP_SHININESS) }
+}
+
+fn exponents(sharp: bool) -> Vec<f32> {
+    EXPONENTS.iter().copied().filter(|exponent| sharp || *exponent <= SHARP_SHININESS).collect()
+}
+
+type Model = fn(DVec3, DVec3, DVec3, f64) -> f64;
+type Bound = fn(DVec3, DVec3, DVec3, f64, bool) -> Allowed;
+
+fn highlight(module: &str, name: &str, model: Model, bound: Bound, sharp: bool) -> Twin {
+    let directions: Vec<Vec<f32>> = hard_directions().iter().map(|numbers| numbers.to_vec()).collect();
+    Twin::new(module, name, features(sharp), &LOBE, Type::Number)
+        .named(suffix(sharp))
+        .expect(move |x| model(vector(x, 0), vector(x, 3), vector(x, 6), x[9]))
+        .within(move |x| bound(vector(x, 0), vector(x, 3), vector(x, 6), x[9], sharp))
         .random(move |s| {
             let mut input = lobe(s);
-            if !sharp {
-                // The plain form is for exponents up to this.
-                input[9] = input[9].min(SHARP_SHININESS);
-            }
+            input[9] = plain(input[9], sharp);
             input
         })
-        .corners(hard_lobes())
-        .method(move |x, _| {
-            let lengths = lengths(x, scale * x[9], turns);
-            if sharp { SERIES + lengths } else { lengths }
-        })
-        .range(0.0, 1.0)
+        .corners(crossed(&directions, &product(&[&exponents(sharp)])))
+        .range_up_to(0.0, 1.0, 1e6)
+}
+
+fn filtered() -> [Twin; 3] {
+    let call = "let r = filtered_lobe(x[0], x[1], x[2]); return array<f32, 2>(r.shininess, r.peak);";
+    let kernel = Kernel::new("specular_antialiasing", &["filtered_lobe"], &[], 3, 2, call);
+    let changes: [f32; 7] = [0.0, 1e-30, 1e-6, 0.1, 0.359_999, 0.36, 4.0];
+    [
+        Twin::around("filtered_lobe", kernel)
+            .expect(|x| {
+                let lobe = filtered_lobe(x[0], x[1], x[2]);
+                [lobe.shininess, lobe.peak]
+            })
+            .within(|x| Allowed::from(&lobes::filtered_lobe(x[0], x[1], x[2])[..]))
+            .random(|s| vec![s.shininess(), 1.0 + 3.0 * s.next().round(), 0.18 * s.next() * s.next()])
+            .corners(product(&[&EXPONENTS, &[1.0, 4.0], &[-1.0, 0.0, 1e-12, 1e-6, 1e-3, 0.18]])),
+        Twin::new("specular_antialiasing", "lobe_widening", &[], &[Type::Number; 2], Type::Number)
+            .expect(|x| lobe_widening(x[0], x[1]))
+            .within(|x| lobes::lobe_widening(x[0], x[1]))
+            .random(|s| vec![s.decades(-12.0, 0.6), s.decades(-12.0, 0.6)])
+            .corners(product(&[&changes, &changes]))
+            .range(0.0, 0.180_001),
+        Twin::new("roughness", "shininess_from_roughness", &[], &[Type::Number], Type::Number)
+            .expect(|x| {
+                let alpha = x[0].clamp(0.0, 1.0).powi(2).max(1e-6);
+                (2.0 / (alpha * alpha) - 2.0).clamp(0.0, MAX_SHININESS.into())
+            })
+            .within(|x| {
+                let alpha = x[0].clamp(0.0, 1.0).powi(2).max(1e-6);
+                lobes::shininess_from_roughness(
+                    (2.0 / (alpha * alpha) - 2.0).clamp(0.0, MAX_SHININESS.into()),
+                )
+            })
+            .random(|s| vec![s.next()])
+            .corners(product(&[&[-1.0, 0.0, 1e-3, 0.0316, 0.0376, 0.1, 0.5, 0.999, 1.0, 2.0]]))
+            .range(0.0, 1e6),
+    ]
 }
 
 pub fn twins() -> Vec<Twin> {
-    let mut all = vec![
-        Twin::new("power", "safe_pow", &[], &[Kind::Number, Kind::Number], Kind::Number)
-            .expect(|x| vec![safe_pow(x[0], x[1])])
-            .random(|s| vec![s.next(), s.shininess()])
-            .corners(product(&[
-                &[-1.0, -0.0, 0.0, 1e-30, 1e-20, 0.1, 0.5, 0.9, 0.999_999, 1.0, 2.0],
-                &EXPONENTS,
-            ]))
-            // Bases under 1e-30 count as that, which matters to exponents under 1 only.
-            .method(|x, _| if x[0] < 2e-30 && x[0] > 0.0 && x[1] < 2.0 { 1.0 } else { 0.0 })
-            .range(0.0, 1.0),
-        Twin::new("power", "power_of_cosine", &[], &[Kind::Number; 3], Kind::Number)
-            .expect(|x| vec![power_of_cosine(x[0], x[1], x[2])])
-            .random(|s| {
-                let angle = f64::from(s.decades(-6.0, 0.19));
-                vec![angle.cos() as f32, angle.sin().powi(2) as f32, s.shininess()]
-            })
-            .corners(product(&[
-                &[-1.0, 0.0, 0.5, 0.899_999, 0.900_001, 0.999, 1.0],
-                &[0.0, 1e-30, 1e-12, 1e-6, 1e-3, 0.19],
-                &EXPONENTS,
-            ]))
-            .method(|_, _| SERIES)
-            .range(0.0, 1.0),
-        Twin::new("roughness", "shininess_from_roughness", &[], &[Kind::Number], Kind::Number)
-            .expect(|x| {
-                let alpha = x[0].clamp(0.0, 1.0).powi(2).max(1e-6);
-                vec![(2.0 / (alpha * alpha) - 2.0).clamp(0.0, MAX_SHININESS.into())]
-            })
-            .random(|s| vec![s.next()])
-            .corners(product(&[&[-1.0, 0.0, 1e-3, 0.0316, 0.1, 0.5, 0.999, 1.0, 2.0]]))
-            .range(0.0, 1e6),
-        Twin::with_call(
-            "filtered_lobe",
-            "specular_antialiasing",
-            &["filtered_lobe"],
-            &[],
-            (3, 2),
-            "let r = filtered_lobe(x[0], x[1], x[2]); return array<f32, 2>(r.shininess, r.peak);",
-        )
-        .expect(|x| {
-            let lobe = filtered_lobe(x[0], x[1], x[2]);
-            vec![lobe.shininess, lobe.peak]
-        })
-        .random(|s| vec![s.shininess(), 1.0 + 3.0 * s.next().round(), 0.18 * s.next() * s.next()])
-        .corners(product(&[&EXPONENTS, &[1.0, 4.0], &[-1.0, 0.0, 1e-12, 1e-6, 1e-3, 0.18]])),
-        Twin::new("specular_antialiasing", "lobe_widening", &[], &[Kind::Number; 2], Kind::Number)
-            .expect(|x| vec![lobe_widening(x[0], x[1])])
-            .random(|s| vec![s.decades(-12.0, 0.6), s.decades(-12.0, 0.6)])
-            .corners(product(&[&[0.0, 1e-30, 1e-6, 0.1, 0.36, 4.0], &[0.0, 1e-30, 1e-6, 0.1, 0.36, 4.0]]))
-            .range(0.0, 0.18001),
-        Twin::new("phong", "reflected_direction", &[], &[Kind::Vector, Kind::Vector], Kind::Vector)
-            .expect(|x| reflected_direction(vector(x, 0), vector(x, 3)).to_array().to_vec())
-            .random(|s| lobe(s)[..6].to_vec())
-            .corners(hard_directions().iter().map(|numbers| numbers[..6].to_vec()).collect()),
-    ];
+    let mut all: Vec<Twin> = powers_of_cosines().into_iter().chain(filtered()).collect();
     for sharp in [false, true] {
-        all.push(highlight("phong", "phong", phong, 1.0, 2.0, sharp));
-        all.push(highlight("blinn_phong", "blinn_phong", blinn_phong, 1.0, 1.0, sharp));
-        all.push(highlight("blinn_phong", "blinn_phong_4n", blinn_phong_4n, 4.0, 1.0, sharp));
-        all.push(highlight("blinn_phong", "blinn_phong_matched", blinn_phong_matched, 4.0, 1.0, sharp));
+        all.push(bare_lobe(sharp));
+        all.push(highlight("phong", "phong", phong, lobes::phong, sharp));
+        all.push(highlight("blinn_phong", "blinn_phong", blinn_phong, lobes::blinn_phong, sharp));
+        all.push(highlight("blinn_phong", "blinn_phong_4n", blinn_phong_4n, lobes::blinn_phong_4n, sharp));
+        let matched =
+            ("blinn_phong_matched", blinn_phong_matched as Model, lobes::blinn_phong_matched as Bound);
+        all.push(highlight("blinn_phong", matched.0, matched.1, matched.2, sharp));
     }
     all
+}
+
+/// Some vectors of an input.
+pub fn directions(x: &[f64]) -> [DVec3; 3] {
+    [vector(x, 0), vector(x, 3), vector(x, 6)]
+}
+
+/// The first three numbers as an f32 vector.
+pub fn leading(x: &[f32]) -> Vec3 {
+    Vec3::from_slice(&x[..3])
 }

@@ -142,6 +142,7 @@ pub fn crossed(heads: &[Vec<f32>], tails: &[Vec<f32>]) -> Vec<Vec<f32>> {
 /// The corners themselves, and around them what is up to three units in the last place away, until there are enough.
 pub fn jittered(corners: &[Vec<f32>]) -> Vec<f32> {
     let mut sequence = Sequence(13);
+    assert!(!corners.is_empty(), "there are no hard inputs");
     let mut all: Vec<f32> = corners.concat();
     let mut count = corners.len();
     while count < HARD {

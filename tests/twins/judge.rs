@@ -1,277 +1,309 @@
 //! One function on the GPU against its f64 twin: how far apart, and how far it may be.
 
-use std::fmt;
+use std::sync::Arc;
 
 use lumbre_render::Gpu;
-use lumbre_tests::kernel::Kernel;
+use lumbre_tests::kernel::{Kernel, Type};
 use lumbre_tests::running_error::Program;
 use rayon::prelude::*;
 
+use crate::bounds::{Allowed, Numbers};
 use crate::inputs::{RANDOM, Sequence, jittered};
+use crate::verdict::{Part, Verdict, unit_in_the_last_place};
 
-/// Bounds above this say nothing of a value that is 1 at most: the input is so badly conditioned that f32 cannot tell.
-const LOOSE: f64 = 1e-2;
+/// Of so many inputs one is checked against the running error of the shader too, which takes longer.
+const MACHINE_CHECKED: usize = 64;
+/// Random inputs are made in pieces of this many, each with its own sequence.
+const PIECE: usize = 10_000;
+/// Random inputs that may lie within rounding of a condition, of a million.
+const MOST_OPEN: usize = 2_000;
+/// Inputs of any size.
+const WILD: usize = 100_000;
+/// Numbers at which things overflow, underflow or vanish.
+const EXTREMES: [f32; 12] = [
+    0.0,
+    -0.0,
+    f32::MAX,
+    -f32::MAX,
+    f32::MIN_POSITIVE,
+    -f32::MIN_POSITIVE,
+    f32::from_bits(1),
+    1e-30,
+    1e30,
+    1.0,
+    -1.0,
+    0.5,
+];
 
-/// A kind of argument or result.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Kind {
-    Number,
-    Vector,
-    /// Given and taken as 0 or 1.
-    Flag,
-}
-
-impl Kind {
-    pub fn size(self) -> usize {
-        if self == Self::Vector { 3 } else { 1 }
-    }
-}
-
-type Expected = Box<dyn Fn(&[f64]) -> Vec<f64> + Sync>;
-type Method = Box<dyn Fn(&[f64], &[f64]) -> f64 + Sync>;
+type Function<T> = Arc<dyn Fn(&[f64]) -> T + Send + Sync>;
 
 /// A function and its twin.
+#[derive(Clone)]
 pub struct Twin {
     pub name: String,
     pub kernel: Kernel,
-    pub inputs: usize,
-    pub outputs: usize,
-    pub expected: Expected,
-    /// Appends one random input.
-    pub random: Box<dyn Fn(&mut Sequence) -> Vec<f32> + Sync>,
-    pub corners: Vec<Vec<f32>>,
-    /// What the program's exact value may differ from the twin's: series that are cut off, lengths that one of them ignores.
-    pub method: Method,
-    /// Where results lie, for every finite input.
-    pub range: (f64, f64),
+    expected: Function<Numbers>,
+    allowed: Function<Allowed>,
+    random: Arc<dyn Fn(&mut Sequence) -> Vec<f32> + Send + Sync>,
+    corners: Vec<Vec<f32>>,
+    /// Where results lie, and the largest component of an input for which they do.
+    range: Option<(f64, f64, f32)>,
+    /// Whether the running error of the shader is asked too.
+    machine_checked: bool,
 }
 
 impl Twin {
-    /// A function of `module` by its own name, called with `arguments`.
-    pub fn new(module: &str, function: &str, features: &[&str], arguments: &[Kind], result: Kind) -> Self {
-        let mut at = 0;
-        let passed = arguments.iter().map(|kind| {
-            let start = at;
-            at += kind.size();
-            match kind {
-                Kind::Number => format!("x[{start}]"),
-                Kind::Vector => format!("vec3<f32>(x[{start}], x[{}], x[{}])", start + 1, start + 2),
-                Kind::Flag => format!("x[{start}] > 0.5"),
-            }
-        });
-        let call = format!("let r = {function}({});", passed.collect::<Vec<_>>().join(", "));
-        let taken = match result {
-            Kind::Number => "r",
-            Kind::Vector => "r.x, r.y, r.z",
-            Kind::Flag => "select(0.0, 1.0, r)",
-        };
-        let call = format!("{call} return array<f32, {}>({taken});", result.size());
-        Self::with_call(function, module, &[function], features, (at, result.size()), &call)
+    /// A function of `module` by its own name.
+    pub fn new(module: &str, function: &str, features: &[&str], arguments: &[Type], result: Type) -> Self {
+        Self::around(function, Kernel::of(module, function, features, arguments, result))
     }
 
-    /// As [`Kernel::new`].
-    pub fn with_call(
-        name: &str,
-        module: &str,
-        imports: &[&str],
-        features: &[&str],
-        (inputs, outputs): (usize, usize),
-        call: &str,
-    ) -> Self {
-        let kernel = Kernel::new(module, imports, features, inputs, outputs, call);
+    /// A function as a kernel calls it.
+    pub fn around(name: &str, kernel: Kernel) -> Self {
         Self {
             name: name.to_owned(),
             kernel,
-            inputs,
-            outputs,
-            expected: Box::new(|_| Vec::new()),
-            random: Box::new(|_| Vec::new()),
+            expected: Arc::new(|_| Numbers::new()),
+            allowed: Arc::new(|_| Allowed::from(0.0)),
+            random: Arc::new(|_| Vec::new()),
             corners: Vec::new(),
-            method: Box::new(|_, _| 0.0),
-            range: (f64::NEG_INFINITY, f64::INFINITY),
+            range: None,
+            machine_checked: true,
         }
     }
 
+    /// One of several cases of a function.
     pub fn named(mut self, suffix: &str) -> Self {
         self.name = format!("{} ({suffix})", self.name);
         self
     }
 
-    pub fn expect(mut self, twin: impl Fn(&[f64]) -> Vec<f64> + Sync + 'static) -> Self {
-        self.expected = Box::new(twin);
+    /// The f64 twin.
+    pub fn expect<T: Results>(mut self, twin: impl Fn(&[f64]) -> T + Send + Sync + 'static) -> Self {
+        self.expected = Arc::new(move |x| twin(x).numbers());
         self
     }
 
-    pub fn random(mut self, input: impl Fn(&mut Sequence) -> Vec<f32> + Sync + 'static) -> Self {
-        self.random = Box::new(input);
+    /// The bound that the twin's documentation states.
+    pub fn within<T: Into<Allowed>>(mut self, bound: impl Fn(&[f64]) -> T + Send + Sync + 'static) -> Self {
+        self.allowed = Arc::new(move |x| bound(x).into());
         self
     }
 
+    /// How a random input is made.
+    pub fn random(mut self, input: impl Fn(&mut Sequence) -> Vec<f32> + Send + Sync + 'static) -> Self {
+        self.random = Arc::new(input);
+        self
+    }
+
+    /// The hard inputs.
     pub fn corners(mut self, corners: Vec<Vec<f32>>) -> Self {
         self.corners = corners;
         self
     }
 
-    pub fn method(mut self, allowed: impl Fn(&[f64], &[f64]) -> f64 + Sync + 'static) -> Self {
-        self.method = Box::new(allowed);
+    /// Where results lie for every finite input.
+    pub fn range(self, low: f64, high: f64) -> Self {
+        self.range_up_to(low, high, f32::MAX)
+    }
+
+    /// Where results lie for inputs up to that size: those of directions, whose products overflow beyond it.
+    pub fn range_up_to(mut self, low: f64, high: f64, largest: f32) -> Self {
+        self.range = Some((low, high, largest));
         self
     }
 
-    pub fn range(mut self, low: f64, high: f64) -> Self {
-        self.range = (low, high);
-        self
+    /// The same twin for another shader, judged by the stated bound alone.
+    pub fn mutated(&self, module: &str, from: &str, to: &str) -> Self {
+        let kernel = self.kernel.mutated(module, from, to);
+        let name = format!("{}: {from:?} -> {to:?}", self.name);
+        Self { kernel, name, machine_checked: false, ..self.clone() }
     }
 
-    fn random_inputs(&self) -> Vec<f32> {
-        let mut sequence = Sequence(17);
-        let mut all = Vec::with_capacity(RANDOM * self.inputs);
-        for _ in 0..RANDOM {
-            all.extend((self.random)(&mut sequence));
-        }
-        assert_eq!(all.len(), RANDOM * self.inputs, "{}: random inputs of another size", self.name);
+    /// What the twin gives and how far the device may be off, for one input.
+    pub fn asked(&self, x: &[f32]) -> (Numbers, Allowed) {
+        let numbers: Numbers = x.iter().map(|x| f64::from(*x)).collect();
+        ((self.expected)(&numbers), (self.allowed)(&numbers))
+    }
+
+    fn random_inputs(&self, count: usize) -> Vec<f32> {
+        let piece = |first: usize| {
+            let mut sequence = Sequence(first as u64);
+            (first..(first + PIECE).min(count))
+                .flat_map(|_| (self.random)(&mut sequence))
+                .collect::<Vec<f32>>()
+        };
+        let pieces: Vec<usize> = (0..count).step_by(PIECE).collect();
+        let all: Vec<f32> = pieces.into_par_iter().flat_map_iter(piece).collect();
+        assert_eq!(all.len(), count * self.kernel.inputs(), "{}: random inputs of another size", self.name);
         all
     }
 
     /// Runs everything and compares.
     pub fn judge(&self, gpu: &Gpu) -> Verdict {
-        let random = self.random_inputs();
+        self.judge_some(gpu, RANDOM)
+    }
+
+    /// Runs with fewer random inputs, for tests of the tests.
+    pub fn judge_some(&self, gpu: &Gpu, count: usize) -> Verdict {
         let hard = jittered(&self.corners);
-        assert_eq!(hard.len() % self.inputs, 0, "{}: corners of another size", self.name);
-        let mut verdict = self.compare(&[random.as_slice(), &hard].concat(), gpu);
-        verdict.random = RANDOM;
-        verdict.hard = hard.len() / self.inputs;
-        verdict.wild = self.wild(gpu);
+        let random = self.compare(&self.random_inputs(count), gpu);
+        let verdict = Verdict {
+            name: self.name.clone(),
+            most_open: MOST_OPEN,
+            hard: self.compare(&hard, gpu),
+            random,
+            wild: self.wild(gpu),
+        };
+        assert_eq!(verdict.hard.count, hard.len() / self.kernel.inputs(), "{}", self.name);
         verdict
     }
 
-    /// How many of 100,000 inputs of any finite bits give what is not finite or out of range.
-    fn wild(&self, gpu: &Gpu) -> usize {
+    /// How many inputs of any size give what is not finite or out of range, and one of them.
+    fn wild(&self, gpu: &Gpu) -> (usize, Vec<f32>) {
+        let Some((low, high, largest)) = self.range else { return (0, Vec::new()) };
         let mut sequence = Sequence(19);
-        let input: Vec<f32> = (0..100_000 * self.inputs).map(|_| sequence.any()).collect();
-        let (low, high) = self.range;
-        let strange = |x: &&f32| !(x.is_finite() && f64::from(**x) >= low && f64::from(**x) <= high);
-        if self.range == (f64::NEG_INFINITY, f64::INFINITY) {
-            return 0;
-        }
-        self.kernel.run(gpu, &input).iter().filter(strange).count()
+        let mut number = || {
+            let number = match sequence.bits() % 3 {
+                0 => EXTREMES[(sequence.bits() % EXTREMES.len() as u64) as usize],
+                1 => sequence.any(),
+                _ => sequence.between(-1.5, 1.5),
+            };
+            number.clamp(-largest, largest)
+        };
+        let input: Vec<f32> = (0..WILD * self.kernel.inputs()).map(|_| number()).collect();
+        let strange = |x: &f32| !(x.is_finite() && f64::from(*x) >= low && f64::from(*x) <= high);
+        let results = self.kernel.run(gpu, &input);
+        let strange: Vec<usize> = results
+            .chunks(self.kernel.outputs())
+            .enumerate()
+            .filter(|(_, results)| results.iter().any(strange))
+            .map(|(at, _)| at)
+            .collect();
+        let first =
+            strange.first().map(|at| input[at * self.kernel.inputs()..][..self.kernel.inputs()].to_vec());
+        (strange.len(), first.unwrap_or_default())
     }
 
     /// Compares on given inputs.
-    pub fn compare(&self, input: &[f32], gpu: &Gpu) -> Verdict {
+    pub fn compare(&self, input: &[f32], gpu: &Gpu) -> Part {
         let got = self.kernel.run(gpu, input);
-        let program = Program::new(&self.kernel.wgsl);
-        let one = |(x, got): (&[f32], &[f32])| self.compare_one(&program, x, got);
-        let parts = input.par_chunks(self.inputs).zip(got.par_chunks(self.outputs)).map(one);
-        let mut verdict = parts.reduce(Verdict::default, Verdict::worse);
-        verdict.name.clone_from(&self.name);
-        verdict
+        let program = self.machine_checked.then(|| Program::new(&self.kernel.wgsl));
+        let one = |(at, (x, got)): (usize, (&[f32], &[f32]))| {
+            let machine = program.as_ref().filter(|_| at % MACHINE_CHECKED == 0);
+            self.compare_one(machine, x, got)
+        };
+        let (inputs, outputs) = (self.kernel.inputs(), self.kernel.outputs());
+        let each = input.par_chunks(inputs).zip(got.par_chunks(outputs)).enumerate();
+        each.map(one).reduce(Part::default, Part::join)
     }
 
-    fn compare_one(&self, program: &Program, x: &[f32], got: &[f32]) -> Verdict {
-        let numbers: Vec<f64> = x.iter().map(|x| f64::from(*x)).collect();
-        let expected = (self.expected)(&numbers);
-        let mut verdict = Verdict::default();
-        let error_of = |got: f32, expected: f64| {
-            let error = (f64::from(got) - expected).abs();
-            if error.is_nan() { f64::INFINITY } else { error }
-        };
-        let errors = || got.iter().zip(&expected).map(|(got, expected)| error_of(*got, *expected));
-        for (error, expected) in errors().zip(&expected) {
-            let ulp = unit_in_the_last_place(*expected);
-            verdict.absolute = verdict.absolute.max(error);
-            verdict.ulp = verdict.ulp.max(error / ulp);
-        }
-        // Every bound holds one rounding at least: what is that near needs no bound.
-        let near = |(error, expected): (f64, &f64)| error <= 0.25 * unit_in_the_last_place(*expected);
-        if errors().zip(&expected).all(near) && expected.len() == got.len() {
-            return verdict;
-        }
-        let bounds = program.bounds(x);
-        let allowed = (self.method)(&numbers, &expected);
-        verdict.open = usize::from(bounds.open_ways > 0);
-        for ((error, expected), bound) in errors().zip(&expected).zip(&bounds.results) {
-            let method = (bound.value - expected).abs();
-            // The interpreter's own f64, and the twin's, round too.
-            let own = 1e-12 * expected.abs().max(1e-3);
-            let bound = bound.error + allowed + own;
-            verdict.loose += usize::from(bound > LOOSE * expected.abs().max(1.0));
-            // An open condition takes the other way in the twin: then the hull covers both.
-            let strange_method = bounds.open_ways == 0 && method > allowed + own;
-            let ratio = if strange_method { f64::INFINITY } else { error / bound };
-            if ratio > verdict.ratio || verdict.input.is_empty() {
-                verdict.ratio = ratio;
-                verdict.input = x.to_vec();
-                verdict.got = got.to_vec();
-                verdict.expected.clone_from(&vec![*expected]);
-                verdict.bound = bound;
+    fn compare_one(&self, machine: Option<&Program>, x: &[f32], got: &[f32]) -> Part {
+        let (expected, allowed) = self.asked(x);
+        assert_eq!(expected.len(), got.len(), "{}: results of another size", self.name);
+        assert_eq!(allowed.error.len(), got.len(), "{}: bounds of another size", self.name);
+        let side = |expected: &[f64]| Side::new(got, expected, &allowed.error);
+        let mut best = side(&expected);
+        let mut accepted = &expected;
+        let mut crossed = false;
+        if let Some(other) = allowed.other.as_ref().filter(|_| best.ratio > 1.0) {
+            let there = side(other);
+            if there.ratio <= 1.0 {
+                (best, accepted, crossed) = (there, other, true);
             }
         }
-        verdict
+        let mut part = Part {
+            count: 1,
+            absolute: best.absolute,
+            ulp: best.ulp,
+            ratio: best.ratio,
+            open: usize::from(allowed.other.is_some()),
+            crossed: usize::from(crossed),
+            input: x.to_vec(),
+            got: got.to_vec(),
+            expected: accepted.to_vec(),
+            bound: allowed.error.to_vec(),
+            ..Part::default()
+        };
+        if let Some(program) = machine {
+            let bounds = program.bounds(x);
+            for (at, (result, got)) in bounds.results.iter().zip(got).enumerate() {
+                // The program's own exact value: nothing of the twin. The interpreter's f64 rounds as well.
+                let own = 1e-13 * result.value.abs().max(1e-20);
+                part.machine =
+                    part.machine.max(ratio((f64::from(*got) - result.value).abs(), result.error + own));
+                let closed = bounds.open_ways == 0 && !bounds.open_selects && allowed.other.is_none();
+                if closed && result.error.is_finite() {
+                    let reach = (result.value - expected[at]).abs() + result.error;
+                    part.reach = part.reach.max(ratio(reach, allowed.error[at] + own));
+                }
+            }
+        }
+        part
     }
 }
 
-/// The distance between neighbouring f32 at a value.
-pub fn unit_in_the_last_place(value: f64) -> f64 {
-    let magnitude = (value.abs() as f32).clamp(f32::MIN_POSITIVE, f32::MAX / 2.0);
-    f64::from(magnitude.next_up()) - f64::from(magnitude)
+/// One side of a condition.
+struct Side {
+    absolute: f64,
+    ulp: f64,
+    ratio: f64,
 }
 
-/// What a comparison found.
-#[derive(Clone, Debug, Default)]
-pub struct Verdict {
-    pub name: String,
-    pub random: usize,
-    pub hard: usize,
-    /// Largest difference.
-    pub absolute: f64,
-    /// Largest difference in units of the last place of the expected value.
-    pub ulp: f64,
-    /// Largest difference in terms of its bound, and where.
-    pub ratio: f64,
-    pub bound: f64,
-    pub input: Vec<f32>,
-    pub got: Vec<f32>,
-    pub expected: Vec<f64>,
-    /// Inputs where rounding may decide a condition, among those that needed a bound.
-    pub open: usize,
-    /// Results whose bound says little.
-    pub loose: usize,
-    /// Inputs of any bits whose results are not finite or out of range.
-    pub wild: usize,
-}
+/// Results under this have units in the last place that say nothing: their absolute error does.
+const SMALLEST_IN_UNITS: f64 = 1e-6;
 
-impl Verdict {
-    fn worse(self, other: Self) -> Self {
-        let (absolute, ulp) = (self.absolute.max(other.absolute), self.ulp.max(other.ulp));
-        let (open, loose) = (self.open + other.open, self.loose + other.loose);
-        let at = if other.ratio > self.ratio || self.input.is_empty() { other } else { self };
-        Self { absolute, ulp, open, loose, ..at }
-    }
-
-    pub fn passes(&self) -> bool {
-        self.ratio <= 1.0 && self.wild == 0
+impl Side {
+    fn new(got: &[f32], expected: &[f64], bounds: &[f64]) -> Self {
+        let mut side = Self { absolute: 0.0, ulp: 0.0, ratio: 0.0 };
+        for ((got, expected), bound) in got.iter().zip(expected).zip(bounds) {
+            let error = (f64::from(*got) - expected).abs();
+            let error = if error.is_nan() { f64::INFINITY } else { error };
+            side.absolute = side.absolute.max(error);
+            if expected.abs() >= SMALLEST_IN_UNITS {
+                side.ulp = side.ulp.max(error / unit_in_the_last_place(*expected));
+            }
+            side.ratio = side.ratio.max(ratio(error, *bound));
+        }
+        side
     }
 }
 
-/// The heading of the table.
-pub const HEADING: &str = "function                                  random     hard  abs error       ULP  error/bound     open    loose  wild  pass  worst input";
+fn ratio(error: f64, bound: f64) -> f64 {
+    match error == 0.0 {
+        true => 0.0,
+        false if error.is_nan() || bound.is_nan() => f64::INFINITY,
+        false if bound == f64::INFINITY => 0.0,
+        false => error / bound,
+    }
+}
 
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{:<38} {:>9} {:>8}  {:>9.2e} {:>9.2e}  {:>11.3}  {:>7}  {:>7} {:>5}  {:<4}  {:?}",
-            self.name,
-            self.random,
-            self.hard,
-            self.absolute,
-            self.ulp,
-            self.ratio,
-            self.open,
-            self.loose,
-            self.wild,
-            if self.passes() { "yes" } else { "NO" },
-            self.input,
-        )
+/// What a twin returns, as numbers.
+pub trait Results {
+    /// One behind the other.
+    fn numbers(self) -> Numbers;
+}
+
+impl Results for f64 {
+    fn numbers(self) -> Numbers {
+        Numbers::from_slice(&[self])
+    }
+}
+
+impl Results for bool {
+    fn numbers(self) -> Numbers {
+        f64::from(u8::from(self)).numbers()
+    }
+}
+
+impl Results for glam::DVec3 {
+    fn numbers(self) -> Numbers {
+        Numbers::from_slice(&self.to_array())
+    }
+}
+
+impl<const N: usize> Results for [f64; N] {
+    fn numbers(self) -> Numbers {
+        Numbers::from_slice(&self)
     }
 }

@@ -1,39 +1,77 @@
 //! Lights: distance, cones, and a light as a point meets it.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use lumbre_optics::*;
+use lumbre_tests::kernel::{Kernel, Type};
 
+use crate::bounds::lights::{self, PlacedLight};
+use crate::bounds::powers::Off;
 use crate::inputs::{Sequence, product};
-use crate::judge::{Kind, Twin};
+use crate::judge::Twin;
 use crate::vectors::vector;
 
 fn distances(sequence: &mut Sequence) -> Vec<f32> {
     let coefficients =
         [(); 3].map(|()| if sequence.next() < 0.2 { 0.0 } else { sequence.decades(-3.0, 2.0) });
     let range = if sequence.next() < 0.5 { UNLIMITED_RANGE as f32 } else { sequence.decades(-1.0, 2.0) };
-    let distance =
-        if sequence.next() < 0.5 { range.min(100.0) * sequence.next() } else { sequence.decades(-4.0, 4.0) };
+    let within = range.min(100.0) * sequence.next();
+    let distance = if sequence.next() < 0.5 { within } else { sequence.decades(-4.0, 4.0) };
     [&coefficients[..], &[sequence.next().round(), range, distance]].concat()
 }
 
 fn cone(sequence: &mut Sequence, smooth: bool) -> Vec<f32> {
     let outer = sequence.next();
-    if !smooth {
-        // Half of the points near the edge of the cone.
-        let near = outer + sequence.decades(-7.0, -1.0) * (2.0 * sequence.next() - 1.0);
-        let cosine = if sequence.next() < 0.5 { near } else { sequence.between(-1.0, 1.0) };
-        return vec![0.0, outer, sequence.between(0.0, 128.0), cosine];
-    }
+    // Half of the points near the edge of the cone.
+    let near = outer + sequence.decades(-7.0, -1.0) * (2.0 * sequence.next() - 1.0);
+    let cosine = if sequence.next() < 0.5 { near.clamp(-1.0, 1.0) } else { sequence.between(-1.0, 1.0) };
     let inner = outer + (1.0 - outer) * sequence.next();
-    vec![1.0, outer, inner, sequence.between(-1.0, 1.0)]
+    let second = if smooth { inner } else { sequence.between(0.0, 128.0) };
+    vec![if smooth { 1.0 } else { 0.0 }, outer, second, cosine]
 }
 
-const RECORD: &str =
-    "let light = LightParameters(vec3<f32>(0.1, 0.2, 0.3), KIND, vec3<f32>(0.9, 0.8, 0.7), 0u,
-    vec3<f32>(0.6, 0.5, 0.4), x[0], vec3<f32>(x[1], x[2], x[3]), SPOT, vec3<f32>(x[4], x[5], x[6]), x[7],
-    vec3<f32>(x[8], x[9], x[10]), x[11]);
-    let r = evaluate_light(light, vec3<f32>(x[12], x[13], x[14]));
-    return array<f32, 5>(r.direction.x, r.direction.y, r.direction.z, r.attenuation, r.spot);";
+fn attenuation() -> Twin {
+    let coefficients: [f32; 5] = [0.0, 1e-20, 0.5, 1.0, 1e20];
+    let arguments = [Type::Vector, Type::Flag, Type::Number, Type::Number];
+    Twin::new("attenuation", "attenuate", &[], &arguments, Type::Number)
+        .expect(|x| attenuate(vector(x, 0), x[3] > 0.5, x[4], x[5]))
+        .within(|x| lights::attenuate(vector(x, 0), x[3] > 0.5, x[4], x[5], 0.0))
+        .random(distances)
+        .corners(product(&[
+            &coefficients,
+            &[0.0, 1.0],
+            &coefficients,
+            &[0.0, 1.0],
+            &[1e-20, 1.0, 1e30],
+            &[0.0, 1e-30, 0.01, 0.999_999, 1.0, 1e6, 1e18],
+        ]))
+        .range(0.0, 1.001e30)
+}
+
+fn spots() -> [Twin; 2] {
+    let arguments = [Type::Flag, Type::Number, Type::Number, Type::Number];
+    let twin = |name: &str, smooth: bool| {
+        Twin::new("spot", "spot_factor", &[], &arguments, Type::Number)
+            .named(name)
+            .expect(|x| spot_factor(x[0] > 0.5, x[1], x[2], x[3]))
+            .within(|x| lights::spot_factor(x[0] > 0.5, x[1], x[2], Off::exact(x[3])))
+            .random(move |s| cone(s, smooth))
+            .range(0.0, 1.0)
+    };
+    [
+        twin("exponent", false).corners(product(&[
+            &[0.0],
+            &[-2.0, 0.0, 0.5, 0.999_999, 1.0],
+            &[0.0, 1e-3, 1.0, 128.0],
+            &[-1.0, -1e-7, 0.0, 1e-30, 1e-7, 0.5, 0.500_000_06, 0.999_999, 1.0],
+        ])),
+        twin("smooth", true).corners(product(&[
+            &[1.0],
+            &[0.0, 0.5, 0.999, 1.0],
+            &[0.0, 0.5, 0.500_5, 0.999_999, 1.0],
+            &[-1.0, -1e-7, 0.0, 0.5, 0.500_000_06, 0.999_999, 1.0],
+        ])),
+    ]
+}
 
 /// Range, position, axis, cosine of the cone's edge, attenuation, exponent or inner cosine, point.
 fn placed(sequence: &mut Sequence, directional: bool, smooth: bool) -> Vec<f32> {
@@ -55,128 +93,71 @@ fn placed(sequence: &mut Sequence, directional: bool, smooth: bool) -> Vec<f32> 
     input
 }
 
-fn light(name: &str, kind: LightKind, spot: u32) -> Twin {
-    let features: &[&str] = match (kind, spot) {
-        (LightKind::Directional, 0) => &["DIRECTIONAL_LIGHTS"],
-        (LightKind::Directional, _) => &["DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"],
-        (_, 0) => &["POINT_LIGHTS"],
-        _ => &["POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"],
-    };
-    let call = RECORD.replace("KIND", &format!("{}u", kind as u32)).replace("SPOT", &format!("{spot}u"));
-    let (directional, smooth) = (kind == LightKind::Directional, spot == 2);
-    let mut corners = Vec::new();
-    let positions =
+/// Lights at, near and far from the origin, where the point is; with no axis; with every kind of edge.
+fn hard_lights() -> Vec<Vec<f32>> {
+    let near =
         [Vec3::ZERO, Vec3::Y, Vec3::new(1e-20, 0.0, 0.0), Vec3::splat(1e5), Vec3::new(0.0, -0.005, 0.0)];
-    for position in positions {
-        for axis in [Vec3::NEG_Y, Vec3::X, Vec3::ZERO] {
-            for (outer, second) in
-                [(0.0, 0.0), (0.5, 128.0), (1.0, 1.0), (0.707_106_8, 0.707_106_8), (-2.0, 0.0)]
-            {
-                for attenuation in [Vec3::Z, Vec3::X, Vec3::splat(0.5), Vec3::ZERO] {
-                    for range in [1e30, 1.0] {
-                        let mut input = vec![range];
-                        input.extend(position.to_array());
-                        input.extend(axis.to_array());
-                        input.push(outer);
-                        input.extend(attenuation.to_array());
-                        input.push(second);
-                        input.extend([0.0, 0.0, 0.0]);
-                        corners.push(input);
-                    }
-                }
+    let cones = [[0.0, 0.0], [0.5, 128.0], [1.0, 1.0], [0.707_106_8, 0.707_106_8], [-2.0, 0.0], [0.0, 1.0]];
+    let heads: Vec<Vec<f32>> = near.iter().map(|position| position.to_array().to_vec()).collect();
+    let axes: Vec<Vec<f32>> = [Vec3::NEG_Y, Vec3::X, Vec3::ZERO].map(|v| v.to_array().to_vec()).to_vec();
+    let laws: Vec<Vec<f32>> =
+        [Vec3::Z, Vec3::X, Vec3::splat(0.5), Vec3::ZERO].map(|v| v.to_array().to_vec()).to_vec();
+    let placed = crossed_all(&[product(&[&[1e30, 1.0]]), heads, axes]);
+    let mut all = Vec::new();
+    for head in placed {
+        for [outer, second] in cones {
+            for law in &laws {
+                all.push([head.as_slice(), &[outer], law, &[second], &[0.0; 3]].concat());
             }
         }
     }
-    Twin::with_call(name, "evaluate_light", &["evaluate_light", "LightParameters"], features, (15, 5), &call)
-        .expect(move |x| {
-            let (position, axis, point) = (vector(x, 1), vector(x, 4), vector(x, 12));
-            let (direction, attenuation) = if directional {
-                (safe_normalize(-axis), 1.0)
-            } else {
-                // The twin itself takes a component; its parts are what the shader is given as numbers here.
-                let half_way = position * 0.5 - point * 0.5;
-                let distance = 2.0 * safe_length(half_way);
-                (safe_normalize(position - point), attenuate(vector(x, 8), false, x[0], distance))
-            };
-            let cosine = -direction.dot(axis);
-            let factor = if spot == 0 { 1.0 } else { spot_factor(smooth, x[7], x[11], cosine) };
-            vec![direction.x, direction.y, direction.z, attenuation, factor]
-        })
-        .random(move |s| placed(s, directional, smooth))
-        .corners(corners)
+    all
 }
 
-/// The whole component against the whole record: what is uploaded of a light is the light.
-pub fn component_agrees(
-    kind: LightKind,
-    cone: Option<SpotCone>,
-    position: DVec3,
-    point: DVec3,
-) -> (f64, f64) {
-    let light = Light { kind, spot: cone, ..Light::point(Vec3::ONE) };
-    let axis = DVec3::NEG_Y;
-    let sample = evaluate_light(&light, position, axis, point);
-    (sample.attenuation, sample.spot)
+fn crossed_all(lists: &[Vec<Vec<f32>>]) -> Vec<Vec<f32>> {
+    lists.iter().fold(vec![Vec::new()], |sofar, list| crate::inputs::crossed(&sofar, list))
+}
+
+const CALL: &str = "let light = LightParameters(vec3<f32>(0.1, 0.2, 0.3), KIND, vec3<f32>(0.9, 0.8, 0.7), 0u,
+    vec3<f32>(0.6, 0.5, 0.4), x[0], vec3<f32>(x[1], x[2], x[3]), SPOT, vec3<f32>(x[4], x[5], x[6]), x[7],
+    vec3<f32>(x[8], x[9], x[10]), x[11]);
+    let r = evaluate_light(light, vec3<f32>(x[12], x[13], x[14]));
+    return array<f32, 5>(r.direction.x, r.direction.y, r.direction.z, r.attenuation, r.spot);";
+
+fn light(kind: LightKind, spot: u32) -> Twin {
+    let (features, name): (&[&str], &str) = match (kind, spot) {
+        (LightKind::Directional, 0) => (&["DIRECTIONAL_LIGHTS"], "directional"),
+        (LightKind::Directional, _) => (&["DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"], "directional spot"),
+        (_, 0) => (&["POINT_LIGHTS"], "point"),
+        (_, 1) => (&["POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"], "spot, exponent"),
+        _ => (&["POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"], "spot, smooth"),
+    };
+    let call = CALL.replace("KIND", &format!("{}u", kind as u32)).replace("SPOT", &format!("{spot}u"));
+    let imports = ["evaluate_light", "LightParameters"];
+    let kernel = Kernel::new("evaluate_light", &imports, features, 15, 5, &call);
+    let (directional, smooth) = (kind == LightKind::Directional, spot == 2);
+    let placed_light = move |x: &[f64]| PlacedLight {
+        directional,
+        range: x[0],
+        position: vector(x, 1),
+        axis: vector(x, 4),
+        attenuation: vector(x, 8),
+        cone: (spot > 0).then_some((smooth, x[7], x[11])),
+    };
+    Twin::around("evaluate_light", kernel)
+        .named(name)
+        .expect(move |x| placed_light(x).expected(vector(x, 12)))
+        .within(move |x| lights::evaluate_light(&placed_light(x), vector(x, 12)))
+        .random(move |s| placed(s, directional, smooth))
+        .corners(hard_lights())
+        .range_up_to(-1.000_001, 1.001e30, 1e18)
 }
 
 pub fn twins() -> Vec<Twin> {
-    let coefficients: [f32; 5] = [0.0, 1e-20, 0.5, 1.0, 1e20];
-    vec![
-        Twin::new(
-            "attenuation",
-            "attenuate",
-            &[],
-            &[Kind::Vector, Kind::Flag, Kind::Number, Kind::Number],
-            Kind::Number,
-        )
-        .expect(|x| vec![attenuate(vector(x, 0), x[3] > 0.5, x[4], x[5])])
-        .random(distances)
-        .corners(product(&[
-            &coefficients,
-            &[0.0, 1.0],
-            &coefficients,
-            &[0.0, 1.0],
-            &[1e-20, 1.0, 1e30],
-            &[0.0, 1e-30, 0.01, 0.999_999, 1.0, 1e6, 1e18],
-        ])),
-        Twin::new(
-            "spot",
-            "spot_factor",
-            &[],
-            &[Kind::Flag, Kind::Number, Kind::Number, Kind::Number],
-            Kind::Number,
-        )
-        .named("exponent")
-        .expect(|x| vec![spot_factor(x[0] > 0.5, x[1], x[2], x[3])])
-        .random(|s| cone(s, false))
-        .corners(product(&[
-            &[0.0],
-            &[-2.0, 0.0, 0.5, 0.999_999, 1.0],
-            &[0.0, 1e-3, 1.0, 128.0],
-            &[-1.0, -1e-7, 0.0, 1e-30, 1e-7, 0.5, 0.500_000_06, 0.999_999, 1.0],
-        ]))
-        .range(0.0, 1.0),
-        Twin::new(
-            "spot",
-            "spot_factor",
-            &[],
-            &[Kind::Flag, Kind::Number, Kind::Number, Kind::Number],
-            Kind::Number,
-        )
-        .named("smooth")
-        .expect(|x| vec![spot_factor(x[0] > 0.5, x[1], x[2], x[3])])
-        .random(|s| cone(s, true))
-        .corners(product(&[
-            &[1.0],
-            &[0.0, 0.5, 0.999, 1.0],
-            &[0.0, 0.5, 0.500_5, 0.999_999, 1.0],
-            &[-1.0, -1e-7, 0.0, 0.5, 0.500_000_06, 0.999_999, 1.0],
-        ]))
-        .range(0.0, 1.0),
-        light("evaluate_light (directional)", LightKind::Directional, 0),
-        light("evaluate_light (directional spot)", LightKind::Directional, 1),
-        light("evaluate_light (point)", LightKind::Point, 0),
-        light("evaluate_light (spot, exponent)", LightKind::Point, 1),
-        light("evaluate_light (spot, smooth)", LightKind::Point, 2),
-    ]
+    let mut all = vec![attenuation()];
+    all.extend(spots());
+    all.push(light(LightKind::Directional, 0));
+    all.push(light(LightKind::Directional, 1));
+    all.extend([0, 1, 2].map(|spot| light(LightKind::Point, spot)));
+    all
 }

@@ -1,21 +1,29 @@
 //! Every lighting function of `shaders/optics` on the GPU against its f64 twin, over a million random and a hundred thousand hard
-//! inputs each. `cargo test --workspace --test twins -- --nocapture` prints the table.
+//! inputs each. `cargo test --workspace --test twins -- --nocapture` prints the table; `LUMBRE_TWIN=name` runs the functions with
+//! that in their names, `LUMBRE_TWIN_WORST=1` prints the worst input of each as `regressions.rs` has it.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+#![allow(clippy::print_stdout, reason = "the table is what the test is for")]
 
 mod atmosphere;
+mod bounds;
 mod highlights;
 mod inputs;
 mod judge;
 mod lights;
 mod microfacets;
+mod negative_controls;
 mod refraction;
+mod regressions;
+mod shading;
 mod vectors;
+mod verdict;
 
 use std::sync::OnceLock;
 
-use judge::{HEADING, Twin};
+use judge::Twin;
 use lumbre_render::Gpu;
+use verdict::{HEADING, LEGEND};
 
 /// The device of all tests here.
 fn gpu() -> &'static Gpu {
@@ -23,31 +31,47 @@ fn gpu() -> &'static Gpu {
     GPU.get_or_init(|| Gpu::headless().unwrap_or_else(|error| panic!("{error}")))
 }
 
-fn all() -> Vec<Twin> {
-    [
-        vectors::twins(),
-        lights::twins(),
-        highlights::twins(),
-        microfacets::twins(),
-        refraction::twins(),
-        atmosphere::twins(),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+/// Every function.
+fn all() -> &'static [Twin] {
+    static ALL: OnceLock<Vec<Twin>> = OnceLock::new();
+    let modules = || {
+        [
+            vectors::twins(),
+            lights::twins(),
+            highlights::twins(),
+            microfacets::twins(),
+            refraction::twins(),
+            shading::twins(),
+            atmosphere::twins(),
+        ]
+    };
+    ALL.get_or_init(|| modules().into_iter().flatten().collect())
+}
+
+/// The twin of that name.
+fn twin(name: &str) -> &'static Twin {
+    let mut found = all().iter().filter(|twin| twin.name == name);
+    match (found.next(), found.next()) {
+        (Some(twin), None) => twin,
+        _ => panic!("there is not one twin called {name:?}"),
+    }
 }
 
 #[test]
 fn every_function_keeps_its_bound() {
-    println!("{}\n{HEADING}", gpu().describe());
+    println!("{}\n{LEGEND}\n{HEADING}", gpu().describe());
     let only = std::env::var("LUMBRE_TWIN").ok();
+    let worst = std::env::var_os("LUMBRE_TWIN_WORST").is_some();
     let mut failed = Vec::new();
     for twin in all().iter().filter(|twin| only.as_ref().is_none_or(|only| twin.name.contains(only))) {
         let verdict = twin.judge(gpu());
         println!("{verdict}");
+        if worst {
+            println!("{}", verdict.regression());
+        }
         if !verdict.passes() {
-            failed.push(format!("{verdict:?}"));
+            failed.push(format!("{verdict:#?}"));
         }
     }
-    assert!(failed.is_empty(), "{failed:#?}");
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
 }

@@ -1,10 +1,13 @@
 //! Microfacets: the three distributions, their half-value angles, Torrance and Sparrow's factor.
 
 use lumbre_optics::*;
+use lumbre_tests::kernel::Type;
 
-use crate::highlights::{hard_lobes, lobe};
+use crate::bounds::microfacets as bound;
+use crate::bounds::powers::{self, Off};
+use crate::highlights::{directions, hard_lobes, lobe};
 use crate::inputs::{EXPONENTS, Sequence, crossed, product};
-use crate::judge::{Kind, Twin};
+use crate::judge::Twin;
 use crate::vectors::vector;
 
 /// cos, sin² and an exponent at which the distribution there is neither 0 nor 1, mostly.
@@ -20,49 +23,74 @@ fn hard_distributions() -> Vec<Vec<f32>> {
     crossed(&angles, &product(&[&EXPONENTS]))
 }
 
-/// The series of `one_minus_exp` is good to 1e-8 of its value; the distributions' logarithms are at most as far off, times 2.
-const SERIES: f64 = 2e-8;
-
-pub fn twins() -> Vec<Twin> {
-    let with_ior = |lobes: Vec<Vec<f32>>| crossed(&lobes, &product(&[&[1.0, 1.5, 2.42]]));
-    vec![
-        Twin::new("microfacets", "half_value_sine_squared", &[], &[Kind::Number], Kind::Number)
-            .expect(|x| vec![half_value_sine_squared(x[0])])
+fn angles() -> [Twin; 4] {
+    // 8 ln 2 = 5.545: where the series takes over from the exponential.
+    let exponents = [&EXPONENTS[..], &[5.5, 5.545_177, 5.6]].concat();
+    [
+        Twin::new("angle", "quarter_angle", &[], &[Type::Number; 2], Type::Number)
+            .expect(|x| quarter_angle(x[0], x[1]))
+            // Two numbers that are both nearly nothing have no angle.
+            .within(|x| match x[0].max(x[1]) < 1e-29 {
+                true => std::f64::consts::FRAC_PI_2,
+                false => bound::quarter_angle(x[0].max(0.0), x[1].max(0.0)),
+            })
+            .random(|s| {
+                let angle = f64::from(s.decades(-5.0, 0.196));
+                vec![angle.sin() as f32, angle.cos().max(0.0) as f32]
+            })
+            .corners(product(&[
+                &[0.0, 1e-20, 1e-7, 0.5, 0.707_106_8, 1.0],
+                &[0.0, 1e-20, 1e-7, 0.5, 0.707_106_8, 1.0],
+            ])),
+        Twin::new("microfacets", "one_minus_exp", &[], &[Type::Number], Type::Number)
+            .expect(|x| -(-x[0]).exp_m1())
+            .within(|x| bound::one_minus_exp(Off::exact(x[0])))
+            .random(|s| vec![s.decades(-6.0, 1.9)])
+            .corners(product(&[&[0.0, 1e-30, 1e-6, 0.249_999, 0.25, 0.250_001, 1.0, 79.999, 80.0]])),
+        Twin::new("microfacets", "half_value_sine_squared", &[], &[Type::Number], Type::Number)
+            .expect(|x| half_value_sine_squared(x[0]))
+            .within(|x| bound::half_value_sine_squared(x[0]))
             .random(|s| vec![s.decades(-2.0, 6.0)])
-            .corners(
-                product(&[&EXPONENTS, &[5.5, 5.545, 5.6]])
-                    .iter()
-                    .map(|pair| vec![pair[0].max(pair[1] - 5.5)])
-                    .collect(),
-            )
-            .method(|_, expected| SERIES * expected[0])
+            .corners(product(&[&exponents]))
             .range(0.0, 1.0),
-        Twin::new("microfacets", "half_value_angle", &[], &[Kind::Number], Kind::Number)
-            .expect(|x| vec![half_value_angle(x[0])])
+        Twin::new("microfacets", "half_value_angle", &[], &[Type::Number], Type::Number)
+            .expect(|x| half_value_angle(x[0]))
+            .within(|x| bound::half_value_angle(x[0]))
             .random(|s| vec![s.decades(-2.0, 6.0)])
-            .corners(product(&[&EXPONENTS]))
-            .method(|_, expected| SERIES * expected[0])
+            .corners(product(&[&exponents]))
             .range(0.0, 1.571),
-        Twin::new("microfacets", "distribution_cosine_power", &[], &[Kind::Number; 3], Kind::Number)
-            .expect(|x| vec![distribution_cosine_power(x[0], x[1], x[2])])
+    ]
+}
+
+fn distributions() -> [Twin; 3] {
+    [
+        Twin::new("microfacets", "distribution_cosine_power", &[], &[Type::Number; 3], Type::Number)
+            .expect(|x| distribution_cosine_power(x[0], x[1], x[2]))
+            .within(|x| powers::power_of_cosine(Off::exact(x[0]), Off::exact(x[1]), Off::exact(x[2])))
             .random(distribution)
             .corners(hard_distributions())
-            .method(|_, _| 2e-7 / std::f64::consts::E)
             .range(0.0, 1.0),
-        Twin::new("microfacets", "distribution_gaussian", &[], &[Kind::Number; 3], Kind::Number)
-            .expect(|x| vec![distribution_gaussian(x[0], x[1], x[2])])
+        Twin::new("microfacets", "distribution_gaussian", &[], &[Type::Number; 3], Type::Number)
+            .expect(|x| distribution_gaussian(x[0], x[1], x[2]))
+            .within(|x| bound::distribution_gaussian(x[0], x[1], x[2]))
             .random(distribution)
             .corners(hard_distributions())
-            .method(|_, _| SERIES)
             .range(0.0, 1.0),
-        Twin::new("microfacets", "distribution_trowbridge_reitz", &[], &[Kind::Number; 2], Kind::Number)
-            .expect(|x| vec![distribution_trowbridge_reitz(x[0], x[1])])
+        Twin::new("microfacets", "distribution_trowbridge_reitz", &[], &[Type::Number; 2], Type::Number)
+            .expect(|x| distribution_trowbridge_reitz(x[0], x[1]))
+            .within(|x| bound::distribution_trowbridge_reitz(Off::exact(x[0]), x[1]))
             .random(|s| distribution(s)[1..].to_vec())
             .corners(hard_distributions().iter().map(|numbers| numbers[1..].to_vec()).collect())
-            .method(|_, _| SERIES)
             .range(0.0, 1.0),
-        Twin::new("torrance_sparrow", "geometric_attenuation", &[], &[Kind::Number; 4], Kind::Number)
-            .expect(|x| vec![geometric_attenuation(x[0], x[1], x[2], x[3])])
+    ]
+}
+
+fn blinn_1977() -> [Twin; 4] {
+    let lobe_arguments = [Type::Vector, Type::Vector, Type::Vector, Type::Number, Type::Number];
+    [
+        Twin::new("torrance_sparrow", "geometric_attenuation", &[], &[Type::Number; 4], Type::Number)
+            .expect(|x| geometric_attenuation(x[0], x[1], x[2], x[3]))
+            .within(|x| bound::geometric_attenuation(x[0], x[1], x[2], x[3]))
             .random(|s| vec![s.next(), s.decades(-4.0, 0.0), s.next(), s.decades(-4.0, 0.0)])
             .corners(product(&[
                 &[-1.0, 0.0, 1e-7, 0.5, 1.0],
@@ -70,34 +98,37 @@ pub fn twins() -> Vec<Twin> {
                 &[-1.0, 0.0, 1e-4, 0.5, 1.0],
                 &[0.0, 1e-7, 1e-4, 0.5, 1.0],
             ]))
-            .range(0.0, 10_000.5),
-        Twin::new(
-            "torrance_sparrow",
-            "torrance_sparrow_geometry",
-            &[],
-            &[Kind::Vector, Kind::Vector, Kind::Vector, Kind::Number],
-            Kind::Number,
-        )
-        .expect(|x| vec![torrance_sparrow_geometry(vector(x, 0), vector(x, 3), vector(x, 6), x[9])])
-        .random(lobe)
-        .corners(hard_lobes())
-        .method(|_, expected| 2.0 * SERIES * expected[0])
-        .range(0.0, 10_000.5),
-        Twin::new(
-            "torrance_sparrow",
-            "torrance_sparrow",
-            &[],
-            &[Kind::Vector, Kind::Vector, Kind::Vector, Kind::Number, Kind::Number],
-            Kind::Number,
-        )
-        .expect(|x| vec![torrance_sparrow(vector(x, 0), vector(x, 3), vector(x, 6), x[9], x[10])])
-        .random(|s| {
-            let mut input = lobe(s);
-            input.push(s.between(1.0, 3.0));
-            input
-        })
-        .corners(with_ior(hard_lobes()))
-        .method(|_, expected| 2.0 * SERIES * expected[0])
-        .range(0.0, 10_000.5),
+            .range(0.0, 10_000.01),
+        Twin::new("torrance_sparrow", "cosine_to_half", &[], &[Type::Vector], Type::Number)
+            .expect(|x| 0.5 * vector(x, 0).length_squared().max(TINY_LENGTH_SQUARED).sqrt())
+            .within(|x| bound::cosine_to_half(vector(x, 0)))
+            .random(|s| (s.unit() * s.decades(-12.0, 0.3)).to_array().to_vec())
+            .corners(product(&[&[0.0, 1e-38, 1e-16, 1e-7, 1.0], &[0.0, 1e-7, -1.0], &[0.0, 1e-20, 1.0]])),
+        Twin::new("torrance_sparrow", "torrance_sparrow_geometry", &[], &lobe_arguments[..4], Type::Number)
+            .expect(|x| torrance_sparrow_geometry(vector(x, 0), vector(x, 3), vector(x, 6), x[9]))
+            .within(|x| {
+                let [normal, light, viewer] = directions(x);
+                bound::torrance_sparrow_geometry(normal, light, viewer, x[9])
+            })
+            .random(lobe)
+            .corners(hard_lobes())
+            .range_up_to(0.0, 10_000.01, 1e6),
+        Twin::new("torrance_sparrow", "torrance_sparrow", &[], &lobe_arguments, Type::Number)
+            .expect(|x| torrance_sparrow(vector(x, 0), vector(x, 3), vector(x, 6), x[9], x[10]))
+            .within(|x| {
+                let [normal, light, viewer] = directions(x);
+                bound::torrance_sparrow(normal, light, viewer, x[9], x[10])
+            })
+            .random(|s| {
+                let mut input = lobe(s);
+                input.push(s.between(1.0, 3.0));
+                input
+            })
+            .corners(crossed(&hard_lobes(), &product(&[&[1.0, 1.5, 2.42]])))
+            .range_up_to(0.0, 10_000.02, 1e6),
     ]
+}
+
+pub fn twins() -> Vec<Twin> {
+    angles().into_iter().chain(distributions()).chain(blinn_1977()).collect()
 }

@@ -3,7 +3,7 @@
 //! No ECS, no GPU, no files: `glam` in, `glam` out.
 //!
 //! ```text
-//!   shapes ─────────┐                ┌─► normals (flat, smooth)
+//!   surfaces ► shapes ┐              ┌─► normals (flat, smooth)
 //!                   ├─► TriangleMesh ┼─► flat (triangle, normal, centroid)
 //!   a file's mesh ──┘                ├─► weld ─► adjacency
 //!                                    └─► unwrap ─► charts ─► atlas ─► uv1 ─► uv_validation
@@ -29,6 +29,7 @@ pub mod flat;
 pub mod normals;
 mod planar_overlap;
 pub mod shapes;
+pub mod surfaces;
 mod triangle_mesh;
 mod unwrap;
 pub mod uv_validation;

@@ -8,7 +8,7 @@ use crate::{Adjacency, MeshError, TriangleMesh, weld_positions};
 /// What a face counts for in the average at a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NormalWeight {
-    /// Every face alike: the plain sum of unit normals. Depends on how a polygon is cut into triangles.
+    /// Every face alike: the plain sum of unit normals of documents \[I\] and \[M\]. Depends on how a polygon is cut into triangles.
     Uniform,
     /// By area: large faces decide.
     Area,
@@ -35,15 +35,45 @@ pub fn compute_flat_normals(mesh: TriangleMesh) -> TriangleMesh {
     if mesh.normals.is_empty() { flat_shaded(&mesh) } else { mesh }
 }
 
+/// A mesh with averaged normals, and where there was none to average.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothNormals {
+    /// The mesh.
+    pub mesh: TriangleMesh,
+    /// Vertices around which the faces cancel: they have the normal of their first face.
+    pub cancelled: usize,
+    /// Vertices without a face that has a normal: theirs is zero, and they take ambient light only.
+    pub missing: usize,
+}
+
+impl SmoothNormals {
+    /// One sentence about the mesh of that name if any vertex fell back, for a log: once a mesh, not once a vertex.
+    pub fn remark(&self, name: &str) -> Option<String> {
+        let Self { cancelled, missing, .. } = self;
+        (cancelled + missing > 0).then(|| {
+            format!(
+                "mesh \"{name}\": the normals around {cancelled} vertices cancel and {missing} have no face with an area; \
+                 they take their first face's normal, or none"
+            )
+        })
+    }
+}
+
 /// The mesh with smooth normals: at each point of space the normalized sum of the faces around it,
 /// N = sum w_k N_k / |sum w_k N_k|. Vertices at the same position share it.
 ///
 /// Where the sum cancels, the normal is that of the first face of the vertex that has one; a vertex with no such
-/// face gets zero.
+/// face gets zero. The result counts both.
+///
+/// Against a smooth surface the error falls with the square of the edges' length where the faces around a vertex lie point by point
+/// opposite each other, as on a regular grid, and with the length itself where they do not, whatever the weight, as long as no
+/// triangle's angle comes near 180 degrees.
+///
+/// Source: document \[I\], Gouraud (uniform weight); \[M\] 1.6.2 and figure 2.5, where the divisor is printed as sum |N_k|.
 ///
 /// # Errors
 /// [`MeshError`] where the mesh is not sound.
-pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Result<TriangleMesh, MeshError> {
+pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Result<SmoothNormals, MeshError> {
     mesh.validate()?;
     let welded = weld_positions(&mesh.positions);
     let triangles: Vec<[u32; 3]> =
@@ -62,17 +92,41 @@ pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Resu
             sum += normal * weight;
             weights += weight;
         }
-        let first = around.iter().find_map(|&t| faces[t as usize]).unwrap_or_default();
         // A sum of unit vectors is exact to some 1e-16 of its weights: less than that has cancelled.
-        let cancelled = sum.length() <= 1e-12 * weights;
-        (if cancelled { first } else { sum.normalize_or(first) }).as_vec3()
+        let average = if sum.length() <= 1e-12 * weights { None } else { sum.try_normalize() };
+        match (average, around.iter().find_map(|&t| faces[t as usize])) {
+            (Some(average), _) => Around::Average(average.as_vec3()),
+            (None, Some(first)) => Around::Cancelled(first.as_vec3()),
+            (None, None) => Around::Nothing,
+        }
     };
-    let mut normals = vec![Vec3::ZERO; mesh.positions.len()];
+    let mut found = vec![Around::Nothing; mesh.positions.len()];
     for (vertex, &point) in welded.iter().enumerate() {
         // The first vertex at a point comes before the others.
-        normals[vertex] = if point as usize == vertex { average(point) } else { normals[point as usize] };
+        found[vertex] = if point as usize == vertex { average(point) } else { found[point as usize] };
     }
-    Ok(TriangleMesh { normals, ..mesh.clone() })
+    let count = |is: fn(&Around) -> bool| found.iter().filter(|around| is(around)).count();
+    let cancelled = count(|around| matches!(around, Around::Cancelled(_)));
+    let missing = count(|around| matches!(around, Around::Nothing));
+    let normals = found.iter().map(Around::normal).collect();
+    Ok(SmoothNormals { mesh: TriangleMesh { normals, ..mesh.clone() }, cancelled, missing })
+}
+
+/// What the faces around a point come to.
+#[derive(Clone, Copy)]
+enum Around {
+    Average(Vec3),
+    Cancelled(Vec3),
+    Nothing,
+}
+
+impl Around {
+    fn normal(&self) -> Vec3 {
+        match self {
+            Self::Average(normal) | Self::Cancelled(normal) => *normal,
+            Self::Nothing => Vec3::ZERO,
+        }
+    }
 }
 
 fn face_weight(weight: NormalWeight, triangle: &[u32; 3], vertex: u32, corners: &[DVec3; 3]) -> f64 {

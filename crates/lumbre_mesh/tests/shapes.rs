@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::Vec3;
-use lumbre_mesh::flat::flat_triangles;
-use lumbre_mesh::normals::{NormalWeight, compute_flat_normals, compute_smooth_normals, face_normal};
+use glam::{DVec3, Vec3};
+use lumbre_mesh::normals::face_normal;
+use lumbre_mesh::shapes::{ShapeError, try_tetrahedral_sphere};
 use lumbre_mesh::{Adjacency, TriangleMesh, shapes, weld_positions};
 
 fn area(mesh: &TriangleMesh) -> f64 {
@@ -155,59 +155,38 @@ fn counts_out_of_range_are_clamped() {
 }
 
 #[test]
-fn averaged_normals() {
-    // A cube's corner has three faces, one to two triangles each; only the angle weight does not see the cut.
-    let cube = shapes::cuboid(Vec3::ONE, 1);
-    let bare = TriangleMesh { normals: Vec::new(), ..cube };
-    let smooth = |mesh: &TriangleMesh, weight| compute_smooth_normals(mesh, weight).unwrap().normals;
-    for (normal, position) in smooth(&bare, NormalWeight::Angle).iter().zip(&bare.positions) {
-        assert!((*normal - position.normalize()).length() < 1e-6);
+fn a_sphere_too_deep_is_refused_before_it_is_built() {
+    for depth in [shapes::MAX_DEPTH + 1, 40, u32::MAX] {
+        assert_eq!(try_tetrahedral_sphere(1.0, depth, false), Err(ShapeError::TooDeep { depth }));
     }
-    let uniform = smooth(&bare, NormalWeight::Uniform);
-    assert!(uniform.iter().zip(&bare.positions).any(|(n, p)| (*n - p.normalize()).length() > 0.1));
-
-    // Two faces of areas 1/2 and 2 at a right angle along x: weights show in the ratio of the components.
-    let wedge = TriangleMesh {
-        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z * 4.0],
-        indices: vec![0, 1, 2, 0, 3, 1],
-        ..TriangleMesh::default()
-    };
-    let by_area = Vec3::new(0.0, 4.0, 1.0).normalize();
-    assert!((smooth(&wedge, NormalWeight::Area)[0] - by_area).length() < 1e-7);
-    let half = Vec3::new(0.0, 1.0, 1.0).normalize();
-    assert!((smooth(&wedge, NormalWeight::Uniform)[0] - half).length() < 1e-7);
-    assert!((smooth(&wedge, NormalWeight::Angle)[0] - half).length() < 1e-7);
-    // At vertex 1 the angles are 45 degrees and atan 4.
-    let angles = Vec3::new(0.0, 4f32.atan(), std::f32::consts::FRAC_PI_4).normalize();
-    assert!((smooth(&wedge, NormalWeight::Angle)[1] - angles).length() < 1e-6);
-
-    // The sphere's averaged normals approach the sphere's.
-    let sphere = shapes::tetrahedral_sphere(1.0, 5, false);
-    for weight in [NormalWeight::Uniform, NormalWeight::Area, NormalWeight::Angle] {
-        let normals = smooth(&sphere, weight);
-        let worst = normals.iter().zip(&sphere.normals).map(|(n, s)| n.angle_between(*s)).fold(0.0, f32::max);
-        assert!(worst.to_degrees() < 3.0, "{weight:?}: {worst}");
+    for radius in [0.0, -1.0, f32::INFINITY] {
+        assert_eq!(try_tetrahedral_sphere(radius, 2, false), Err(ShapeError::Radius { radius }));
     }
+    assert!(try_tetrahedral_sphere(f32::NAN, 2, false).is_err());
+    assert_eq!(try_tetrahedral_sphere(2.0, 3, true), Ok(shapes::tetrahedral_sphere(2.0, 3, true)));
+    let message = try_tetrahedral_sphere(1.0, 99, true).unwrap_err().to_string();
+    assert!(message.contains("99") && message.contains("11"), "{message}");
 }
 
 #[test]
-fn normals_that_cannot_be_computed() {
-    // A face and its own back cancel: the first face decides. A lone sliver has none: zero.
-    let mesh = TriangleMesh {
-        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NAN, Vec3::Z],
-        indices: vec![0, 1, 2, 0, 2, 1, 3, 4, 4],
-        ..TriangleMesh::default()
+fn the_fourth_vertex_of_the_code_in_document_i_is_not_on_a_regular_tetrahedron() {
+    // Its text has z = -1/3 and its code +0.333333: with that, three of the six edges are shorter than the others.
+    let edges = |fourth: DVec3| {
+        let sphere = shapes::tetrahedral_sphere(1.0, 0, false);
+        let welded = weld_positions(&sphere.positions);
+        let mut points: Vec<DVec3> = welded
+            .iter()
+            .enumerate()
+            .filter(|&(vertex, &first)| vertex == first as usize)
+            .map(|(vertex, _)| sphere.positions[vertex].as_dvec3())
+            .collect();
+        let last = points.iter().position(|p| p.x > 0.1).expect("a corner lies at positive x");
+        points[last] = fourth;
+        let pairs = (0..4).flat_map(|i| (0..i).map(move |j| (i, j)));
+        pairs.map(|(i, j)| (points[i] - points[j]).length()).collect::<Vec<_>>()
     };
-    for weight in [NormalWeight::Uniform, NormalWeight::Area, NormalWeight::Angle] {
-        let normals = compute_smooth_normals(&mesh, weight).unwrap().normals;
-        assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::ZERO]);
-    }
-    let flat = compute_flat_normals(mesh.clone());
-    assert_eq!((flat.positions.len(), flat.normals[3], flat.normals[8]), (9, Vec3::NEG_Z, Vec3::ZERO));
-    assert_eq!(compute_flat_normals(flat.clone()).normals, flat.normals);
-    assert_eq!(flat_triangles(&flat).count(), 3);
-    // Sizes at both ends of f32 have normals: the cross product is taken in f64.
-    for size in [1e-30f32, 1e30] {
-        assert_eq!(face_normal(&[Vec3::ZERO, Vec3::X * size, Vec3::Y * size]), Some(Vec3::Z));
-    }
+    let regular = (8.0f64 / 3.0).sqrt();
+    let off = |fourth| edges(fourth).iter().filter(|edge| (**edge - regular).abs() > 1e-6).count();
+    assert_eq!(off(DVec3::new(0.816497, -0.471405, -1.0 / 3.0)), 0);
+    assert_eq!(off(DVec3::new(0.816497, -0.471405, 0.333333)), 3);
 }

@@ -106,7 +106,7 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
     let end = range.clamp(MINIMUM_DENOMINATOR, UNLIMITED_RANGE);
     let ratio = limited.min(end) / end;
     let ratio_squared = ratio * ratio;
-    let window = 1.0 - ratio_squared * ratio_squared;
+    let window = (1.0 - ratio_squared * ratio_squared).max(0.0);
     window * if clamp_to_one { factor.min(1.0) } else { factor }
 }
 

@@ -71,11 +71,14 @@ const MAXIMUM_DISTANCE: f64 = 1e18;
 /// exp(-80) is 2·10⁻³⁵, the last power of ten before f32's denormals.
 const LARGEST_EXPONENT: f64 = 80.0;
 
+/// Fogs thinner than this, in metres, are walls: f32 cannot divide by numbers near its denormals.
+const SMALLEST_SPAN: f64 = 1e-30;
+
 /// The part of the way from `start` to `end` that `distance` has gone, 0 to 1: a step at `end` where the two
 /// are equal.
-fn fraction(start: f64, end: f64, distance: f64) -> f64 {
+pub fn fog_fraction(start: f64, end: f64, distance: f64) -> f64 {
     let span = end - start;
-    if span == 0.0 {
+    if span.abs() < SMALLEST_SPAN {
         return if distance < end { 0.0 } else { 1.0 };
     }
     ((distance - start) / span).clamp(0.0, 1.0)
@@ -83,7 +86,7 @@ fn fraction(start: f64, end: f64, distance: f64) -> f64 {
 
 /// OpenGL's linear fog: (end - z)/(end - start), clamped to [0, 1].
 pub fn fog_linear(start: f64, end: f64, distance: f64) -> f64 {
-    1.0 - fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE))
+    1.0 - fog_fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE))
 }
 
 /// OpenGL's exponential fog: exp(-density z).
@@ -101,7 +104,7 @@ pub fn fog_exponential_squared(density: f64, distance: f64) -> f64 {
 
 /// Document \[M\]'s depth cue: S_A nearer than `start`, S_B beyond `end`, linear between.
 pub fn fog_depth_cue(start: f64, end: f64, near_weight: f64, far_weight: f64, distance: f64) -> f64 {
-    let far = fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE));
+    let far = fog_fraction(start, end, distance.abs().min(MAXIMUM_DISTANCE));
     near_weight * (1.0 - far) + far_weight * far
 }
 

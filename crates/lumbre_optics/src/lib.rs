@@ -14,7 +14,8 @@
 //!                                                    ▼                           D: microfacets  F: fresnel
 //!                          apply_fog ◄── add_emission ◄── Contribution { ambient, diffuse, specular }
 //!
-//!   beside it: transmitted_direction (Snell), fresnel_conductor, facing_normal (two-sided)
+//!   beside it: polygon_light_contribution (an emissive polygon in place of a LightSample),
+//!              transmitted_direction (Snell), fresnel_conductor, facing_normal (two-sided)
 //! ```
 //!
 //! Directions are unit and point away from the surface: `normal`, `light`, `viewer`. The zero vector stands
@@ -35,6 +36,7 @@
 //! # Ok::<(), lumbre_optics::LightError>(())
 //! ```
 
+mod angle;
 mod attenuation;
 mod blinn_phong;
 mod emission;
@@ -51,6 +53,7 @@ mod material_validation;
 mod microfacets;
 mod normalization;
 mod phong;
+mod polygon_light;
 mod power;
 mod roughness;
 mod shade;
@@ -63,12 +66,14 @@ mod two_sided;
 mod validation;
 mod viewer;
 
+pub use angle::quarter_angle;
 pub use attenuation::{Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate};
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
 pub use emission::{add_emission, exitance};
 pub use evaluate_light::{LightSample, evaluate_light};
 pub use fog::{
-    Fog, FogMode, apply_fog, fog_depth_cue, fog_exponential, fog_exponential_squared, fog_linear, fog_weight,
+    Fog, FogMode, apply_fog, fog_depth_cue, fog_exponential, fog_exponential_squared, fog_fraction,
+    fog_linear, fog_weight,
 };
 pub use fog_validation::FogError;
 pub use fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
@@ -84,6 +89,9 @@ pub use microfacets::{
 };
 pub use normalization::{TINY_LENGTH_SQUARED, safe_length, safe_normalize, try_normalize};
 pub use phong::{phong, reflected_direction};
+pub use polygon_light::{
+    HIGHLIGHT_SAMPLES, PolygonLight, polygon_form_factor, polygon_highlight, polygon_light_contribution,
+};
 pub use power::{cosine_lobe, power_of_cosine, safe_pow};
 pub use roughness::{MAX_SHININESS, shininess_from_roughness};
 pub use shade::{Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, shade, specular_factor};

@@ -7,6 +7,7 @@
 
 use std::f64::consts::{LN_2, SQRT_2};
 
+use crate::angle::quarter_angle;
 use crate::power::power_of_cosine;
 
 /// Smallest exponent that is divided by; β is 90 degrees long before.
@@ -21,8 +22,9 @@ pub fn half_value_sine_squared(shininess: f64) -> f64 {
 
 /// β in radians: where the highlight of the exponent `shininess` falls to a half, 0 to π/2.
 pub fn half_value_angle(shininess: f64) -> f64 {
-    let sine_squared = half_value_sine_squared(shininess);
-    sine_squared.sqrt().atan2((1.0 - sine_squared).max(0.0).sqrt())
+    // The cosine by itself, 2^(-1/n): 1 - sin² has lost its digits where the angle is large.
+    let cosine = (-LN_2 / shininess.max(SMALLEST_EXPONENT)).exp();
+    quarter_angle(half_value_sine_squared(shininess).sqrt(), cosine)
 }
 
 /// D1 = cosⁿ: Phong's.
@@ -32,7 +34,7 @@ pub fn distribution_cosine_power(cosine: f64, sine_squared: f64, shininess: f64)
 
 /// D2 = exp(-(c₂ α)²), c₂ = sqrt(ln 2)/β: Torrance and Sparrow's.
 pub fn distribution_gaussian(cosine: f64, sine_squared: f64, shininess: f64) -> f64 {
-    let angle = sine_squared.max(0.0).sqrt().atan2(cosine.clamp(0.0, 1.0));
+    let angle = quarter_angle(sine_squared.max(0.0).sqrt(), cosine.clamp(0.0, 1.0));
     let ratio = angle / half_value_angle(shininess).max(1e-6);
     // Beyond 10 half widths nothing is left in f32 (2⁻¹⁰⁰).
     (-LN_2 * (ratio * ratio).min(100.0)).exp()

@@ -4,18 +4,23 @@
 use glam::DVec3;
 
 /// Cosine above which [`power_of_cosine`] works from the sine.
-const NEARLY_PARALLEL: f64 = 0.9;
+const NEARLY_PARALLEL: f64 = 0.9_f32 as f64;
+/// Smaller bases count as 0, smaller exponents too: well above f32's denormals, which a device may take for 0.
+const SMALLEST_BASE: f64 = 1e-30_f32 as f64;
+const SMALLEST_EXPONENT: f64 = 1e-30_f32 as f64;
+/// Larger exponents count as this: above 4 n for the largest n that a material may have.
+const LARGEST_EXPONENT: f64 = 1e7;
 
 /// baseⁿ for a base in [0, 1], with 0⁰ = 1 and every base clamped to that range.
 ///
 /// WGSL's pow is exp2(n log2(base)), undefined for a base of 0 or less: both ends are chosen explicitly.
 pub fn safe_pow(base: f64, exponent: f64) -> f64 {
-    if exponent <= 0.0 {
+    if exponent < SMALLEST_EXPONENT {
         1.0
-    } else if base <= 0.0 {
+    } else if base < SMALLEST_BASE {
         0.0
     } else {
-        base.min(1.0).powf(exponent)
+        base.min(1.0).powf(exponent.min(LARGEST_EXPONENT))
     }
 }
 
@@ -27,7 +32,7 @@ pub fn safe_pow(base: f64, exponent: f64) -> f64 {
 pub fn power_of_cosine(cosine: f64, sine_squared: f64, exponent: f64) -> f64 {
     if cosine > NEARLY_PARALLEL {
         let logarithm = (-sine_squared.clamp(0.0, 0.25)).ln_1p();
-        (0.5 * exponent.max(0.0) * logarithm).exp()
+        (0.5 * exponent.clamp(0.0, LARGEST_EXPONENT) * logarithm).exp()
     } else {
         safe_pow(cosine, exponent)
     }

@@ -8,8 +8,10 @@ use glam::DVec3;
 use crate::normalization::safe_normalize;
 use crate::power::cosine_lobe;
 
-/// Smallest eta that is divided by; no pair of real media comes near it.
-const SMALLEST_INDEX: f64 = 1e-4;
+/// Smallest and largest eta that are used; no pair of real media comes near them, and below the smallest the
+/// direction would drown in the rounding of η² - sin².
+const SMALLEST_INDEX: f64 = 1e-2_f32 as f64;
+const LARGEST_INDEX: f64 = 1e4;
 
 /// Whether all light is reflected: sin θ_i > eta. At the critical angle itself it still leaves, along the
 /// surface.
@@ -34,15 +36,18 @@ pub fn transmitted_cosine(sin_incident: f64, eta: f64) -> f64 {
 /// t = -(1/eta) l - (cos θ_t - cos θ_i / eta) n: the unit direction, away from the light, in which light from
 /// l (unit, on the side of the unit normal n) goes on behind the surface. The zero vector under total
 /// internal reflection.
+///
+/// eta cos θ_t is taken from the cosine, as in [`fresnel_dielectric`](crate::fresnel_dielectric), not from
+/// the sine, whose rounding is multiplied by 1/cos θ_t where light grazes. The factor 1/eta is left to the
+/// normalization.
 pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> DVec3 {
-    let index = eta.max(SMALLEST_INDEX);
-    let sin_incident = normal.cross(light).length();
-    if is_totally_reflected(sin_incident, index) {
+    let index = eta.clamp(SMALLEST_INDEX, LARGEST_INDEX);
+    let cos_incident = normal.dot(light);
+    let g_squared = (index - 1.0) * (index + 1.0) + cos_incident * cos_incident;
+    if g_squared < 0.0 {
         return DVec3::ZERO;
     }
-    let cos_incident = normal.dot(light);
-    let bent = cos_incident / index - transmitted_cosine(sin_incident, index);
-    safe_normalize(bent * normal - light / index)
+    safe_normalize((cos_incident - g_squared.sqrt()) * normal - light)
 }
 
 /// [`transmitted_direction`], or nothing under total internal reflection, with the light behind the surface,
@@ -56,11 +61,11 @@ pub fn try_transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Optio
 /// (t·v)ⁿ of document \[I\]: the highlight of light that shines through, for a viewer behind the surface (n·v
 /// < 0) with the light in front (n·l > 0), else 0.
 pub fn transmitted_highlight(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, eta: f64) -> f64 {
-    let sin_incident = normal.cross(light).length();
-    if normal.dot(light) <= 0.0 || normal.dot(viewer) >= 0.0 || is_totally_reflected(sin_incident, eta) {
+    let direction = transmitted_direction(normal, light, eta);
+    if normal.dot(light) <= 0.0 || normal.dot(viewer) >= 0.0 || direction.length_squared() < 0.5 {
         return 0.0;
     }
-    cosine_lobe(transmitted_direction(normal, light, eta), viewer, shininess)
+    cosine_lobe(direction, viewer, shininess)
 }
 
 #[cfg(test)]

@@ -88,7 +88,7 @@ fn every_file_compiles_and_validates_for_each_feature() {
     assert!(stems.len() >= 17, "{stems:?}");
     for stem in stems {
         let choices = match stem.as_str() {
-            "shade" => reflection_features(),
+            "shade" | "polygon_light" => reflection_features(),
             "fog" => fog_features(),
             "evaluate_light" => LIGHT_FEATURES.to_vec(),
             _ => vec![""],

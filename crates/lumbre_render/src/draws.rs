@@ -96,7 +96,7 @@ impl Draws {
     fn push(&mut self, seen: &Visible, lights: &mut LightLists) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
         let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
-        let list = lights.reaching(seen.object.center, seen.object.half_size);
+        let list = lights.reaching(seen.object.entity, seen.object.center, seen.object.half_size);
         self.instances.push(InstanceData { object, ..list });
         let batches = match seen.pass {
             LitPass::Lightmap => &mut self.lightmapped,

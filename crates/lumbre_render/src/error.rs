@@ -98,6 +98,19 @@ pub enum RenderError {
         /// Bytes there are.
         limit: u64,
     },
+    /// An emissive object makes more polygon lights than anyone would want to wait for.
+    #[error(
+        "`{object}`: {faces} or more of its emissive faces would light other objects, beyond the limit of {limit}; give the lamp \
+         a simpler mesh, or take its EmissiveLight (LUMBRE_object.emissiveLight) away and put a light in its place"
+    )]
+    TooManyEmissiveFaces {
+        /// Name of the object.
+        object: String,
+        /// Polygons that they make, at least.
+        faces: usize,
+        /// The limit.
+        limit: usize,
+    },
     /// A shader variant does not compile: a fault of ours, not of the scene.
     #[error("shader variant [{variant}]: {message}")]
     Shader {

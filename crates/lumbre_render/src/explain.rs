@@ -26,7 +26,7 @@ pub struct SceneExplanation {
 /// Explains the frame that these options would draw of `world`, in a target of this size.
 ///
 /// # Errors
-/// Faults of the graph.
+/// Faults of the graph; too many emissive faces on one object.
 pub fn explain(
     world: &mut World,
     options: &FrameOptions,
@@ -34,7 +34,7 @@ pub fn explain(
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-    let mut lights = LightSet::of(world);
+    let mut lights = LightSet::of(world)?;
     if !options.lightmaps {
         lights.dynamic = lights.all;
     }

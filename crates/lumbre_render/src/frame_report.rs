@@ -7,7 +7,7 @@ use lumbre_graph::Plan;
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
-    /// Lights that are on, ambient ones apart.
+    /// Lights that are on, ambient ones apart. Each face of an emissive object that lights others is one.
     pub lights: u32,
     /// Of these, the static ones: a lightmapped mesh takes their highlights only. 0 while lightmaps are switched off.
     pub static_lights: u32,

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use lumbre_optics::{Light, LightKind, Material, SpotCone, SpotCosines, Surface};
+use lumbre_optics::{Light, LightKind, Material, PolygonLight, SpotCone, SpotCosines, Surface};
 use lumbre_scene::{GlobalTransform, MaterialTextures, TextureReference};
 
 /// `Frame`.
@@ -196,6 +196,22 @@ impl LightData {
             spot_outer: cosines.map_or(0.0, |cosines: SpotCosines| cosines.outer as f32),
             attenuation: light.attenuation.coefficients(),
             spot_inner_or_exponent: cosines.map_or(0.0, |cosines| cosines.inner_or_exponent as f32),
+        }
+    }
+}
+
+impl LightData {
+    /// A polygon light in frame space: its edges stand where other kinds have their axis and their attenuation.
+    pub fn polygon(light: &PolygonLight, origin: DVec3) -> Self {
+        let radiance = finite(light.radiance.as_vec3());
+        Self {
+            kind: if light.triangle { 3 } else { 4 },
+            diffuse: radiance,
+            specular: radiance,
+            position: (light.corner - origin).as_vec3(),
+            axis: light.edge_u.as_vec3(),
+            attenuation: light.edge_v.as_vec3(),
+            ..Self::default()
         }
     }
 }

@@ -1,8 +1,10 @@
-//! Which lights reach which object: a list per object, by the object's bounding box and the light's range. Exact, not an approximation: a light is left out only where
-//! its range window is 0. Lists are per object and not per screen tile, so that Gouraud's vertices outside the view keep their light.
+//! Which lights reach which object: a list per object, by the object's bounding box and the light's range, or the plane that a polygon
+//! light shines from. Exact, not an approximation: a light is left out only where its range window is 0, or where nothing of the object
+//! lies before the polygon. An emitter's own faces do not light it: rounding would decide on which side of them it lies. Lists are per object and not per screen tile, so that Gouraud's vertices outside the view keep their light.
 
 use std::collections::HashMap;
 
+use bevy_ecs::entity::Entity;
 use glam::DVec3;
 
 use crate::extract::LightReach;
@@ -25,8 +27,13 @@ impl<'a> LightLists<'a> {
     }
 
     /// The list of an object with this bounding box in the world (its `object` is 0).
-    pub fn reaching(&mut self, center: DVec3, half_size: DVec3) -> InstanceData {
+    pub fn reaching(&mut self, entity: Entity, center: DVec3, half_size: DVec3) -> InstanceData {
         let reaches = |light: &LightReach| {
+            if let Some(polygon) = light.polygon {
+                let farthest =
+                    (center - light.center).dot(polygon.front) + half_size.dot(polygon.front.abs());
+                return polygon.emitter != entity && farthest > 0.0;
+            }
             let outside = ((light.center - center).abs() - half_size).max(DVec3::ZERO);
             light.radius.is_infinite() || outside.length() < light.radius
         };
@@ -59,10 +66,17 @@ impl<'a> LightLists<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::extract::PolygonReach;
 
     #[test]
     fn an_object_gets_the_lights_whose_range_touches_it_baked_ones_last() {
-        let light = |x: f64, radius, baked| LightReach { center: DVec3::new(x, 0.0, 0.0), radius, baked };
+        let light = |x: f64, radius, baked| LightReach {
+            center: DVec3::new(x, 0.0, 0.0),
+            radius,
+            baked,
+            polygon: None,
+        };
+        let object = Entity::PLACEHOLDER;
         let reaches = [
             light(0.0, 2.0, false),
             light(100.0, f64::INFINITY, false),
@@ -71,16 +85,35 @@ mod tests {
             light(30.0, 1.0, true),
         ];
         let mut lists = LightLists::new(&reaches);
-        let near = lists.reaching(DVec3::ZERO, DVec3::splat(0.5));
+        let near = lists.reaching(object, DVec3::ZERO, DVec3::splat(0.5));
         assert_eq!(lists.indices, [0, 1, 3]);
         assert_eq!((near.first_light, near.dynamic_end, near.static_end), (0, 2, 3));
-        let far = lists.reaching(DVec3::new(11.0, 0.0, 0.0), DVec3::splat(0.5));
+        let far = lists.reaching(object, DVec3::new(11.0, 0.0, 0.0), DVec3::splat(0.5));
         assert_eq!(lists.indices, [0, 1, 3, 1, 2]);
         assert_eq!((far.first_light, far.dynamic_end, far.static_end), (3, 5, 5));
         // The same lights, the same list.
-        assert_eq!(lists.reaching(DVec3::new(0.1, 0.0, 0.0), DVec3::splat(0.5)), near);
+        assert_eq!(lists.reaching(object, DVec3::new(0.1, 0.0, 0.0), DVec3::splat(0.5)), near);
         assert_eq!(lists.indices.len(), 5);
         // A box that touches the sphere meets it where the window is 0 already.
-        assert_eq!(lists.reaching(DVec3::new(-3.0, 0.0, 0.0), DVec3::ONE).static_end, 6);
+        assert_eq!(lists.reaching(object, DVec3::new(-3.0, 0.0, 0.0), DVec3::ONE).static_end, 6);
+    }
+
+    #[test]
+    fn a_polygon_reaches_what_lies_before_it_and_is_not_its_own() {
+        let [lamp, other] = [1, 2].map(|index| Entity::from_raw_u32(index).unwrap());
+        let polygon = Some(PolygonReach { front: DVec3::new(0.0, -1e-3, 0.0), emitter: lamp });
+        let light = LightReach { center: DVec3::Y * 2.0, radius: f64::INFINITY, baked: false, polygon };
+        let reaches = [light];
+        let mut lists = LightLists::new(&reaches);
+        let mut count = |entity, y: f64, half: f64| {
+            let list = lists.reaching(entity, DVec3::Y * y, DVec3::splat(half));
+            list.static_end - list.first_light
+        };
+        assert_eq!(count(other, 0.0, 0.5), 1);
+        assert_eq!(count(lamp, 0.0, 0.5), 0);
+        assert_eq!(count(other, 3.0, 0.5), 0);
+        // It touches the plane with its lowest face: nothing of it is lit. A little lower, something is.
+        assert_eq!(count(other, 2.5, 0.5), 0);
+        assert_eq!(count(other, 2.49, 0.5), 1);
     }
 }

@@ -7,7 +7,7 @@ use lumbre_scene::{SceneSettings, propagate_transforms};
 
 use crate::display::DisplayPass;
 use crate::draws::Draws;
-use crate::extract::{CameraView, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
+use crate::extract::{CameraView, Emitters, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
 use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, InstanceData, LightData, finite};
@@ -23,6 +23,7 @@ pub struct Renderer {
     gpu: Gpu,
     executor: Executor,
     objects: Objects,
+    emitters: Emitters,
     lights: GrowableBuffer<LightData>,
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
@@ -42,6 +43,7 @@ impl Renderer {
             gpu: gpu.clone(),
             executor: Executor::new(),
             objects: Objects::new(),
+            emitters: Emitters::default(),
             lights: GrowableBuffer::new("lights"),
             instances: GrowableBuffer::new("instances"),
             light_list: GrowableBuffer::new("light list"),
@@ -118,7 +120,8 @@ impl Renderer {
             &mut self.sets,
             view.eye,
         )?;
-        let (mut lights, mut reaches) = extract_lights(world, &mut self.lights, self.objects.origin);
+        let (mut lights, mut reaches) =
+            extract_lights(world, &mut self.emitters, &mut self.lights, self.objects.origin)?;
         if !options.lightmaps {
             lights.dynamic = lights.all;
             reaches.iter_mut().for_each(|reach| reach.baked = false);

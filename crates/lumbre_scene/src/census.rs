@@ -8,7 +8,10 @@ use glam::Vec3;
 use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, Shading};
 use serde::Serialize;
 
-use crate::{Camera, DynamicObject, Hidden, Lightmap, MaterialTextures, Mesh, SceneSettings, StaticObject};
+use crate::{
+    Camera, DynamicObject, EmissiveLight, Hidden, Lightmap, MaterialTextures, Mesh, SceneSettings,
+    StaticObject,
+};
 
 /// Counts of what is in a World. Lights that are off and meshes that are hidden count only as such.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -73,6 +76,8 @@ pub struct Census {
     pub unlit: usize,
     /// Meshes that emit light.
     pub emissive: usize,
+    /// Emissive meshes whose faces light others in real time.
+    pub emissive_lights: usize,
     /// Meshes with a highlight.
     pub specular: usize,
     /// Meshes that mirror.
@@ -146,10 +151,12 @@ impl Census {
         let mut lightmaps = HashSet::new();
         let mut images = HashSet::new();
         let mut query = world.query::<(
-            (&Mesh, &Material, Has<Hidden>, Has<StaticObject>, Has<DynamicObject>),
+            (&Mesh, &Material, Has<Hidden>, Has<StaticObject>, Has<DynamicObject>, Has<EmissiveLight>),
             (Option<&MaterialTextures>, Option<&Lightmap>, Option<&Shading>),
         )>();
-        for ((mesh, material, hidden, fixed, moves), (textures, lightmap, shading)) in query.iter(world) {
+        for ((mesh, material, hidden, fixed, moves, shines), (textures, lightmap, shading)) in
+            query.iter(world)
+        {
             if hidden {
                 self.hidden += 1;
                 continue;
@@ -177,6 +184,8 @@ impl Census {
                     }
                 }
             }
+            let emits = EmissiveLight::radiance(material) != [Vec3::ZERO; 2];
+            self.emissive_lights += usize::from(shines && emits);
             self.count_material(material, settings);
             if !material.unlit {
                 *match shading.copied().unwrap_or(settings.shading) {
@@ -255,6 +264,12 @@ impl Census {
             light("directional lights", self.directional_lights, "directional"),
             light("point lights", self.point_lights, "point"),
             light("spot lights", self.spot_lights, "spot"),
+            mesh(
+                "polygon lights",
+                self.emissive_lights,
+                "whose emissive faces light others",
+                "no emissive mesh asks to light others",
+            ),
             light("dynamic lights", self.dynamic_lights, "dynamic"),
             light("mixed lights", self.mixed_lights, "mixed"),
             light("static lights", self.static_lights, "static"),

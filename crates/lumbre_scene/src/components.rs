@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 
 use crate::{Image, LightmapImage, TextureReference, Transform};
@@ -61,6 +61,31 @@ pub struct StaticObject;
 /// An entity that moves in the game: the baker leaves it (and what hangs below it) out.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DynamicObject;
+
+/// Asks that an entity's emissive faces light other objects in real time: each becomes a polygon light. Without it emission adds a
+/// colour and lights nothing in a frame (in the baker it always does).
+///
+/// The front shines with the front's emission; the back only if the material is double-sided and its back is a surface of its own,
+/// as in the baker. Faces shine evenly: an emissive texture is averaged over each. Alpha does not weaken them. An emitter does not
+/// light itself.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EmissiveLight;
+
+impl EmissiveLight {
+    /// Radiance of the front and the back of faces of this material without its texture, W/(m² sr). Channels that are negative or hold
+    /// no number are 0; none is above 10³⁰.
+    pub fn radiance(material: &lumbre_optics::Material) -> [Vec3; 2] {
+        let back = material.back.as_ref().filter(|_| material.double_sided);
+        let clean = |color: Vec3| {
+            let channel = |value: f32| {
+                if value > 0.0 { value.min(lumbre_optics::LARGEST_INTENSITY as f32) } else { 0.0 }
+            };
+            Vec3::new(channel(color.x), channel(color.y), channel(color.z))
+        };
+        let emission = [material.front.emission, back.map_or(Vec3::ZERO, |back| back.emission)];
+        if material.unlit { [Vec3::ZERO; 2] } else { emission.map(clean) }
+    }
+}
 
 /// Hides the mesh of an entity.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -48,8 +48,8 @@ pub use bevy_ecs::name::Name;
 pub use bounds::scene_bounds;
 pub use census::{Census, CensusLine};
 pub use components::{
-    ActiveCamera, Bounds, Camera, DynamicObject, Extras, Hidden, Lightmap, MaterialTextures, Mesh,
-    MetallicRoughnessTexture, Primitive, Projection, SharedImage, StaticObject,
+    ActiveCamera, Bounds, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, MaterialTextures,
+    Mesh, MetallicRoughnessTexture, Primitive, Projection, SharedImage, StaticObject,
 };
 pub use default_camera::default_camera;
 pub use gltf::{

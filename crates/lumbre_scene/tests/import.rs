@@ -402,6 +402,25 @@ fn who_moves() {
 }
 
 #[test]
+fn who_lights_others() {
+    let mut file = File::new();
+    file.square(|_, _| {});
+    let glowing = file.push("materials", json!({"emissiveFactor": [1, 0.5, 0]}));
+    let mut mesh = file.root["meshes"][0].clone();
+    mesh["primitives"][0]["material"] = json!(glowing);
+    let mesh = file.push("meshes", mesh);
+    let asks = json!({"LUMBRE_object": {"emissiveLight": true}});
+    for (mesh, extensions) in [(mesh, asks.clone()), (mesh, json!({})), (0, asks)] {
+        file.node(json!({"mesh": mesh, "extensions": extensions}));
+    }
+    let (mut world, _) = file.load().unwrap();
+    assert_eq!(world.query::<(&Mesh, &EmissiveLight)>().iter(&world).count(), 2);
+    // Two emit, two ask, one does both.
+    let census = Census::of(&mut world);
+    assert_eq!((census.emissive, census.emissive_lights), (2, 1));
+}
+
+#[test]
 fn scene_settings_and_cameras() {
     let mut file = File::new();
     file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"ambient": [1, 2, 3], "localViewer": false,

@@ -139,7 +139,15 @@ fn everything() -> World {
     }
     let cart = world.spawn((Name::new("cart"), Transform::IDENTITY, DynamicObject)).id();
     let label = Primitive { index: 0, mesh: "cart".into(), material: "".into() };
-    world.spawn((Mesh(other), Material::default(), label, ChildOf(cart), DynamicObject, Hidden));
+    world.spawn((
+        Mesh(other),
+        Material::default(),
+        label,
+        ChildOf(cart),
+        DynamicObject,
+        Hidden,
+        EmissiveLight,
+    ));
     let spot = |cone| Light::spot(Vec3::new(1.0, 0.3, 0.2), cone);
     let window = Attenuation { range: 7.7, clamp: true, ..Attenuation::INVERSE_SQUARE };
     let lights = [

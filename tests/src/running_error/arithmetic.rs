@@ -76,6 +76,10 @@ impl Number {
     }
 
     pub(super) fn multiply(self, other: Self) -> Self {
+        let zero = Self { value: 0.0, error: 0.0 };
+        if (self == zero && other.error.is_finite()) || (other == zero && self.error.is_finite()) {
+            return zero;
+        }
         if [self, other].contains(&Self { value: 1.0, error: 0.0 }) {
             let factor = if self.value == 1.0 && self.error == 0.0 { other } else { self };
             return factor;
@@ -120,6 +124,9 @@ impl Number {
         let value = pairs().map(|(a, b)| a.value * b.value).sum();
         let propagated: f64 = pairs().map(|(a, b)| a.product_error(b)).sum();
         let size: f64 = pairs().map(|(a, b)| (a.value * b.value).abs()).sum::<f64>() + propagated;
+        if size == 0.0 {
+            return Self { value, error: 0.0 };
+        }
         // One rounding of each product and one fewer sum than there are terms.
         let error = propagated + left.len() as f64 * (ROUNDING * size + FLUSHED);
         Self {
@@ -165,10 +172,16 @@ impl Number {
         if self.low() < FLUSHED {
             return Self { value: self.value.max(FLUSHED).log2(), error: f64::INFINITY };
         }
-        let near_one = self.high() >= 0.5 && self.low() <= 2.0;
+        let (low, high) = (self.low(), self.high());
+        let near_one = 2f64.powi(-21);
+        if low >= 0.5 && high <= 2.0 {
+            let mut result = self.monotonic(f64::log2, 0.0);
+            result.error += near_one;
+            return result;
+        }
         let mut result = self.monotonic(f64::log2, 6.0);
-        if near_one {
-            result.error += 2f64.powi(-21);
+        if high >= 0.5 && low <= 2.0 {
+            result.error += near_one;
         }
         result
     }

@@ -32,8 +32,10 @@ pub struct Program {
 pub struct Bounds {
     /// Exact values of the program, and how far a device may be off.
     pub results: Vec<Number>,
-    /// Ways followed beyond the first: conditions that rounding decides.
+    /// Ways followed beyond the first: branches that rounding decides.
     pub open_ways: usize,
+    /// Whether rounding decides between two values of a `select`.
+    pub open_selects: bool,
 }
 
 /// Where the values of a function's expressions and variables lie.
@@ -56,6 +58,8 @@ enum Flow {
 struct Ways {
     answers: Vec<bool>,
     met: usize,
+    /// Whether a `select` was open between values that differ by more than their errors.
+    selects: bool,
 }
 
 impl Program {
@@ -88,7 +92,7 @@ impl Program {
         let mut results = self.call(self.evaluate, std::slice::from_ref(&arguments), &mut ways);
         // Every way that differs from the first in one answer or more.
         let mut pending: Vec<Vec<bool>> = flipped(&ways.answers, 0);
-        let mut open_ways = 0;
+        let (mut open_ways, mut open_selects) = (0, ways.selects);
         while let Some(answers) = pending.pop() {
             open_ways += 1;
             if open_ways > MOST_WAYS {
@@ -96,26 +100,30 @@ impl Program {
                 break;
             }
             let fixed = answers.len();
-            let mut ways = Ways { answers, met: 0 };
+            let mut ways = Ways { answers, met: 0, selects: false };
             let other = self.call(self.evaluate, std::slice::from_ref(&arguments), &mut ways);
             pending.extend(flipped(&ways.answers, fixed));
+            open_selects |= ways.selects;
             results.iter_mut().zip(other).for_each(|(result, other)| *result = result.hull(other));
         }
-        Bounds { results: results.into_vec(), open_ways }
+        Bounds { results: results.into_vec(), open_ways, open_selects }
     }
 
     fn call(&self, handle: Handle<Function>, arguments: &[Scalars], ways: &mut Ways) -> Scalars {
         let function = &self.module.functions[handle];
         let frame = &self.functions[&handle];
-        let mut run =
-            Run { program: self, function, frame, numbers: vec![Number::exact(0.0); frame.size], arguments };
+        let numbers = vec![Number::exact(0.0); frame.size];
+        let open = std::cell::Cell::new(false);
+        let mut run = Run { program: self, function, frame, numbers, arguments, open };
         for (variable, place) in function.local_variables.iter() {
             if let Some(value) = place.init {
                 let value = run.read(value);
                 run.numbers[span(frame.locals[variable.index()])].copy_from_slice(&value);
             }
         }
-        match run.block(&function.body, ways) {
+        let flow = run.block(&function.body, ways);
+        ways.selects |= run.open.get();
+        match flow {
             Flow::Return(result) => result,
             _ => Scalars::new(),
         }
@@ -171,6 +179,8 @@ struct Run<'a> {
     frame: &'a Frame,
     numbers: Vec<Number>,
     arguments: &'a [Scalars],
+    /// Whether the errors left the condition of a `select` open.
+    open: std::cell::Cell<bool>,
 }
 
 impl Run<'_> {
@@ -378,7 +388,13 @@ impl Run<'_> {
                             true => (accept[at], reject[at]),
                             false => (reject[at], accept[at]),
                         };
-                        if condition.is_open() { taken.hull(other) } else { taken }
+                        if !condition.is_open() {
+                            return taken;
+                        }
+                        let hull = taken.hull(other);
+                        let apart = hull.error > 2.0 * taken.error.max(other.error);
+                        self.open.set(self.open.get() || apart);
+                        hull
                     })
                     .collect()
             }

@@ -7,7 +7,7 @@ use lumbre_scene::{Camera, GlobalTransform, Projection, SceneSettings, update_tr
 
 use rayon::prelude::*;
 
-use super::scene::{Scene, Vertex, collect};
+use super::scene::{Object, Scene, Vertex, collect};
 use super::shading::{PixelWeights, ShadedTriangle};
 use super::{TwinFrame, TwinOptions};
 
@@ -33,8 +33,10 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
     let reflection = options.reflection.unwrap_or(settings.reflection);
     let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
     let specular_antialiasing = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
-    let scene = Scene { settings, reflection, flat_rule, specular_antialiasing, lights, eye, basis };
     let objects = collect(world, &settings, &options);
+    let polygons = objects.iter().flat_map(Object::polygons).collect();
+    let scene =
+        Scene { settings, reflection, flat_rule, specular_antialiasing, lights, polygons, eye, basis };
 
     let mut frame = TwinFrame {
         width,

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::{DMat3, DVec2, DVec3};
-use lumbre_optics::{FlatRule, Light, Material, ReflectionModel, Shading, safe_normalize};
-use lumbre_scene::{GlobalTransform, Hidden, Lightmap, LightmapImage, Mesh, SceneSettings};
+use lumbre_optics::{FlatRule, Light, Material, PolygonLight, ReflectionModel, Shading, safe_normalize};
+use lumbre_scene::{
+    EmissiveLight, GlobalTransform, Hidden, Lightmap, LightmapImage, Mesh, SceneSettings, StaticObject,
+};
 
 use super::TwinOptions;
 
@@ -21,18 +23,66 @@ pub(super) struct Scene {
     pub(super) flat_rule: FlatRule,
     pub(super) specular_antialiasing: bool,
     pub(super) lights: Vec<(Light, DVec3, DVec3)>,
+    pub(super) polygons: Vec<Polygon>,
     pub(super) eye: DVec3,
     pub(super) basis: DMat3,
 }
 
+/// A triangle of an emissive object that lights others.
+pub(super) struct Polygon {
+    pub(super) light: PolygonLight,
+    /// Index of the object whose triangle it is.
+    pub(super) emitter: usize,
+    /// A lightmap has its diffuse light.
+    pub(super) baked: bool,
+}
+
 pub(super) struct Object {
+    pub(super) index: usize,
     pub(super) material: Material,
     pub(super) shading: Shading,
     pub(super) lightmap: Option<Arc<LightmapImage>>,
     pub(super) triangles: Vec<[Vertex; 3]>,
     /// Its transform mirrors: the second and third corner of every triangle have changed places.
     pub(super) mirrored: bool,
+    /// Its faces light others: whether they are baked.
+    pub(super) emissive_light: Option<bool>,
 }
+
+impl Object {
+    /// Its faces as lights, without a texture. Two triangles make one polygon if they follow each other and halve a parallelogram: the
+    /// tests' lamps are made so.
+    pub(super) fn polygons(&self) -> Vec<Polygon> {
+        let Some(baked) = self.emissive_light else { return Vec::new() };
+        let [front, back] = EmissiveLight::radiance(&self.material).map(|color| color.as_dvec3());
+        let mut polygons = Vec::new();
+        let mut triangles = self.triangles.iter().map(|t| t.each_ref().map(|v| v.point)).peekable();
+        while let Some([a, b, c]) = triangles.next() {
+            let light =
+                PolygonLight { corner: a, edge_u: b - a, edge_v: c - a, triangle: true, radiance: front };
+            let whole = [[a, b, c], [b, c, a], [c, a, b]].into_iter().find_map(|[a, b, c]| {
+                let (edge_u, edge_v) = (b - a, c - a);
+                let fourth = |p: &DVec3| (*p - (b + c - a)).length() < 1e-6 * (c - b).length();
+                let next = triangles.peek()?;
+                let fits = next.contains(&b) && next.contains(&c) && next.iter().any(fourth);
+                fits.then_some(PolygonLight { corner: a, edge_u, edge_v, triangle: false, ..light })
+            });
+            if whole.is_some() {
+                triangles.next();
+            }
+            let light = whole.unwrap_or(light);
+            for light in [light, PolygonLight { radiance: back, ..light.turned() }] {
+                if light.radiance != DVec3::ZERO {
+                    polygons.push(Polygon { light, emitter: self.index, baked });
+                }
+            }
+        }
+        polygons
+    }
+}
+
+type Found<'a> =
+    (&'a Mesh, &'a Material, &'a GlobalTransform, Option<&'a Shading>, Option<&'a Lightmap>, (bool, bool));
 
 /// The objects that are seen.
 pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &TwinOptions) -> Vec<Object> {
@@ -42,14 +92,10 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
         &GlobalTransform,
         Option<&Shading>,
         Option<&Lightmap>,
+        (Has<EmissiveLight>, Has<StaticObject>),
     ), Without<Hidden>>();
-    let object = |(mesh, material, place, shading, lightmap): (
-        &Mesh,
-        &Material,
-        &GlobalTransform,
-        Option<&Shading>,
-        Option<&Lightmap>,
-    )| {
+    let object = |(index, found): (usize, Found<'_>)| {
+        let (mesh, material, place, shading, lightmap, (shines, fixed)) = found;
         // Of unit size, so that what counts as no normal does not depend on the scale.
         let normals = place.normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
@@ -64,6 +110,8 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
             }
         };
         Object {
+            index,
+            emissive_light: shines.then_some(fixed),
             material: material.clone(),
             shading: options.shading.or(shading.copied()).unwrap_or(settings.shading),
             mirrored: place.mirrors(),
@@ -79,5 +127,5 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
                 .collect(),
         }
     };
-    query.iter(world).map(object).collect()
+    query.iter(world).enumerate().map(object).collect()
 }

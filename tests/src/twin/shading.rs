@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use lumbre_optics::{
     Contribution, FlatRule, LightKind, LightSample, ReflectionModel, Shading, SurfaceSample, add_emission,
     apply_fog, evaluate_light, facing_normal, filtered_lobe, fog_weight, light_contribution, lobe_widening,
-    safe_normalize, viewer_direction,
+    polygon_light_contribution, safe_normalize, viewer_direction,
 };
 use lumbre_scene::LightmapImage;
 
@@ -114,6 +114,15 @@ impl<'a> ShadedTriangle<'a> {
                 added = Contribution::ZERO;
             }
             if mapped && light.bake == lumbre_optics::BakeMode::Static {
+                added.diffuse = DVec3::ZERO;
+            }
+            sum = sum + added;
+        }
+        for polygon in scene.polygons.iter().filter(|polygon| polygon.emitter != self.object.index) {
+            let light = &polygon.light;
+            let mut added =
+                polygon_light_contribution(scene.reflection, surface, light, point, normal, viewer);
+            if mapped && polygon.baked {
                 added.diffuse = DVec3::ZERO;
             }
             sum = sum + added;

@@ -1,7 +1,7 @@
 //! Shapes with exact normals and texture coordinates: for scenes, tests and demonstrations. Not a modeller.
 //!
 //! All are centred on the origin with +y up, closed shapes face outward, and counts out of range are clamped to
-//! the range in the text. Vertices are split where normals or texture coordinates break, so weld positions
+//! the range in the text (functions in `try_` refuse instead). Vertices are split where normals or texture coordinates break, so weld positions
 //! ([`weld_positions`](crate::weld_positions)) before counting vertices.
 
 mod flat_sided;
@@ -10,7 +10,7 @@ mod sphere;
 
 pub use flat_sided::{cuboid, plane};
 pub use revolution::{cone, cylinder, torus, uv_sphere};
-pub use sphere::tetrahedral_sphere;
+pub use sphere::{MAX_DEPTH, ShapeError, tetrahedral_sphere, try_tetrahedral_sphere};
 
 use glam::{DVec3, Vec2};
 
@@ -20,17 +20,17 @@ use crate::TriangleMesh;
 pub const MAX_SEGMENTS: u32 = 2048;
 
 /// One corner of a grid.
-struct GridVertex {
-    position: DVec3,
-    normal: DVec3,
-    uv0: [f64; 2],
+pub(crate) struct GridVertex {
+    pub position: DVec3,
+    pub normal: DVec3,
+    pub uv0: [f64; 2],
 }
 
 impl TriangleMesh {
     /// Appends a grid of `columns` by `rows` quads, counter-clockwise where column and row axes turn left.
     ///
     /// `vertex(column, row)` is asked once per corner. Triangles with two corners in one place are left out.
-    fn push_grid(&mut self, columns: u32, rows: u32, vertex: impl Fn(u32, u32) -> GridVertex) {
+    pub(crate) fn push_grid(&mut self, columns: u32, rows: u32, vertex: impl Fn(u32, u32) -> GridVertex) {
         let first = self.positions.len() as u32;
         for row in 0..=rows {
             for column in 0..=columns {
@@ -57,7 +57,7 @@ impl TriangleMesh {
     }
 
     /// Removes vertices that no triangle uses.
-    fn without_unused_vertices(self) -> Self {
+    pub(crate) fn without_unused_vertices(self) -> Self {
         let mut renamed = vec![u32::MAX; self.positions.len()];
         let mut sources = Vec::with_capacity(self.positions.len());
         let mut indices = self.indices.clone();
@@ -70,5 +70,14 @@ impl TriangleMesh {
             *index = *slot;
         }
         self.with_vertices(&sources, indices)
+    }
+
+    /// Appends a mesh with the same attributes as this one, or to an empty one.
+    pub(crate) fn append(&mut self, other: Self) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        self.uv0.extend(other.uv0);
+        self.indices.extend(other.indices.into_iter().map(|index| index + first));
     }
 }

@@ -8,14 +8,51 @@ use glam::{DVec3, Vec2};
 use crate::TriangleMesh;
 use crate::flat::flat_shaded;
 
-/// Largest depth of subdivision: 4^12 triangles, 16.8 million.
-const MAX_DEPTH: u32 = 11;
+/// Largest depth of subdivision: 4^12 triangles, 16.8 million, in half a gigabyte. One more would need two.
+pub const MAX_DEPTH: u32 = 11;
 
-/// A sphere of 4^(depth + 1) triangles over 2 * 4^depth + 2 points (`depth` 0 to 11; 0 is the tetrahedron).
+/// Why a shape cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeError {
+    /// Subdivided too often: every step takes four times the memory.
+    #[error(
+        "a sphere subdivided {depth} times has 4^{depth} times 4 triangles; subdivide at most {MAX_DEPTH} times"
+    )]
+    TooDeep {
+        /// The depth asked for.
+        depth: u32,
+    },
+    /// A size that is not a positive number of metres.
+    #[error("a radius of {radius} m; give a finite one above 0")]
+    Radius {
+        /// The radius asked for.
+        radius: f32,
+    },
+}
+
+/// As [`tetrahedral_sphere`], but refuses what that clamps or lets pass.
+///
+/// # Errors
+/// [`ShapeError::TooDeep`] beyond [`MAX_DEPTH`], before anything is allocated; [`ShapeError::Radius`].
+pub fn try_tetrahedral_sphere(radius: f32, depth: u32, flat: bool) -> Result<TriangleMesh, ShapeError> {
+    if depth > MAX_DEPTH {
+        return Err(ShapeError::TooDeep { depth });
+    }
+    if !(radius.is_finite() && radius > 0.0) {
+        return Err(ShapeError::Radius { radius });
+    }
+    Ok(tetrahedral_sphere(radius, depth, flat))
+}
+
+/// A sphere of 4^(depth + 1) triangles over 2 * 4^depth + 2 points (`depth` 0 to [`MAX_DEPTH`]; 0 is the tetrahedron).
 ///
 /// Each step splits every triangle into four at the middles of its edges, moved out to the sphere. `flat` gives
 /// each triangle its own vertices with the face's normal; else the normals are those of the sphere.
 /// The tetrahedron's first vertex is at +z; the other three lie at z = -1/3.
+///
+/// Source: document \[I\], Aproximación de una esfera por subdivisión recursiva. Its code gives the fourth vertex z = +0.333333,
+/// which is not on the sphere's regular tetrahedron; its text has -1/3.
 pub fn tetrahedral_sphere(radius: f32, depth: u32, flat: bool) -> TriangleMesh {
     let root_2 = 2f64.sqrt();
     let root_6 = 6f64.sqrt();

@@ -1,10 +1,12 @@
-//! Lights of a frame: those that are on, dynamic ones first. Which of them reach what is not decided here.
+//! Lights of a frame: those that are on and the faces of emissive objects, dynamic ones first. Which of them reach what is not decided here.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, Light, LightKind};
 use lumbre_scene::GlobalTransform;
 
+use super::emitters::{EmissivePolygon, Emitters};
+use crate::RenderError;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::LightData;
 
@@ -22,18 +24,30 @@ pub(crate) struct LightSet {
     pub directional: bool,
     pub point: bool,
     pub spot: bool,
+    /// Whether faces of emissive objects shine.
+    pub polygon: bool,
 }
 
 impl LightSet {
     /// The lights of a World, counted.
-    pub fn of(world: &mut World) -> Self {
+    ///
+    /// # Errors
+    /// [`RenderError::TooManyEmissiveFaces`].
+    pub fn of(world: &mut World) -> Result<Self, RenderError> {
         let mut set = Self::default();
+        Emitters::default().polygons(world)?.iter().for_each(|polygon| set.add_polygon(polygon));
         let mut query = world.query::<(&Light, &GlobalTransform)>();
         query
             .iter(world)
             .filter(|(light, transform)| shines(light, transform))
             .for_each(|(light, _)| set.add(light));
-        set
+        Ok(set)
+    }
+
+    fn add_polygon(&mut self, polygon: &EmissivePolygon) {
+        self.dynamic += u32::from(!polygon.baked);
+        self.all += 1;
+        self.polygon = true;
     }
 
     fn add(&mut self, light: &Light) {
@@ -59,6 +73,16 @@ pub(crate) struct LightReach {
     pub radius: f64,
     /// Baked into the lightmaps in use.
     pub baked: bool,
+    /// Of a polygon light: the plane that it shines from.
+    pub polygon: Option<PolygonReach>,
+}
+
+/// Where a polygon light shines: before its plane, on everything but the object whose face it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PolygonReach {
+    /// Of any length, to the front.
+    pub front: DVec3,
+    pub emitter: Entity,
 }
 
 impl LightReach {
@@ -67,26 +91,46 @@ impl LightReach {
             LightKind::Point => f64::from(light.attenuation.range),
             LightKind::Ambient | LightKind::Directional => f64::INFINITY,
         };
-        Self { center: transform.translation(), radius, baked: light.bake == BakeMode::Static }
+        let baked = light.bake == BakeMode::Static;
+        Self { center: transform.translation(), radius, baked, polygon: None }
+    }
+
+    fn of_polygon(EmissivePolygon { light, emitter, baked }: &EmissivePolygon) -> Self {
+        let reach = PolygonReach { front: light.area_vector(), emitter: *emitter };
+        Self { center: light.corner, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
     }
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time.
+///
+/// # Errors
+/// [`RenderError::TooManyEmissiveFaces`].
 pub(crate) fn extract_lights(
     world: &mut World,
+    emitters: &mut Emitters,
     buffer: &mut GrowableBuffer<LightData>,
     origin: DVec3,
-) -> (LightSet, Vec<LightReach>) {
+) -> Result<(LightSet, Vec<LightReach>), RenderError> {
     let mut set = LightSet::default();
+    let polygons = emitters.polygons(world)?;
+    polygons.iter().for_each(|polygon| set.add_polygon(polygon));
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
     let mut found: Vec<_> =
         query.iter(world).filter(|(_, light, transform)| shines(light, transform)).collect();
-    found.sort_by_key(|(entity, light, _)| (light.bake == BakeMode::Static, entity.index_u32()));
+    found.sort_by_key(|(entity, _, _)| entity.index_u32());
     found.iter().for_each(|(_, light, _)| set.add(light));
     found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
-    buffer.replace(found.iter().map(|(_, light, transform)| LightData::new(light, transform, origin)));
-    let reaches = found.iter().map(|(_, light, transform)| LightReach::new(light, transform)).collect();
-    (set, reaches)
+    let lights = found.iter().map(|(_, light, transform)| {
+        (LightReach::new(light, transform), LightData::new(light, transform, origin))
+    });
+    let polygons = polygons
+        .iter()
+        .map(|polygon| (LightReach::of_polygon(polygon), LightData::polygon(&polygon.light, origin)));
+    let mut all: Vec<(LightReach, LightData)> = lights.chain(polygons).collect();
+    // Stable: within both halves the order stays.
+    all.sort_by_key(|(reach, _)| reach.baked);
+    buffer.replace(all.iter().map(|(_, data)| *data));
+    Ok((set, all.into_iter().map(|(reach, _)| reach).collect()))
 }
 
 /// Whether a light adds anything; one whose numbers are out of range is left out rather than let into a frame.

@@ -1,11 +1,16 @@
 //! From the World to the GPU: what changed since the last frame, and nothing else. What is drawn of it is decided in `draws`.
 
 mod camera;
+mod emissive_faces;
+mod emitters;
 mod lights;
 mod objects;
 mod traits;
 
 pub(crate) use camera::{CameraView, find_camera};
+pub(crate) use emitters::Emitters;
+#[cfg(test)]
+pub(crate) use lights::PolygonReach;
 pub(crate) use lights::{LightReach, LightSet, extract_lights};
 pub(crate) use objects::{Object, Objects};
 pub(crate) use traits::{FrameFeatures, LitPass, Traits};

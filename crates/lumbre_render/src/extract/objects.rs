@@ -22,6 +22,7 @@ use crate::{Gpu, RenderError};
 /// What the draws need to know of one object.
 #[derive(Debug)]
 pub(crate) struct Object {
+    pub entity: Entity,
     pub mesh: MeshKey,
     pub texture_set: Option<Arc<TextureSet>>,
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
@@ -119,7 +120,7 @@ impl Objects {
                 let traits = Traits::new(&material, maps, &mesh.0, lightmap.is_some(), shading.copied());
                 let mut object = match self.objects[slot].take() {
                     Some(object) => object,
-                    None => Object::new(meshes.insert(&mesh.0), traits),
+                    None => Object::new(entity, meshes.insert(&mesh.0), traits),
                 };
                 // A component that was removed leaves no change behind: compare presence too.
                 let rematerialized = new
@@ -197,8 +198,9 @@ impl Objects {
 }
 
 impl Object {
-    fn new(mesh: MeshKey, traits: Traits) -> Self {
+    fn new(entity: Entity, mesh: MeshKey, traits: Traits) -> Self {
         Self {
+            entity,
             mesh,
             texture_set: None,
             lightmap: None,

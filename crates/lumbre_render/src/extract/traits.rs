@@ -108,7 +108,7 @@ impl Traits {
         variant.set(Feature::Lightmap, lightmapped);
         variant.set(Feature::TwoSided, self.double_sided && settings.two_sided);
         variant.set(Feature::Lit, lit);
-        let LightSet { dynamic, all, directional, point, spot, static_ambient, .. } = frame.lights;
+        let LightSet { dynamic, all, directional, point, spot, polygon, static_ambient, .. } = frame.lights;
         variant.set(Feature::DynamicLights, dynamic > 0);
         // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
         let left = !lightmapped || self.specular || static_ambient;
@@ -116,6 +116,7 @@ impl Traits {
         variant.set(Feature::DirectionalLights, directional);
         variant.set(Feature::PointLights, point);
         variant.set(Feature::SpotLights, spot);
+        variant.set(Feature::PolygonLights, polygon);
         variant.set(Feature::SharpHighlights, self.sharp);
         variant.set(Feature::LocalViewer, settings.local_viewer);
         if let Some(fog) = &settings.fog {

@@ -123,6 +123,8 @@ mod tests {
             "discard",
             "phong_4n",
             "dpdx",
+            "polygon",
+            "contour",
         ] {
             assert!(!plain.contains(word), "{word} is left in:\n{plain}");
         }
@@ -131,6 +133,13 @@ mod tests {
         for word in ["frame_lights", "light_list", "safe_normalize", "for ("] {
             assert!(!unlit.contains(word), "{word} is left in:\n{unlit}");
         }
+        // Polygons alone: nothing of the other kinds is left; all together: both are there.
+        let polygons = [Feature::Lit, Feature::DynamicLights, Feature::StaticLights, Feature::PolygonLights];
+        let alone = valid(&variant(Shading::Phong, &polygons));
+        assert!(alone.contains("polygon_form_factor") && !alone.contains("evaluate_light("), "{alone}");
+        let together =
+            valid(&variant(Shading::Phong, &[polygons.as_slice(), &[Feature::PointLights]].concat()));
+        assert!(together.contains("polygon_form_factor") && together.contains("attenuate"), "{together}");
         let dark = valid(&variant(Shading::Phong, &[Feature::Lit]));
         assert!(!dark.contains("for ("), "a scene without lights loops:\n{dark}");
         let lit = valid(&variant(Shading::Phong, &[LIT.as_slice(), &[Feature::SpotLights]].concat()));

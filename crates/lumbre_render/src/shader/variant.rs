@@ -80,6 +80,8 @@ features! {
     SharpHighlights = 25 => "SHARP_HIGHLIGHTS",
     /// Widens highlights by what the normals change within a pixel.
     SpecularAntialiasing = 26 => "SPECULAR_ANTIALIASING",
+    /// Knows the faces of emissive objects as lights.
+    PolygonLights = 27 => "POLYGON_LIGHTS",
 }
 
 /// A variant of the forward shader.
@@ -131,6 +133,7 @@ impl Variant {
             self.bits &= !(Feature::DirectionalLights as u32
                 | Feature::PointLights as u32
                 | Feature::SpotLights as u32
+                | Feature::PolygonLights as u32
                 | Feature::SharpHighlights as u32
                 | Feature::SpecularAntialiasing as u32);
             self.reflection = ReflectionModel::Phong;

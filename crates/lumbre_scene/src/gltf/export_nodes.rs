@@ -14,8 +14,8 @@ use super::export_data::Data;
 use super::extensions::{CameraExtension, ObjectExtension};
 use super::{export_light, export_material, export_scene};
 use crate::{
-    ActiveCamera, Camera, DynamicObject, Extras, Hidden, Lightmap, LightmapImage, MaterialTextures, Mesh,
-    Primitive, Transform,
+    ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, LightmapImage,
+    MaterialTextures, Mesh, Primitive, Transform,
 };
 
 /// The lists of a file being written.
@@ -37,6 +37,7 @@ struct Appearance {
     shading: Option<Shading>,
     lightmap: Option<Arc<LightmapImage>>,
     hidden: bool,
+    emissive_light: bool,
     dynamic: bool,
 }
 
@@ -108,9 +109,10 @@ impl Nodes {
             let own = groups.iter().position(|(appearance, _)| appearance.dynamic == dynamic);
             let own = own.map(|own| groups.remove(own));
             let name = world.get::<Name>(entity).map(|name| name.as_str().to_owned());
-            let mut hidden = false;
+            let mut object = ObjectExtension { dynamic: own_dynamic && !inherited, ..Default::default() };
             if let Some((appearance, group)) = own {
-                hidden = appearance.hidden;
+                object.hidden = appearance.hidden;
+                object.emissive_light = appearance.emissive_light;
                 result.show(
                     world,
                     &mut node,
@@ -122,7 +124,7 @@ impl Nodes {
                     lightmaps,
                 )?;
             }
-            object_extension(&mut node, own_dynamic && !inherited, hidden)?;
+            object_extension(&mut node, object)?;
             for (appearance, group) in groups {
                 let number = result.nodes.len();
                 let mut below = Map::new();
@@ -139,7 +141,12 @@ impl Nodes {
                     &mut known,
                     lightmaps,
                 )?;
-                object_extension(&mut below, appearance.dynamic && !dynamic, appearance.hidden)?;
+                let object = ObjectExtension {
+                    dynamic: appearance.dynamic && !dynamic,
+                    hidden: appearance.hidden,
+                    emissive_light: appearance.emissive_light,
+                };
+                object_extension(&mut below, object)?;
                 result.nodes.push(below.into());
                 children.push(number);
             }
@@ -295,6 +302,7 @@ fn appearance(world: &World, entity: Entity, dynamic: bool) -> Appearance {
         shading: world.get::<Shading>(entity).copied(),
         lightmap: world.get::<Lightmap>(entity).map(|lightmap| lightmap.image.clone()),
         hidden: world.get::<Hidden>(entity).is_some(),
+        emissive_light: world.get::<EmissiveLight>(entity).is_some(),
         dynamic: dynamic || world.get::<DynamicObject>(entity).is_some(),
     }
 }
@@ -304,9 +312,9 @@ fn ancestors(world: &World, entity: Entity) -> impl Iterator<Item = Entity> + '_
         .skip(1)
 }
 
-fn object_extension(node: &mut Map<String, Value>, dynamic: bool, hidden: bool) -> Result<(), SaveError> {
-    if dynamic || hidden {
-        let extension = serde_json::to_value(ObjectExtension { dynamic, hidden });
+fn object_extension(node: &mut Map<String, Value>, object: ObjectExtension) -> Result<(), SaveError> {
+    if object.dynamic || object.hidden || object.emissive_light {
+        let extension = serde_json::to_value(object);
         extend(node, "LUMBRE_object", extension.map_err(|source| SaveError::Json { source })?);
     }
     Ok(())

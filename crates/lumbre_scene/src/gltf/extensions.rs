@@ -138,11 +138,14 @@ pub(crate) struct LightmapExtension {
 
 /// `nodes[i].extensions.LUMBRE_object`.
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "camelCase")]
 pub(crate) struct ObjectExtension {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub dynamic: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub hidden: bool,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub emissive_light: bool,
 }
 
 /// `nodes[i].extensions.LUMBRE_camera`, beside the node's `camera`.

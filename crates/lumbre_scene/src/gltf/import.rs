@@ -12,7 +12,8 @@ use super::limits::{Budget, LoadLimits};
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
 use super::{container, uri};
 use crate::{
-    ActiveCamera, DynamicObject, Extras, Hidden, MaterialTextures, Mesh, StaticObject, update_transforms,
+    ActiveCamera, DynamicObject, EmissiveLight, Extras, Hidden, MaterialTextures, Mesh, StaticObject,
+    update_transforms,
 };
 
 /// What loading did.
@@ -182,6 +183,9 @@ fn spawn_primitive(world: &mut World, node: &PreparedNode, primitive: &PreparedP
     }
     if node.hidden {
         entity.insert(Hidden);
+    }
+    if node.emissive_light {
+        entity.insert(EmissiveLight);
     }
     if node.dynamic {
         entity.insert(DynamicObject);

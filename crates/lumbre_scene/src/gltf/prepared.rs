@@ -45,6 +45,7 @@ pub(crate) struct PreparedNode {
     pub lightmap: Option<Lightmap>,
     pub dynamic: bool,
     pub hidden: bool,
+    pub emissive_light: bool,
     pub extras: Option<serde_json::Value>,
 }
 
@@ -154,9 +155,8 @@ pub(crate) fn prepare(
         if node.skin.is_some() {
             notes.add(&place, "skins are not supported; the mesh is shown as it was modelled");
         }
-        let hidden = extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &place)?
-            .unwrap_or_default()
-            .hidden;
+        let object =
+            extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &place)?.unwrap_or_default();
         nodes.push(PreparedNode {
             index,
             parent: parents[index],
@@ -169,7 +169,8 @@ pub(crate) fn prepare(
             shading,
             lightmap,
             dynamic: dynamic.contains(&index),
-            hidden,
+            hidden: object.hidden,
+            emissive_light: object.emissive_light,
             extras: node.extras.clone(),
         });
     }

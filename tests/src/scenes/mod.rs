@@ -1,5 +1,7 @@
 //! Small scenes made in code: one subject, one light, one camera.
 
+pub mod documents;
+
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;

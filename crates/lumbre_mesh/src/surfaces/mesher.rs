@@ -1,0 +1,81 @@
+//! A mesh of a parametric surface: a grid over its parameters. Not of an implicit one.
+
+use glam::{DVec2, DVec3};
+
+use super::{ParametricSurface, SurfaceError};
+use crate::TriangleMesh;
+use crate::shapes::{GridVertex, MAX_SEGMENTS};
+
+/// A mesh of a parametric surface in `columns` cells along u and `rows` along v, two triangles each, with the surface's own normals
+/// and with (u, v) as texture coordinates: u to the right, v upwards.
+///
+/// Seams of closed parameters are the same bits on both sides; triangles that a pole leaves without area are left out, and a pole's
+/// vertices, one a column, take the texture coordinate of the column's middle. Where the surface has no normal a pole's vertex takes
+/// that of the column's middle just inside (a cone's apex), any other vertex zero.
+///
+/// # Errors
+/// [`SurfaceError::Grid`] for 0 or more than [`MAX_SEGMENTS`] cells; [`SurfaceError::NotFinite`] where a point is not, or does not
+/// fit into f32.
+pub fn parametric_mesh<S>(surface: &S, columns: u32, rows: u32) -> Result<TriangleMesh, SurfaceError>
+where
+    S: ParametricSurface + ?Sized,
+{
+    let count = 1..=MAX_SEGMENTS;
+    if !(count.contains(&columns) && count.contains(&rows)) {
+        return Err(SurfaceError::Grid { columns, rows, largest: MAX_SEGMENTS });
+    }
+    let mut mesh = TriangleMesh::default();
+    push_surface(&mut mesh, surface, columns, rows);
+    match mesh.positions.iter().find(|position| !position.is_finite()) {
+        Some(place) => Err(SurfaceError::NotFinite { place: place.as_dvec3() }),
+        None => Ok(mesh),
+    }
+}
+
+/// As [`parametric_mesh`], of counts that are in range, appended to a mesh and unchecked.
+pub(crate) fn push_surface<S>(mesh: &mut TriangleMesh, surface: &S, columns: u32, rows: u32)
+where
+    S: ParametricSurface + ?Sized,
+{
+    let [low, high] = surface.domain();
+    let closed = surface.closed();
+    // The last step of a closed parameter is its first, and of an open one exactly its end.
+    let parameter = |axis: usize, step: f64, steps: u32| {
+        let steps = f64::from(steps);
+        let step = if closed[axis] { step % steps } else { step };
+        if step == steps { high[axis] } else { low[axis] + (high[axis] - low[axis]) * step / steps }
+    };
+    let u = |step: f64| parameter(0, step, columns);
+    let v = |step: f64| parameter(1, step, rows);
+    let point = |column: u32, row: u32| surface.point(u(column.into()), v(row.into()));
+    let is_pole = |row: u32| {
+        let first = point(0, row).as_vec3();
+        !closed[1] && (1..=columns).all(|column| point(column, row).as_vec3() == first)
+    };
+    let poles = [is_pole(0), is_pole(rows)];
+    let vertex = |column: u32, row: u32| {
+        // The one triangle that uses a pole's vertex goes on to the right of it below, and to the left of it above.
+        let middle = match row {
+            0 if poles[0] => 0.5,
+            _ if row == rows && poles[1] => -0.5,
+            _ => 0.0,
+        };
+        let step = (f64::from(column) + middle).max(0.0);
+        let normal = surface.normal(u(step), v(row.into())).or_else(|error| {
+            let inside = if row == 0 { INSIDE } else { f64::from(rows) - INSIDE };
+            if middle == 0.0 { Err(error) } else { surface.normal(u(step), v(inside)) }
+        });
+        let uv0 = DVec2::new(step / f64::from(columns), 1.0 - f64::from(row) / f64::from(rows));
+        GridVertex {
+            position: point(column, row),
+            normal: normal.unwrap_or(DVec3::ZERO),
+            uv0: uv0.to_array(),
+        }
+    };
+    let mut grid = TriangleMesh::default();
+    grid.push_grid(columns, rows, vertex);
+    mesh.append(if poles == [false; 2] { grid } else { grid.without_unused_vertices() });
+}
+
+/// How far inside a pole, as a part of a row, the normal of a column's middle is taken.
+const INSIDE: f64 = 1e-6;

@@ -1,0 +1,108 @@
+//! Surfaces by equation and their normals: the plane through three points, implicit surfaces, parametric surfaces, and the
+//! sphere, cylinder, cone and torus as both. Not meshes of them: those are [`shapes`](crate::shapes) and [`parametric_mesh`].
+//!
+//! ```text
+//!   plane_normal        three points       (p1 - p0) x (p2 - p0)                     [I] Vectores normales
+//!   implicit_normal     f(p) = 0           gradient of f                             [I] Vectores normales
+//!   parametric_normal   p(u, v)            dp/du x dp/dv, its limit at a pole        [I] Vectores normales
+//!   averaged            a mesh             normals::compute_smooth_normals           [I] Gouraud, [M] 1.6.2, fig. 2.5
+//! ```
+//!
+//! All in f64, metres and radians; every normal is a unit vector or an error that says why there is none.
+//!
+//! ```
+//! use glam::DVec3;
+//! use lumbre_mesh::surfaces::{ParametricSurface, SurfaceError, Torus, implicit_normal};
+//!
+//! // An ellipsoid by its equation alone: the gradient comes from central differences.
+//! let ellipsoid = |p: DVec3| p.x * p.x + 4.0 * p.y * p.y + p.z * p.z - 1.0;
+//! let normal = implicit_normal(&ellipsoid, DVec3::new(0.0, 0.5, 0.0))?;
+//! assert!((normal - DVec3::Y).length() < 1e-9);
+//!
+//! // A torus at a quarter of its tube: straight up, exactly.
+//! let torus = Torus { major_radius: 2.0, minor_radius: 0.5 };
+//! let top = torus.normal(0.3, std::f64::consts::FRAC_PI_2)?;
+//! assert!((top - DVec3::Y).length() < 1e-15);
+//! assert!((torus.point(0.3, std::f64::consts::FRAC_PI_2).y - 0.5).abs() < 1e-15);
+//! # Ok::<(), SurfaceError>(())
+//! ```
+
+mod cone;
+mod cylinder;
+mod implicit;
+mod mesher;
+mod parametric;
+mod plane;
+mod pole;
+mod sphere;
+mod torus;
+
+pub use cone::Cone;
+pub use cylinder::Cylinder;
+pub use implicit::{ImplicitSurface, central_difference_gradient, implicit_normal};
+pub use mesher::parametric_mesh;
+pub use parametric::{ParametricSurface, difference_partials, parametric_normal};
+pub use plane::plane_normal;
+pub use sphere::Sphere;
+pub use torus::Torus;
+
+pub(crate) use mesher::push_surface;
+
+use glam::DVec3;
+
+/// Why a surface has no normal at a place, or no mesh.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// Three points that span no plane.
+    #[error("the three points lie on one line, so no plane goes through them alone; move one of them")]
+    Collinear,
+    /// A coordinate or a value of the surface's function is infinite or not a number.
+    #[error("the surface is not finite at {place}")]
+    NotFinite {
+        /// The point in metres, or (u, v, 0).
+        place: DVec3,
+    },
+    /// The gradient of an implicit surface vanishes: a centre, an apex, a crossing.
+    #[error("the gradient vanishes at {point}: the surface has no tangent plane there")]
+    Singular {
+        /// The point in metres.
+        point: DVec3,
+    },
+    /// The partial derivatives span no plane, and the normals around do not agree on one: an apex, a crease.
+    #[error("the surface has no tangent plane at u = {u}, v = {v}")]
+    NoTangentPlane {
+        /// First parameter.
+        u: f64,
+        /// Second parameter.
+        v: f64,
+    },
+    /// A grid without cells, or with more than a mesh may have.
+    #[error("a grid of {columns} by {rows} cells; both must be 1 to {largest}")]
+    Grid {
+        /// Cells along u.
+        columns: u32,
+        /// Cells along v.
+        rows: u32,
+        /// Largest count of either.
+        largest: u32,
+    },
+}
+
+/// The direction of a vector of any finite length: scaled first, so that squares neither overflow nor vanish.
+fn direction(vector: DVec3) -> Option<DVec3> {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 && vector.is_finite() { Some((vector / largest).normalize()) } else { None }
+}
+
+/// Distance from the y axis and direction away from it, +x where there is none.
+fn from_axis(point: DVec3) -> (f64, DVec3) {
+    let distance = point.x.hypot(point.z);
+    (distance, DVec3::new(point.x, 0.0, point.z).try_normalize().unwrap_or(DVec3::X))
+}
+
+/// The direction at an angle around the y axis, from +x towards -z, and how it turns with the angle.
+fn around(angle: f64) -> [DVec3; 2] {
+    let (sin, cos) = angle.sin_cos();
+    [DVec3::new(cos, 0.0, -sin), DVec3::new(-sin, 0.0, -cos)]
+}

@@ -1,0 +1,63 @@
+//! The sphere about the origin, by its equation and by longitude and latitude.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
+
+use super::{ImplicitSurface, ParametricSurface, SurfaceError, around};
+
+/// f(p) = p·p - r²; p(u, v) with u the longitude from +x towards -z and v the angle from the south pole (-y).
+///
+/// Source: document \[I\], Vectores normales, there of radius 1 about z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// In metres, greater than 0.
+    pub radius: f64,
+}
+
+impl ImplicitSurface for Sphere {
+    fn value(&self, point: DVec3) -> f64 {
+        point.length_squared() - self.radius * self.radius
+    }
+
+    fn scale(&self) -> f64 {
+        self.radius
+    }
+
+    fn gradient(&self, point: DVec3) -> DVec3 {
+        2.0 * point
+    }
+}
+
+impl ParametricSurface for Sphere {
+    fn domain(&self) -> [DVec2; 2] {
+        [DVec2::ZERO, DVec2::new(TAU, PI)]
+    }
+
+    fn closed(&self) -> [bool; 2] {
+        [true, false]
+    }
+
+    fn point(&self, u: f64, v: f64) -> DVec3 {
+        unit_point(u, v) * self.radius
+    }
+
+    fn partials(&self, u: f64, v: f64) -> [DVec3; 2] {
+        let ([out, turn], (sin, cos)) = (around(u), v.sin_cos());
+        [turn * (self.radius * sin), (out * cos + DVec3::Y * sin) * self.radius]
+    }
+
+    /// At the poles too.
+    fn normal(&self, u: f64, v: f64) -> Result<DVec3, SurfaceError> {
+        Ok(unit_point(u, v))
+    }
+}
+
+/// Exact at both poles, where π's own rounding would leave a circle of 10⁻¹⁶.
+fn unit_point(u: f64, v: f64) -> DVec3 {
+    if v == PI {
+        return DVec3::Y;
+    }
+    let (sin, cos) = v.sin_cos();
+    around(u)[0] * sin - DVec3::Y * cos
+}

@@ -1,0 +1,91 @@
+//! Bounds of distance, cones, and a light as a point meets it.
+
+use glam::DVec3;
+use lumbre_optics::{MAXIMUM_DISTANCE, MINIMUM_COSINE_DIFFERENCE, UNLIMITED_RANGE};
+
+use super::powers::{self, Off};
+use super::{Allowed, FLUSHED, Numbers, U, vectors};
+
+/// attenuate: 13 u of it, and 28 u of (d/range)⁴ times the factor without its window. A distance that is off by so many u itself
+/// adds twice that to the one and four times that to the other.
+pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: f64, roundings: f64) -> f64 {
+    let factor = lumbre_optics::attenuate(coefficients, clamp_to_one, UNLIMITED_RANGE, distance);
+    let end = range.clamp(1e-30, UNLIMITED_RANGE);
+    let ratio = distance.clamp(0.0, MAXIMUM_DISTANCE).min(end) / end;
+    let window = 1.0 - ratio.powi(4);
+    U * factor * ((13.0 + 2.0 * roundings) * window + (28.0 + 4.0 * roundings) * ratio.powi(4)) + FLUSHED
+}
+
+/// spot_factor for a cosine that may be off. Smooth: 15 u, and twice the cosine's error over the width. Exponent: `safe_pow`, and
+/// either side of the edge where the cosine is within its error of it.
+pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine: Off) -> Allowed {
+    let value = lumbre_optics::spot_factor(smooth_cone, outer, inner_or_exponent, cosine.value);
+    if smooth_cone {
+        let width = (inner_or_exponent - outer).max(MINIMUM_COSINE_DIFFERENCE);
+        // Angular, as far as it may reach.
+        let angular = value.sqrt() + cosine.error / width;
+        return Allowed::from(15.0 * U * value + 2.0 * angular.min(1.0) * cosine.error / width + FLUSHED);
+    }
+    let clamped = Off { value: cosine.value.clamp(-1.0, 1.0), ..cosine };
+    let inside = lumbre_optics::safe_pow(clamped.value, inner_or_exponent);
+    let open = cosine.error > 0.0 && (outer - clamped.value).abs() <= cosine.error;
+    let error =
+        if value > 0.0 || open { powers::safe_pow(clamped, Off::exact(inner_or_exponent)) } else { 0.0 };
+    let other = if outer < clamped.value { 0.0 } else { inside };
+    Allowed::from(error).or(open, || Numbers::from_slice(&[other]))
+}
+
+/// evaluate_light: direction, attenuation and spot factor. The direction is a difference made unit; the distance its length, 12 u;
+/// the cosine of the cone a dot product with it.
+pub fn evaluate_light(light: &PlacedLight, point: DVec3) -> Allowed {
+    let to_light = if light.directional { -light.axis } else { light.position - point };
+    let direction = lumbre_optics::safe_normalize(to_light);
+    let of_direction = match light.directional {
+        true => vectors::safe_normalize(to_light),
+        false => vectors::normalized_sum(to_light),
+    };
+    let of_attenuation = match light.directional {
+        true => 0.0,
+        false => attenuate(light.attenuation, false, light.range, to_light.length(), 12.0),
+    };
+    let value = -direction.dot(light.axis);
+    let error = vectors::dot_of(direction, of_direction, light.axis, DVec3::ZERO);
+    let spot = match light.cone {
+        None => Allowed::from(0.0),
+        Some((smooth, outer, second)) => spot_factor(smooth, outer, second, Off { value, error }),
+    };
+    let exact = light.expected(point);
+    let other = spot.other.map(|spot| Numbers::from_iter(exact[..4].iter().copied().chain(spot)));
+    let error = of_direction.to_array().into_iter().chain([of_attenuation, spot.error[0]]).collect();
+    Allowed { error, other }
+}
+
+/// A light as the shader is given it.
+pub struct PlacedLight {
+    pub directional: bool,
+    pub range: f64,
+    pub position: DVec3,
+    pub axis: DVec3,
+    pub attenuation: DVec3,
+    /// Whether smooth, outer cosine, inner cosine or exponent.
+    pub cone: Option<(bool, f64, f64)>,
+}
+
+impl PlacedLight {
+    /// Direction, attenuation and spot factor by the f64 functions that `evaluate_light` is made of, with cosines instead of angles.
+    pub fn expected(&self, point: DVec3) -> [f64; 5] {
+        let to_light = if self.directional { -self.axis } else { self.position - point };
+        let direction = lumbre_optics::safe_normalize(to_light);
+        let attenuation = match self.directional {
+            true => 1.0,
+            false => {
+                let distance = lumbre_optics::safe_length(to_light);
+                lumbre_optics::attenuate(self.attenuation, false, self.range, distance)
+            }
+        };
+        let spot = self.cone.map_or(1.0, |(smooth, outer, second)| {
+            lumbre_optics::spot_factor(smooth, outer, second, -direction.dot(self.axis))
+        });
+        [direction.x, direction.y, direction.z, attenuation, spot]
+    }
+}
