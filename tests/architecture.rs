@@ -143,3 +143,64 @@ fn files_hold_one_concept_each() {
     let long: Vec<_> = lengths.iter().filter(|(lines, path)| *lines > limit(path)).collect();
     assert!(long.is_empty(), "files that hold more than one concept: {long:?}");
 }
+
+/// Where the links of a Markdown page lead, each with the inline code that follows it up to the next link or the end of the line.
+fn links(page: &str) -> Vec<(String, Vec<String>)> {
+    let mut found = Vec::new();
+    for line in page.lines() {
+        let mut parts = line.split("](");
+        parts.next();
+        for part in parts {
+            let Some((target, rest)) = part.split_once(')') else { continue };
+            // What comes before the next link's text.
+            let rest = rest.rsplit_once('[').map_or(rest, |(before, _)| before);
+            let code = rest.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+            found.push((target.to_owned(), code));
+        }
+    }
+    found
+}
+
+#[test]
+fn what_the_documentation_names_exists() {
+    let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let mut tests = 0;
+    for page in ["README.md", "CHANGELOG.md", "docs/documents.md", "docs/decisions.md", "docs/testing.md"] {
+        let page = root.join(page);
+        let text = std::fs::read_to_string(&page).unwrap();
+        for (target, code) in links(&text) {
+            let local = !target.contains("://");
+            let path = page.parent().unwrap().join(target.split('#').next().unwrap_or_default());
+            assert!(!local || path.exists(), "{} names {target}, which is not there", page.display());
+            // Behind a link to a test's file stand the names of tests.
+            let is_name = |code: &&String| {
+                code.contains('_') && code.bytes().all(|c| c == b'_' || c.is_ascii_alphanumeric())
+            };
+            if !page.ends_with("documents.md") || !target.ends_with(".rs") {
+                continue;
+            }
+            let source = std::fs::read_to_string(&path).unwrap();
+            for name in code.iter().filter(is_name) {
+                assert!(source.contains(&format!("fn {name}(")), "{target} has no test `{name}`");
+                tests += 1;
+            }
+        }
+    }
+    // Rows 1 to 23 of the documents, most with a test by name.
+    assert!(tests > 40, "only {tests} tests are named");
+    let rows = std::fs::read_to_string(root.join("docs/documents.md")).unwrap();
+    for row in 1..=23 {
+        assert!(rows.contains(&format!("\n| {row} | ")), "row {row} is missing");
+    }
+    // Negative control.
+    let sample = "see [a](../x/a.rs) `one_test`, `two` and [b](b.md#part) or ![c](c.png)";
+    let expected = [("../x/a.rs", vec!["one_test", "two"]), ("b.md#part", vec![]), ("c.png", vec![])];
+    let found = links(sample);
+    assert_eq!(found.len(), expected.len());
+    for ((target, code), (path, names)) in found.iter().zip(&expected) {
+        assert_eq!(
+            (target.as_str(), code.iter().map(String::as_str).collect::<Vec<_>>()),
+            (*path, names.clone())
+        );
+    }
+}

@@ -18,7 +18,7 @@ const OBJECTS: usize = 60;
 
 // Bytes that the shaders read of one of each (crates/lumbre_render/src/layout.rs asserts these sizes).
 const OBJECT: u64 = 96;
-const MATERIAL: u64 = 256;
+const MATERIAL: u64 = 288;
 const LIGHT: u64 = 96;
 /// Per object in view: which it is, and where its lights stand.
 const INSTANCE: u64 = 16;

@@ -21,7 +21,7 @@ use crate::adapter::{draw, linear};
 const SIZE: usize = 160;
 
 /// As balls.rs has it: f32 against f64, n (a few ulp) for the power, n = 100 at most here: 100 · 4 · 2^-24 = 2.4e-5, and the
-/// position's rounding times the slope of the highlight. Measured at most 1.6e-5.
+/// position's rounding times the slope of the highlight. Measured at most 2.4e-5.
 const LARGEST: f64 = 1e-4;
 
 fn frame(world: &mut World) -> Vec<DVec3> {

@@ -122,7 +122,7 @@ proptest! {
         surface in surface(),
         model in model(),
         lights in prop::collection::vec((color(), place()), 1..4),
-        tilt in [-0.6..0.6f64, -0.6..0.6f64],
+        tilt in [-0.45..0.45f64, -0.45..0.45f64],
     ) {
         let lights: Vec<(Light, DVec3)> = lights
             .into_iter()

@@ -69,9 +69,9 @@ class FixedFunction:
         self.clear(scene.get("background", [0, 0, 0]))
         attenuated = light_state(document, nodes, view, scene)
         fog_state(scene.get("fog"))
-        for _, material in meshes(document, data, nodes, view):
+        for material, draw in meshes(document, data, nodes, view):
             material_state(material, attenuated)
-            yield_to_draw()
+            draw()
         glDisable(GL_FOG)
         return np.clip(self.read()[..., :3], 0.0, 1.0), surfaces
 
@@ -84,18 +84,18 @@ class FixedFunction:
             glDisable(GL_LIGHT0 + light)
         glLightModelfv(GL_LIGHT_MODEL_AMBIENT, [0, 0, 0, 1])
         glLightModeli(GL_LIGHT_MODEL_TWO_SIDE, 1)
-        for number, (_, _) in enumerate(meshes(document, data, nodes, view)):
+        for number, (_, draw) in enumerate(meshes(document, data, nodes, view)):
             for face, side in ((GL_FRONT, 0), (GL_BACK, 1)):
                 for parameter in (GL_AMBIENT, GL_DIFFUSE, GL_SPECULAR):
                     glMaterialfv(face, parameter, [0, 0, 0, 1])
                 glMaterialfv(face, GL_EMISSION, [(2 * number + side + 1) / 16, 0, 0, 1])
-            yield_to_draw()
+            draw()
         surfaces = np.round(16 * self.read()[..., 0])
         if by_triangle:
             self.clear([0, 0, 0])
             glUseProgram(self.triangle_numbers)
-            for _ in meshes(document, data, nodes, view):
-                yield_to_draw()
+            for _, draw in meshes(document, data, nodes, view):
+                draw()
             glUseProgram(0)
             surfaces += 16 * self.read()[..., 0]
         return surfaces.astype(np.float32)
@@ -193,7 +193,7 @@ def material_state(material, attenuated):
 
 
 def meshes(document, data, nodes, view):
-    """Sets up transform, winding and arrays of each primitive in turn: the caller sets the material and draws."""
+    """The material of each primitive and how it is drawn, with its transform, winding and arrays set."""
     for node, place in nodes:
         for primitive in document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []:
             glMatrixMode(GL_MODELVIEW)
@@ -208,4 +208,4 @@ def meshes(document, data, nodes, view):
             glEnableClientState(GL_NORMAL_ARRAY)
             glVertexPointer(3, GL_FLOAT, 0, positions)
             glNormalPointer(GL_FLOAT, 0, normals)
-            yield indices, material
+            yield material, lambda: glDrawElements(GL_TRIANGLES, len(indices), GL_UNSIGNED_INT, indices)

@@ -13,6 +13,7 @@ mod judge;
 mod lights;
 mod microfacets;
 mod negative_controls;
+mod polygons;
 mod refraction;
 mod regressions;
 mod shading;
@@ -42,6 +43,7 @@ fn all() -> &'static [Twin] {
             microfacets::twins(),
             refraction::twins(),
             shading::twins(),
+            polygons::twins(),
             atmosphere::twins(),
         ]
     };

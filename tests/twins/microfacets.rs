@@ -1,7 +1,8 @@
 //! Microfacets: the three distributions, their half-value angles, Torrance and Sparrow's factor.
 
+use glam::DVec3;
 use lumbre_optics::*;
-use lumbre_tests::kernel::Type;
+use lumbre_tests::kernel::{Kernel, Type};
 
 use crate::bounds::microfacets as bound;
 use crate::bounds::powers::{self, Off};
@@ -72,7 +73,7 @@ fn distributions() -> [Twin; 3] {
             .range(0.0, 1.0),
         Twin::new("microfacets", "distribution_gaussian", &[], &[Type::Number; 3], Type::Number)
             .expect(|x| distribution_gaussian(x[0], x[1], x[2]))
-            .within(|x| bound::distribution_gaussian(x[0], x[1], x[2]))
+            .within(|x| bound::distribution_gaussian(Off::exact(x[0]), Off::exact(x[1]), x[2]))
             .random(distribution)
             .corners(hard_distributions())
             .range(0.0, 1.0),
@@ -106,19 +107,13 @@ fn blinn_1977() -> [Twin; 4] {
             .corners(product(&[&[0.0, 1e-38, 1e-16, 1e-7, 1.0], &[0.0, 1e-7, -1.0], &[0.0, 1e-20, 1.0]])),
         Twin::new("torrance_sparrow", "torrance_sparrow_geometry", &[], &lobe_arguments[..4], Type::Number)
             .expect(|x| torrance_sparrow_geometry(vector(x, 0), vector(x, 3), vector(x, 6), x[9]))
-            .within(|x| {
-                let [normal, light, viewer] = directions(x);
-                bound::torrance_sparrow_geometry(normal, light, viewer, x[9])
-            })
+            .within(|x| bound::microfacet_lobe(Distribution::TrowbridgeReitz, directions(x), x[9]))
             .random(lobe)
             .corners(hard_lobes())
             .range_up_to(0.0, 10_000.01, 1e6),
         Twin::new("torrance_sparrow", "torrance_sparrow", &[], &lobe_arguments, Type::Number)
             .expect(|x| torrance_sparrow(vector(x, 0), vector(x, 3), vector(x, 6), x[9], x[10]))
-            .within(|x| {
-                let [normal, light, viewer] = directions(x);
-                bound::torrance_sparrow(normal, light, viewer, x[9], x[10])
-            })
+            .within(|x| bound::torrance_sparrow(directions(x), x[9], x[10]))
             .random(|s| {
                 let mut input = lobe(s);
                 input.push(s.between(1.0, 3.0));
@@ -129,6 +124,56 @@ fn blinn_1977() -> [Twin; 4] {
     ]
 }
 
+fn features(distribution: Distribution) -> &'static [&'static str] {
+    match distribution {
+        Distribution::CosinePower => &["DISTRIBUTION_COSINE_POWER"],
+        Distribution::Gaussian => &["DISTRIBUTION_GAUSSIAN"],
+        Distribution::TrowbridgeReitz => &[],
+    }
+}
+
+fn chosen_lobe(distribution: Distribution) -> Twin {
+    let arguments = [Type::Vector, Type::Vector, Type::Vector, Type::Number];
+    Twin::new("microfacet_reflection", "microfacet_lobe", features(distribution), &arguments, Type::Number)
+        .named(distribution.name())
+        .expect(move |x| microfacet_lobe(distribution, vector(x, 0), vector(x, 3), vector(x, 6), x[9]))
+        .within(move |x| bound::microfacet_lobe(distribution, directions(x), x[9]))
+        .random(lobe)
+        .corners(hard_lobes())
+        .range_up_to(0.0, 10_000.01, 1e6)
+}
+
+/// A metal's constants, the same for all inputs, as a material's are.
+const GOLD: Fresnel = Fresnel::Conductor {
+    eta: glam::Vec3::new(0.17, 0.42, 1.38),
+    absorption: glam::Vec3::new(3.15, 2.35, 1.92),
+};
+
+fn chosen_fresnel(fresnel: Fresnel, feature: &[&str]) -> Twin {
+    let call = "let r = microfacet_reflection(vec3<f32>(x[0], x[1], x[2]), vec3<f32>(x[3], x[4], x[5]),
+        vec3<f32>(x[6], x[7], x[8]), x[9], vec3<f32>(x[10], 0.5 * x[10], 1.0), x[11], vec3<f32>(0.17, 0.42, 1.38),
+        vec3<f32>(3.15, 2.35, 1.92));
+        return array<f32, 3>(r.x, r.y, r.z);";
+    let kernel = Kernel::new("microfacet_reflection", &["microfacet_reflection"], feature, 12, 3, call);
+    let kind = (Distribution::TrowbridgeReitz, fresnel);
+    let specular = |x: &[f64]| DVec3::new(x[10], 0.5 * x[10], 1.0);
+    Twin::around("microfacet_reflection", kernel)
+        .named(fresnel.name())
+        .expect(move |x| {
+            let [normal, light, viewer] = directions(x);
+            microfacet_reflection(kind, normal, light, viewer, x[9], specular(x), x[11])
+        })
+        .within(move |x| bound::microfacet_reflection(kind, directions(x), x[9], specular(x), x[11]))
+        .random(|s| [lobe(s), vec![s.next(), s.between(1.0, 3.0)]].concat())
+        .corners(crossed(&hard_lobes(), &product(&[&[0.0, 0.04, 1.0], &[1.5]])))
+}
+
 pub fn twins() -> Vec<Twin> {
-    angles().into_iter().chain(distributions()).chain(blinn_1977()).collect()
+    let choices = [
+        chosen_fresnel(Fresnel::Dielectric, &[]),
+        chosen_fresnel(GOLD, &["FRESNEL_CONDUCTOR"]),
+        chosen_fresnel(Fresnel::NormalReflectance, &["FRESNEL_NORMAL_REFLECTANCE"]),
+    ];
+    let lobes = Distribution::ALL.iter().copied().map(chosen_lobe);
+    angles().into_iter().chain(distributions()).chain(blinn_1977()).chain(lobes).chain(choices).collect()
 }

@@ -57,7 +57,7 @@ fn hard_rays() -> Vec<Vec<f32>> {
     crossed(&pairs, &product(&[&INDICES]))
 }
 
-fn fresnel() -> [Twin; 3] {
+fn fresnel() -> [Twin; 4] {
     let optical = crossed(
         &product(&[&COSINES]),
         &product(&[&[0.0, 0.2, 1.0], &[0.5], &[3.11], &[0.0, 1e-6, 3.9], &[0.0, 1e4], &[3.31]]),
@@ -66,19 +66,35 @@ fn fresnel() -> [Twin; 3] {
     [
         Twin::new("fresnel", "fresnel_dielectric", &[], &[Type::Number; 2], Type::Number)
             .expect(|x| fresnel_dielectric(x[0], x[1]))
-            .within(|x| refraction::fresnel_dielectric(Off::exact(x[0]), x[1]))
+            .within(|x| refraction::fresnel_dielectric(Off::exact(x[0]), Off::exact(x[1])))
             .random(cosine_and_index)
             .corners(product(&[&COSINES, &INDICES]))
             .range(0.0, 1.000_002),
         Twin::new("fresnel", "fresnel_conductor", &[], &conductor, Type::Vector)
             .expect(|x| fresnel_conductor(x[0], vector(x, 1), vector(x, 4)))
             .within(|x| {
-                let channel = |at: usize| refraction::fresnel_conductor(x[0], x[1 + at], x[4 + at]);
+                let channel =
+                    |at: usize| refraction::fresnel_conductor(Off::exact(x[0]), x[1 + at], x[4 + at]);
                 DVec3::new(channel(0), channel(1), channel(2))
             })
             .random(|s| (0..7).map(|at| if at == 0 { s.next() } else { s.decades(-2.0, 1.0) }).collect())
             .corners(optical)
             .range(0.0, 1.000_005),
+        Twin::new(
+            "microfacet_reflection",
+            "fresnel_normal_reflectance",
+            &[],
+            &[Type::Number, Type::Vector],
+            Type::Vector,
+        )
+        .expect(|x| fresnel_normal_reflectance(x[0], vector(x, 1)))
+        .within(|x| {
+            let channel = |at: usize| refraction::fresnel_normal_reflectance(Off::exact(x[0]), x[at]);
+            DVec3::new(channel(1), channel(2), channel(3))
+        })
+        .random(|s| vec![s.next(), s.next(), s.decades(-6.0, 0.0), 1.0 - s.decades(-6.0, 0.0)])
+        .corners(product(&[&COSINES, &[0.0, 0.04, 1.0], &[1e-38, 1e-6, 0.5], &[0.9, 0.9998, 2.0]]))
+        .range(0.0, 1.000_002),
         Twin::new("fresnel", "fresnel_schlick", &[], &[Type::Number, Type::Vector], Type::Vector)
             .expect(|x| fresnel_schlick(x[0], vector(x, 1)))
             .within(|x| refraction::fresnel_schlick(x[0], vector(x, 1)))

@@ -42,7 +42,14 @@ fn turned(v: DVec3) -> [DVec3; 3] {
 
 fn samples(x: &[f64]) -> (SurfaceSample, LightSample, DVec3, DVec3) {
     let [ambient, diffuse, specular] = turned(vector(x, 0));
-    let surface = SurfaceSample { ambient, diffuse, specular, shininess: x[6], ior: x[7] };
+    let surface = SurfaceSample {
+        ambient,
+        diffuse,
+        specular,
+        shininess: x[6],
+        ior: x[7],
+        ..SurfaceSample::from(&lumbre_optics::Surface::default())
+    };
     let [ambient, diffuse, specular] = turned(vector(x, 3));
     let direction = vector(x, 8);
     let light = LightSample { ambient, diffuse, specular, direction, attenuation: x[11], spot: x[12] };

@@ -114,7 +114,7 @@ fn implicit_and_parametric_forms_agree_and_differences_find_them() {
                 }
             }
         }
-        println!(
+        eprintln!(
             "{name:9} forms {forms:.1e}, partials {from_partials:.1e}, points {from_points:.1e}, values {from_values:.1e}, \
              tangents {tangents:.1e}"
         );

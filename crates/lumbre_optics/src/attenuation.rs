@@ -98,6 +98,14 @@ const MINIMUM_DENOMINATOR: f64 = 1e-30;
 ///
 /// The denominator is at least what b and c alone give at [`MINIMUM_DISTANCE`]. Constant attenuation (a, 0,
 /// 0) is exactly 1/a at any distance, the light's own position included, as where OpenGL skips the distance.
+///
+/// # Error of the f32 twin
+///
+/// At most 13 u of the factor, and 28 u (d/range)⁴ of the factor without its window. The denominator is a sum
+/// of positive terms, with the rounded constants 6 u of it; the division 5 u, window and product 2 u. The
+/// ratio, a division by a rounded end, is off by 6 u, its fourth power by 27 u, which the difference from 1
+/// turns into an absolute error: near its range a light is off by much of the little that is left of it.
+/// Nothing else cancels.
 pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: f64) -> f64 {
     let limited = distance.clamp(0.0, MAXIMUM_DISTANCE);
     let full = coefficients.x + (coefficients.y + coefficients.z * limited) * limited;

@@ -43,6 +43,14 @@ impl LightSample {
 /// OpenGL's rules: a directional light is not attenuated, and a spot narrows it too; the ambient colour takes
 /// both factors. At the light's own position there is no direction, so only the ambient part is left there
 /// (with a cone, not even that).
+///
+/// # Error of the f32 twin
+///
+/// Direction: 9 u of each component, a difference made unit; 7 u for a directional light. Attenuation: that
+/// of [`attenuate`](crate::attenuate), its 13 u and 28 u as 37 u and 76 u for a distance that is off by 12 u
+/// (difference, square and a root of 9 u) under a law of at most the second power. Spot: that of
+/// [`spot_factor`] for a cosine that is off by 12 u Σ|l axis|, and within that of the edge either side's
+/// value. Colours are copied.
 pub fn evaluate_light(light: &Light, light_position: DVec3, light_axis: DVec3, point: DVec3) -> LightSample {
     if !light.enabled {
         return LightSample::DARK;

@@ -3,6 +3,11 @@
 use glam::DVec3;
 
 /// max(n·l, 0) of unit vectors, at most 1. Zero for a zero normal or a light behind.
+///
+/// # Error of the f32 twin
+///
+/// 3 u Σ|n l|, absolute: each product is rounded, and summed twice, in any order. For unit vectors at most 3
+/// u √3, in fact seldom above 2 u. Relatively anything where light grazes.
 pub fn lambert(normal: DVec3, light: DVec3) -> f64 {
     normal.dot(light).clamp(0.0, 1.0)
 }

@@ -23,6 +23,12 @@
 //! its `try_` twin says so with `None`. What may not be loaded at all, [`Light::validate`],
 //! [`Material::validate`] and [`Fog::validate`] refuse by name.
 //!
+//! How far the shaders' f32 may be off, each function says under "Error of the f32 twin", in terms of u = 2⁻²⁴, the relative error of
+//! one rounding (half a unit in the last place), from what WGSL guarantees: sums, differences and products u, division 5 u,
+//! inverseSqrt 4 u, roots 9 u, exp 2 u (3 + 2 |x|), log2 8 u absolute in [1/2, 2] and 6 u of itself elsewhere. To first order, and
+//! besides a few times 2⁻¹²⁶, below which numbers may be taken for 0. The test target `twins` holds the same bounds as functions and a
+//! device to them, over a million inputs each.
+//!
 //! ```
 //! use glam::{DVec3, Vec3};
 //! use lumbre_optics::{Light, Material, ReflectionModel, evaluate_light, light_contribution};
@@ -50,6 +56,7 @@ mod light;
 mod light_validation;
 mod material;
 mod material_validation;
+mod microfacet_reflection;
 mod microfacets;
 mod normalization;
 mod phong;
@@ -83,6 +90,9 @@ pub use light::{BakeMode, Light, LightKind};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
 pub use material_validation::MaterialError;
+pub use microfacet_reflection::{
+    Distribution, Fresnel, fresnel_normal_reflectance, microfacet_lobe, microfacet_reflection,
+};
 pub use microfacets::{
     distribution_cosine_power, distribution_gaussian, distribution_trowbridge_reitz, half_value_angle,
     half_value_sine_squared,
@@ -94,7 +104,9 @@ pub use polygon_light::{
 };
 pub use power::{cosine_lobe, power_of_cosine, safe_pow};
 pub use roughness::{MAX_SHININESS, shininess_from_roughness};
-pub use shade::{Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, shade, specular_factor};
+pub use shade::{
+    Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, shade, specular_factor, specular_reflection,
+};
 pub use shading::{FlatRule, ReflectionModel, Shading};
 pub use snell::{
     critical_angle, is_totally_reflected, transmitted_cosine, transmitted_direction, transmitted_highlight,

@@ -4,6 +4,7 @@
 use bevy_ecs::component::Component;
 use glam::Vec3;
 
+use crate::microfacet_reflection::{Distribution, Fresnel};
 use crate::roughness::{MAX_SHININESS, shininess_from_roughness};
 
 /// The Phong coefficients of one side of a surface. All linear RGB in [0, 1] except emission, which is at
@@ -84,6 +85,10 @@ pub struct Material {
     pub transmission: Vec3,
     /// Index of refraction, at least 1 (1.5 by default).
     pub ior: f32,
+    /// Spread of the microfacets (Torrance-Sparrow only).
+    pub distribution: Distribution,
+    /// What the microfacets reflect (Torrance-Sparrow only).
+    pub fresnel: Fresnel,
 }
 
 impl Default for Material {
@@ -98,6 +103,8 @@ impl Default for Material {
             mirror: Vec3::ZERO,
             transmission: Vec3::ZERO,
             ior: 1.5,
+            distribution: Distribution::default(),
+            fresnel: Fresnel::default(),
         }
     }
 }
@@ -127,7 +134,7 @@ impl Material {
             emission: Vec3::ZERO,
             shininess: shininess_from_roughness(roughness),
         };
-        Self { front, ..Self::default() }
+        Self { front, fresnel: Fresnel::NormalReflectance, ..Self::default() }
     }
 }
 

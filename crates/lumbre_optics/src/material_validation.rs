@@ -4,7 +4,7 @@
 use thiserror::Error;
 
 use crate::validation::{color_fault, fault};
-use crate::{AlphaMode, Material, Surface};
+use crate::{AlphaMode, Fresnel, Material, Surface};
 
 /// Why a material is refused.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -45,6 +45,14 @@ impl Material {
     /// # Errors
     /// [`MaterialError`], the first fault in the order of the fields.
     pub fn validate(&self, name: &str) -> Result<(), MaterialError> {
+        if let Fresnel::Conductor { eta, absorption } = self.fresnel {
+            for (field, value) in [("eta", eta), ("absorption", absorption)] {
+                if let Some((value, reason)) = color_fault(value) {
+                    let (material, field) = (name.to_owned(), format!("fresnel.{field}"));
+                    return Err(MaterialError::Number { material, field, value, reason });
+                }
+            }
+        }
         validate_surface(&self.front, name, "front")?;
         if let Some(back) = &self.back {
             validate_surface(back, name, "back")?;

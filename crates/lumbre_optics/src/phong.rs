@@ -6,6 +6,11 @@ use glam::DVec3;
 use crate::power::cosine_lobe;
 
 /// r = 2 (l·n) n - l: the direction in which a mirror with unit normal n sends light that comes from l.
+///
+/// # Error of the f32 twin
+///
+/// 2 u |n| (3 Σ|l n| + |l·n|) + u |r| for each component: three roundings of each product in l·n, two of the
+/// product with n, one of the difference.
 pub fn reflected_direction(normal: DVec3, light: DVec3) -> DVec3 {
     2.0 * light.dot(normal) * normal - light
 }
@@ -14,6 +19,12 @@ pub fn reflected_direction(normal: DVec3, light: DVec3) -> DVec3 {
 /// surface.
 ///
 /// Exponent 0 makes it a step on n·l > 0.
+///
+/// # Error of the f32 twin
+///
+/// That of [`cosine_lobe`] around a [`reflected_direction`] that is off itself: about n 9 u tan of the angle
+/// from the peak, relative. Where |n·l| is at most 3 u Σ|n l| either side of the gate is right: 0, or the
+/// lobe.
 pub fn phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     if normal.dot(light) <= 0.0 {
         return 0.0;

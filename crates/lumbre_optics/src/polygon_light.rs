@@ -152,10 +152,12 @@ pub fn polygon_form_factor(
     let mut horizon = None;
     let (mut sets, mut rises) = (DVec3::ZERO, DVec3::ZERO);
     let mut start = -middle;
-    let mut before = height + normal.dot(start);
-    for edge in [edge_u, third - edge_u, edge_v - third, -edge_v] {
+    let first = height + normal.dot(start);
+    let mut before = first;
+    for (index, edge) in [edge_u, third - edge_u, edge_v - third, -edge_v].into_iter().enumerate() {
         let end = start + edge;
-        let after = height + normal.dot(end);
+        // The contour ends where it began: as often above the horizon as below, however a corner on it is rounded.
+        let after = if index == 3 { first } else { height + normal.dot(end) };
         if before >= 0.0 || after >= 0.0 {
             let (mut visible_start, mut visible_edge) = (start, edge);
             if (before < 0.0) != (after < 0.0) {

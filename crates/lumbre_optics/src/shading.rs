@@ -26,8 +26,8 @@ pub enum FlatRule {
     LastVertex,
 }
 
-/// The specular model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+/// The specular model. As a component it overrides the scene's choice for one object.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum ReflectionModel {
     /// (r·v)^n, Phong 1975.
     #[default]

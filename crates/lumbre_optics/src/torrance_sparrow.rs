@@ -15,6 +15,10 @@ pub const MINIMUM_VIEW_COSINE: f64 = 1e-4;
 /// v·h.
 ///
 /// Each term is divided by n·v by itself, so that the second has no n·v left to vanish. Clamped to [0, 10⁴].
+///
+/// # Error of the f32 twin
+///
+/// 13 u of it: two divisions, a product, two rounded clamps. No differences.
 pub fn geometric_attenuation(n_light: f64, n_viewer: f64, n_half: f64, v_half: f64) -> f64 {
     let viewer = n_viewer.max(MINIMUM_VIEW_COSINE);
     let ratio = 2.0 * n_half.max(0.0) / v_half.max(MINIMUM_VIEW_COSINE);
@@ -23,6 +27,13 @@ pub fn geometric_attenuation(n_light: f64, n_viewer: f64, n_half: f64, v_half: f
 
 /// D G / (n·v) with the distribution of Trowbridge and Reitz, where light and viewer are in front, else 0:
 /// the model without its Fresnel factor, for conductors. All directions unit. In [0, 10⁴].
+///
+/// # Error of the f32 twin
+///
+/// D: that of [`distribution_trowbridge_reitz`] for a sine that is off by about 12 u (n × h, h being off by 9
+/// u): at n = 10⁶, where the lobe is .002 wide, 10⁻³ of it. G/(n·v): 13 u, and its changes over the errors of
+/// its cosines, 3 u Σ|n l|, 3 u Σ|n v|, 12 u Σ|n h| and 12 u of v·h, which count by themselves over n·v where
+/// the viewer grazes. Either side of n·l > 0 and n·v > 0 where those are within rounding.
 pub fn torrance_sparrow_geometry(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
     let (n_light, n_viewer) = (normal.dot(light), normal.dot(viewer));
     if n_light <= 0.0 || n_viewer <= 0.0 {
@@ -46,6 +57,11 @@ fn cosine_to_half(sum: DVec3) -> f64 {
 /// `shininess` is the exponent of n·h at whose half-value angle D falls to a half. Used like the other
 /// specular factors: times k_s and the light's colour, not times n·l. Reciprocal as a reflectance: its
 /// product with n·v is symmetric in l and v.
+///
+/// # Error of the f32 twin
+///
+/// [`torrance_sparrow_geometry`]'s times F, [`fresnel_dielectric`]'s times the rest for a cosine that is off
+/// by 12 u, and u.
 pub fn torrance_sparrow(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, ior: f64) -> f64 {
     let fresnel = fresnel_dielectric(cosine_to_half(light + viewer), ior);
     torrance_sparrow_geometry(normal, light, viewer, shininess) * fresnel

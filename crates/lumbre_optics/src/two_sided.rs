@@ -6,11 +6,20 @@ use crate::normalization::try_normalize;
 
 /// The normal, reversed on the back of a face: two-sided lighting of OpenGL 2.1 §2.14.1, where the front is
 /// the side whose corners wind counter-clockwise on the screen.
+///
+/// # Error of the f32 twin
+///
+/// None: a sign.
 pub fn facing_normal(normal: DVec3, front_facing: bool) -> DVec3 {
     if front_facing { normal } else { -normal }
 }
 
 /// A unit normal from an interpolated one, or the face's own unit normal where interpolation cancelled it.
+///
+/// # Error of the f32 twin
+///
+/// That of [`safe_normalize`](crate::safe_normalize). For interpolated normals shorter than 7·10⁻¹⁶ the
+/// face's own; within 20 u of that length either.
 pub fn shading_normal(interpolated: DVec3, face_normal: DVec3) -> DVec3 {
     try_normalize(interpolated).unwrap_or(face_normal)
 }

@@ -8,6 +8,11 @@ use crate::normalization::safe_normalize;
 ///
 /// A local viewer stands at `eye`; an infinitely distant one is seen along `backward`, the camera's own +Z
 /// axis (unit, from the scene to the camera), from everywhere. Zero where the point is the eye itself.
+///
+/// # Error of the f32 twin
+///
+/// 9 u of each component for a local viewer, as of a half vector: the difference of two positions is rounded
+/// once per component. None for a distant one. How well the positions themselves are known is another matter.
 pub fn viewer_direction(local_viewer: bool, eye: DVec3, backward: DVec3, point: DVec3) -> DVec3 {
     if local_viewer { safe_normalize(eye - point) } else { backward }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Explanation, TextureDescriptor};
-use lumbre_optics::{Material, Shading};
+use lumbre_optics::{Material, ReflectionModel, Shading};
 use lumbre_scene::{Census, Hidden, Lightmap, MaterialTextures, Mesh, SceneSettings};
 
 use crate::extract::{FrameFeatures, LightSet, Traits};
@@ -40,7 +40,7 @@ pub fn explain(
     }
     let features = FrameFeatures {
         shading: options.shading,
-        reflection: options.reflection.unwrap_or(settings.reflection),
+        reflection: options.reflection,
         specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
         lightmaps: options.lightmaps,
         clamp: options.display == Display::Clamp,
@@ -51,12 +51,12 @@ pub fn explain(
         &Material,
         Option<&MaterialTextures>,
         Has<Lightmap>,
-        Option<&Shading>,
+        (Option<&Shading>, Option<&ReflectionModel>),
     ), Without<Hidden>>();
     let traits: Vec<Traits> = query
         .iter(world)
-        .map(|(mesh, material, maps, lightmap, shading)| {
-            Traits::new(material, maps, &mesh.0, lightmap, shading.copied())
+        .map(|(mesh, material, maps, lightmap, (shading, reflection))| {
+            Traits::new(material, maps, &mesh.0, lightmap, (shading.copied(), reflection.copied()))
         })
         .collect();
     let mut variants = BTreeMap::new();

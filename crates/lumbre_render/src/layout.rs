@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use lumbre_optics::{Light, LightKind, Material, PolygonLight, SpotCone, SpotCosines, Surface};
+use lumbre_optics::{Fresnel, Light, LightKind, Material, PolygonLight, SpotCone, SpotCosines, Surface};
 use lumbre_scene::{GlobalTransform, MaterialTextures, TextureReference};
 
 /// `Frame`.
@@ -131,6 +131,8 @@ pub(crate) struct MaterialData {
     metallic_roughness: CoordinatesData,
     base_and_metallic: [f32; 4],
     roughness: [f32; 4],
+    eta: [f32; 4],
+    absorption: [f32; 4],
 }
 
 impl MaterialData {
@@ -140,6 +142,10 @@ impl MaterialData {
         let none = MaterialTextures::default();
         let textures = textures.unwrap_or(&none);
         let mapped = textures.metallic_roughness.as_ref();
+        let (eta, absorption) = match material.fresnel {
+            Fresnel::Conductor { eta, absorption } => (eta, absorption),
+            Fresnel::Dielectric | Fresnel::NormalReflectance => (Vec3::ZERO, Vec3::ZERO),
+        };
         Self {
             front,
             back,
@@ -148,6 +154,8 @@ impl MaterialData {
             metallic_roughness: CoordinatesData::new(mapped.map(|mapped| &mapped.texture)),
             base_and_metallic: mapped.map_or([0.0; 4], |m| m.base_color.extend(m.metallic).to_array()),
             roughness: mapped.map_or([0.0; 4], |m| [m.roughness, 0.0, 0.0, 0.0]),
+            eta: eta.extend(0.0).to_array(),
+            absorption: absorption.extend(0.0).to_array(),
         }
     }
 }
@@ -224,7 +232,7 @@ mod tests {
     fn sizes_are_those_of_the_shaders() {
         assert_eq!(size_of::<FrameData>(), 144);
         assert_eq!(size_of::<ObjectData>(), 96);
-        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 32);
+        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 4 * 16);
         assert_eq!(size_of::<LightData>(), 96);
     }
 }

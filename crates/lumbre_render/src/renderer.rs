@@ -135,7 +135,7 @@ impl Renderer {
         plan.choose_formats(&self.gpu, target, options, exposure);
         let features = FrameFeatures {
             shading: options.shading,
-            reflection: options.reflection.unwrap_or(settings.reflection),
+            reflection: options.reflection,
             specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
             lightmaps: options.lightmaps,
             clamp: options.display == Display::Clamp,

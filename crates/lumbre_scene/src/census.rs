@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, Shading};
+use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, ReflectionModel, Shading};
 use serde::Serialize;
 
 use crate::{
@@ -90,6 +90,8 @@ pub struct Census {
     pub gouraud: usize,
     /// Meshes shaded per fragment.
     pub phong: usize,
+    /// Lit meshes with a specular model of their own.
+    pub own_reflection: usize,
     /// Whether there is fog.
     pub fog: bool,
     /// Cameras.
@@ -152,9 +154,9 @@ impl Census {
         let mut images = HashSet::new();
         let mut query = world.query::<(
             (&Mesh, &Material, Has<Hidden>, Has<StaticObject>, Has<DynamicObject>, Has<EmissiveLight>),
-            (Option<&MaterialTextures>, Option<&Lightmap>, Option<&Shading>),
+            (Option<&MaterialTextures>, Option<&Lightmap>, Option<&Shading>, Option<&ReflectionModel>),
         )>();
-        for ((mesh, material, hidden, fixed, moves, shines), (textures, lightmap, shading)) in
+        for ((mesh, material, hidden, fixed, moves, shines), (textures, lightmap, shading, reflection)) in
             query.iter(world)
         {
             if hidden {
@@ -188,6 +190,7 @@ impl Census {
             self.emissive_lights += usize::from(shines && emits);
             self.count_material(material, settings);
             if !material.unlit {
+                self.own_reflection += usize::from(reflection.is_some());
                 *match shading.copied().unwrap_or(settings.shading) {
                     Shading::Flat => &mut self.flat,
                     Shading::Gouraud => &mut self.gouraud,
@@ -254,6 +257,12 @@ impl Census {
             mesh("flat shading", self.flat, "shaded per face", "no lit mesh asks for it"),
             mesh("Gouraud shading", self.gouraud, "shaded per vertex", "no lit mesh asks for it"),
             mesh("Phong shading", self.phong, "shaded per fragment", "no lit mesh asks for it"),
+            mesh(
+                "own reflection models",
+                self.own_reflection,
+                "with a specular model of its own",
+                "all take the scene's",
+            ),
             scene(
                 "global ambient",
                 self.global_ambient,

@@ -271,7 +271,7 @@ fn materials_by_phong() {
     assert_eq!(defaults, Material { front, ..Material::default() });
     let all = phong(
         json!({"ambient": [0.1, 0, 0], "specular": [0, 0.2, 0], "emission": [0, 0, 3], "shininess": 128,
-        "back": {"diffuse": [1, 1, 0]}, "mirror": [0.5, 0.5, 0.5], "transmission": [0, 0, 0.25], "ior": 1.25}),
+        "back": {"diffuse": [1, 1, 0]}, "distribution": "gaussian", "eta": [0.2, 0.4, 1.4], "absorption": [3, 2.5, 2], "mirror": [0.5, 0.5, 0.5], "transmission": [0, 0, 0.25], "ior": 1.25}),
     );
     let front = Surface {
         ambient: Vec3::new(0.1, 0.0, 0.0),
@@ -282,7 +282,13 @@ fn materials_by_phong() {
     };
     let back = Some(Surface { diffuse: Vec3::new(1.0, 1.0, 0.0), ..front });
     let (mirror, transmission) = (Vec3::splat(0.5), Vec3::new(0.0, 0.0, 0.25));
-    assert_eq!(all, Material { front, back, mirror, transmission, ior: 1.25, ..Material::default() });
+    let (distribution, ior) = (Distribution::Gaussian, 1.25);
+    let fresnel = Fresnel::Conductor { eta: Vec3::new(0.2, 0.4, 1.4), absorption: Vec3::new(3.0, 2.5, 2.0) };
+    let rest = Material::default();
+    assert_eq!(all, Material { front, back, mirror, transmission, ior, distribution, fresnel, ..rest });
+    // What glTF itself says: k_s is the reflectance at normal incidence.
+    let plain = material(json!({"pbrMetallicRoughness": {"metallicFactor": 0.5}}));
+    assert_eq!(plain.fresnel, Fresnel::NormalReflectance);
 }
 
 #[test]

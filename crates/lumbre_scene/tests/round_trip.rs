@@ -106,6 +106,11 @@ fn everything() -> World {
             mirror: Vec3::splat(0.1),
             transmission: Vec3::new(0.0, 0.2, 0.0),
             ior: 1.33,
+            distribution: Distribution::Gaussian,
+            fresnel: Fresnel::Conductor {
+                eta: Vec3::new(0.17, 0.42, 1.38),
+                absorption: Vec3::new(3.1, 2.4, 1.9),
+            },
         },
         Material {
             unlit: true,
@@ -134,7 +139,7 @@ fn everything() -> World {
             if index == 0 {
                 primitive.insert(textured.clone());
             }
-            primitive.insert((Shading::Flat, Lightmap { image: lightmap.clone() }));
+            primitive.insert((Shading::Flat, ReflectionModel::Blinn4n, Lightmap { image: lightmap.clone() }));
         }
     }
     let cart = world.spawn((Name::new("cart"), Transform::IDENTITY, DynamicObject)).id();

@@ -30,13 +30,11 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
     let mut lights = world.query::<(&Light, &GlobalTransform)>();
     let lights =
         lights.iter(world).map(|(light, at)| (light.clone(), at.translation(), at.forward())).collect();
-    let reflection = options.reflection.unwrap_or(settings.reflection);
     let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
     let specular_antialiasing = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
     let objects = collect(world, &settings, &options);
     let polygons = objects.iter().flat_map(Object::polygons).collect();
-    let scene =
-        Scene { settings, reflection, flat_rule, specular_antialiasing, lights, polygons, eye, basis };
+    let scene = Scene { settings, flat_rule, specular_antialiasing, lights, polygons, eye, basis };
 
     let mut frame = TwinFrame {
         width,

@@ -19,7 +19,6 @@ pub(super) struct Vertex {
 
 pub(super) struct Scene {
     pub(super) settings: SceneSettings,
-    pub(super) reflection: ReflectionModel,
     pub(super) flat_rule: FlatRule,
     pub(super) specular_antialiasing: bool,
     pub(super) lights: Vec<(Light, DVec3, DVec3)>,
@@ -41,6 +40,7 @@ pub(super) struct Object {
     pub(super) index: usize,
     pub(super) material: Material,
     pub(super) shading: Shading,
+    pub(super) reflection: ReflectionModel,
     pub(super) lightmap: Option<Arc<LightmapImage>>,
     pub(super) triangles: Vec<[Vertex; 3]>,
     /// Its transform mirrors: the second and third corner of every triangle have changed places.
@@ -81,8 +81,9 @@ impl Object {
     }
 }
 
+type Choices<'a> = (Option<&'a Shading>, Option<&'a ReflectionModel>);
 type Found<'a> =
-    (&'a Mesh, &'a Material, &'a GlobalTransform, Option<&'a Shading>, Option<&'a Lightmap>, (bool, bool));
+    (&'a Mesh, &'a Material, &'a GlobalTransform, Choices<'a>, Option<&'a Lightmap>, (bool, bool));
 
 /// The objects that are seen.
 pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &TwinOptions) -> Vec<Object> {
@@ -90,12 +91,12 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
         &Mesh,
         &Material,
         &GlobalTransform,
-        Option<&Shading>,
+        (Option<&Shading>, Option<&ReflectionModel>),
         Option<&Lightmap>,
         (Has<EmissiveLight>, Has<StaticObject>),
     ), Without<Hidden>>();
     let object = |(index, found): (usize, Found<'_>)| {
-        let (mesh, material, place, shading, lightmap, (shines, fixed)) = found;
+        let (mesh, material, place, (shading, reflection), lightmap, (shines, fixed)) = found;
         // Of unit size, so that what counts as no normal does not depend on the scale.
         let normals = place.normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
@@ -114,6 +115,7 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
             emissive_light: shines.then_some(fixed),
             material: material.clone(),
             shading: options.shading.or(shading.copied()).unwrap_or(settings.shading),
+            reflection: options.reflection.or(reflection.copied()).unwrap_or(settings.reflection),
             mirrored: place.mirrors(),
             lightmap: lightmap.map(|lightmap| Arc::clone(&lightmap.image)),
             triangles: mesh

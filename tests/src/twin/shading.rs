@@ -95,10 +95,10 @@ impl<'a> ShadedTriangle<'a> {
         let mut surface = SurfaceSample::new(&self.object.material, front);
         if widening > 0.0 {
             let of_half_vector =
-                matches!(scene.reflection, ReflectionModel::Blinn | ReflectionModel::TorranceSparrow);
+                matches!(self.object.reflection, ReflectionModel::Blinn | ReflectionModel::TorranceSparrow);
             let lobe = filtered_lobe(surface.shininess, if of_half_vector { 1.0 } else { 4.0 }, widening);
             surface.shininess = lobe.shininess;
-            surface.specular *= lobe.peak;
+            surface.peak = lobe.peak;
         }
         let normal = facing_normal(normal, front);
         let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
@@ -109,7 +109,7 @@ impl<'a> ShadedTriangle<'a> {
         }
         for (light, position, axis) in &scene.lights {
             let sample: LightSample = evaluate_light(light, *position, *axis, point);
-            let mut added = light_contribution(scene.reflection, surface, &sample, normal, viewer);
+            let mut added = light_contribution(self.object.reflection, surface, &sample, normal, viewer);
             if mapped && light.kind == LightKind::Ambient {
                 added = Contribution::ZERO;
             }
@@ -121,7 +121,7 @@ impl<'a> ShadedTriangle<'a> {
         for polygon in scene.polygons.iter().filter(|polygon| polygon.emitter != self.object.index) {
             let light = &polygon.light;
             let mut added =
-                polygon_light_contribution(scene.reflection, surface, light, point, normal, viewer);
+                polygon_light_contribution(self.object.reflection, surface, light, point, normal, viewer);
             if mapped && polygon.baked {
                 added.diffuse = DVec3::ZERO;
             }

@@ -1,12 +1,12 @@
 //! Bounds of the distributions of microfacets and of Blinn's model of 1977.
 
-use std::f64::consts::{FRAC_PI_4, LN_2, SQRT_2};
+use std::f64::consts::{LN_2, SQRT_2};
 
 use glam::DVec3;
-use lumbre_optics as optics;
+use lumbre_optics::{self as optics, Distribution, Fresnel};
 
 use super::powers::{Off, exponential, grown};
-use super::{Allowed, FLUSHED, Numbers, U, refraction, vectors};
+use super::{Allowed, FLUSHED, Numbers, U, powers, refraction, vectors};
 
 /// quarter_angle: 9 u.
 pub fn quarter_angle(sine: f64, cosine: f64) -> f64 {
@@ -46,21 +46,30 @@ pub fn half_value_angle(shininess: f64) -> f64 {
     slope * (of_sine + of_cosine) + 9.0 * U * optics::half_value_angle(shininess) + 2.0 * FLUSHED
 }
 
-/// distribution_gaussian: the angle's and the half-value angle's errors twice, and 20 u, of the exponent; exp.
-pub fn distribution_gaussian(cosine: f64, sine_squared: f64, shininess: f64) -> f64 {
-    let sine = sine_squared.max(0.0).sqrt();
-    let cosine = cosine.clamp(0.0, 1.0);
-    let angle = optics::quarter_angle(sine, cosine);
-    // The root's 9 u move the angle by sin cos of it over sin² + cos².
-    let moved = 9.0 * U * sine * cosine / (sine_squared.max(0.0) + cosine * cosine).max(1e-30);
-    let of_angle =
-        (quarter_angle(sine, cosine) + moved.min(9.0 * U * angle.max(FRAC_PI_4))) / angle.max(1e-30);
+/// distribution_gaussian: the angle's and the half-value angle's errors twice, and 4 u, of the exponent; exp. The cosine and the
+/// squared sine may be off themselves, which moves the angle from one end to the other.
+pub fn distribution_gaussian(cosine: Off, sine_squared: Off, shininess: f64) -> f64 {
+    let angle_of =
+        |square: f64, cosine: f64| optics::quarter_angle(square.max(0.0).sqrt(), cosine.clamp(0.0, 1.0));
+    let angle = angle_of(sine_squared.value, cosine.value);
+    let of_square = sine_squared.error + FLUSHED;
+    let wide = angle_of(sine_squared.value + of_square, cosine.value - cosine.error);
+    let narrow = angle_of(sine_squared.value - of_square, cosine.value + cosine.error);
+    // The root's 9 u turn the angle by sin cos of that; the angle's own 9 u.
+    let own = 9.0 * U * (angle + angle.sin() * angle.cos()) + 2.0 * FLUSHED;
     let beta = optics::half_value_angle(shininess).max(1e-6);
-    let of_ratio = of_angle + half_value_angle(shininess) / beta + 6.0 * U;
-    let exponent = LN_2 * (angle / beta).powi(2).min(100.0);
-    let value = (-exponent).exp();
-    let flushed = if sine_squared.abs() < 4.0 * FLUSHED { 1e-7 } else { 0.0 };
-    value * grown(exponent * (2.0 * of_ratio + 4.0 * U) + exponential(exponent)) + flushed + FLUSHED
+    let of_beta = half_value_angle(shininess) / beta;
+    let at = |angle: f64| {
+        let exponent = LN_2 * (angle / beta).powi(2).min(100.0);
+        ((-exponent).exp(), exponent)
+    };
+    let roundings = |angle: f64| {
+        let (value, exponent) = at(angle);
+        let of_ratio = own / angle.max(1e-30) + of_beta + 6.0 * U;
+        value * grown(exponent * (2.0 * of_ratio.min(1.0) + 4.0 * U) + exponential(exponent))
+    };
+    let (value, high, low) = (at(angle).0, at(narrow).0, at(wide).0);
+    (high - value).max(value - low) + roundings(angle).max(roundings(narrow)) + FLUSHED
 }
 
 /// distribution_trowbridge_reitz: q = A/(A + B), A = c₃², B = sin² (1 - A), off by q (1 - q) times the relative errors of A and B, and
@@ -90,17 +99,28 @@ pub fn cosine_to_half(sum: DVec3) -> f64 {
     12.0 * U * 0.5 * sum.length_squared().max(1e-30).sqrt() + FLUSHED
 }
 
-/// torrance_sparrow_geometry: D with the error of sin², G with those of its cosines; the product. Either side of n·l > 0 and n·v > 0.
-pub fn torrance_sparrow_geometry(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> Allowed {
-    let (value, other, error) = geometry(normal, light, viewer, shininess);
-    let open = vectors::is_open(normal, light) || vectors::is_open(normal, viewer);
-    let here = optics::torrance_sparrow_geometry(normal, light, viewer, shininess);
-    debug_assert!(here == 0.0 || (here - value).abs() <= 1e-9 * value);
-    Allowed::from(error).or(open, || Numbers::from_slice(&[if here > 0.0 { 0.0 } else { other }]))
+/// D for cosines that are off themselves.
+fn density(distribution: Distribution, cosine: Off, sine_squared: Off, shininess: f64) -> Off {
+    let (c, s) = (cosine.value, sine_squared.value);
+    let (value, error) = match distribution {
+        Distribution::CosinePower => (
+            optics::distribution_cosine_power(c, s, shininess),
+            powers::power_of_cosine(cosine, sine_squared, Off::exact(shininess)),
+        ),
+        Distribution::Gaussian => (
+            optics::distribution_gaussian(c, s, shininess),
+            distribution_gaussian(cosine, sine_squared, shininess),
+        ),
+        Distribution::TrowbridgeReitz => (
+            optics::distribution_trowbridge_reitz(s, shininess),
+            distribution_trowbridge_reitz(sine_squared, shininess),
+        ),
+    };
+    Off { value, error }
 }
 
-/// The value without its gates, the same once more, and its error.
-fn geometry(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> (f64, f64, f64) {
+/// D G / (n·v) without its gates.
+fn geometry(distribution: Distribution, [normal, light, viewer]: [DVec3; 3], shininess: f64) -> Off {
     let sum = light + viewer;
     let half = optics::safe_normalize(sum);
     let of_half = vectors::normalized_sum(sum);
@@ -109,42 +129,83 @@ fn geometry(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> (f64,
         + FLUSHED;
     let sine = normal.cross(half).length();
     let of_square = of_cross * (2.0 * sine + of_cross) + 3.0 * U * sine * sine + FLUSHED;
-    let distribution = optics::distribution_trowbridge_reitz(sine * sine, shininess);
-    let of_distribution =
-        distribution_trowbridge_reitz(Off { value: sine * sine, error: of_square }, shininess);
-    let (n_light, n_viewer, n_half) = (normal.dot(light), normal.dot(viewer), normal.dot(half));
+    let n_half = Off { value: normal.dot(half), error: vectors::dot_of(normal, DVec3::ZERO, half, of_half) };
+    let sine_squared = Off { value: sine * sine, error: of_square };
+    let density = density(distribution, n_half, sine_squared, shininess);
+    let (n_light, n_viewer) = (normal.dot(light), normal.dot(viewer));
     let v_half = 0.5 * sum.length_squared().max(1e-30).sqrt();
-    let attenuation = optics::geometric_attenuation(n_light, n_viewer, n_half, v_half);
+    let attenuation = optics::geometric_attenuation(n_light, n_viewer, n_half.value, v_half);
     // At both ends of every cosine: it falls with n·v and v·h, and rises with n·l and n·h.
     let (of_light, of_viewer) = (vectors::dot(normal, light), vectors::dot(normal, viewer));
-    let of_n_half = vectors::dot_of(normal, DVec3::ZERO, half, of_half);
     let of_v_half = cosine_to_half(sum);
     let at = |sign: f64| {
         optics::geometric_attenuation(
             n_light + sign * of_light,
             n_viewer - sign * of_viewer,
-            n_half + sign * of_n_half,
+            n_half.value + sign * n_half.error,
             v_half - sign * of_v_half,
         )
     };
     let (low, high) = (at(-1.0), at(1.0));
     let of_attenuation = (high - attenuation).max(attenuation - low) + 13.0 * U * high;
-    let value = distribution * attenuation;
-    let error = of_distribution * (attenuation + of_attenuation) + distribution * of_attenuation + U * value;
-    (value, value, error + 1e8 * FLUSHED)
+    let value = density.value * attenuation;
+    let error = density.error * (attenuation + of_attenuation) + density.value * of_attenuation + U * value;
+    Off { value, error: error + 1e8 * FLUSHED }
 }
 
-/// torrance_sparrow: the geometry's error times F, F's times the geometry, and a rounding.
-pub fn torrance_sparrow(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, ior: f64) -> Allowed {
-    let v_half = 0.5 * (light + viewer).length_squared().max(1e-30).sqrt();
-    let reflectance = optics::fresnel_dielectric(v_half, ior);
-    let of_reflectance =
-        refraction::fresnel_dielectric(Off { value: v_half, error: cosine_to_half(light + viewer) }, ior);
-    let (value, _, _) = geometry(normal, light, viewer, shininess);
-    let geometry = torrance_sparrow_geometry(normal, light, viewer, shininess);
-    let error = geometry.error[0] * (reflectance + of_reflectance)
-        + (value + geometry.error[0]) * of_reflectance
-        + U * value * reflectance;
-    let other = geometry.other.map(|other| Numbers::from_slice(&[other[0] * reflectance]));
-    Allowed { error: Numbers::from_slice(&[error + FLUSHED]), other }
+/// Whether rounding decides on n·l > 0 or n·v > 0, and whether they hold.
+fn gates([normal, light, viewer]: [DVec3; 3]) -> (bool, bool) {
+    let open = vectors::is_open(normal, light) || vectors::is_open(normal, viewer);
+    (open, normal.dot(light) > 0.0 && normal.dot(viewer) > 0.0)
+}
+
+/// microfacet_lobe, and torrance_sparrow_geometry, which is the one of Trowbridge and Reitz: D with the errors of its cosine and
+/// sin², G with those of its cosines; the product. Either side of n·l > 0 and n·v > 0.
+pub fn microfacet_lobe(distribution: Distribution, directions: [DVec3; 3], shininess: f64) -> Allowed {
+    let lobe = geometry(distribution, directions, shininess);
+    let (open, in_front) = gates(directions);
+    Allowed::from(lobe.error).or(open, || Numbers::from_slice(&[if in_front { 0.0 } else { lobe.value }]))
+}
+
+/// microfacet_reflection: the lobe's error times k_s F, F's times the rest, and 2 u. F is for a cosine that is off by 12 u.
+pub fn microfacet_reflection(
+    (distribution, fresnel): (Distribution, Fresnel),
+    directions: [DVec3; 3],
+    shininess: f64,
+    specular: DVec3,
+    ior: f64,
+) -> Allowed {
+    let lobe = geometry(distribution, directions, shininess);
+    let sum = directions[1] + directions[2];
+    let v_half = Off { value: 0.5 * sum.length_squared().max(1e-30).sqrt(), error: cosine_to_half(sum) };
+    let (reflected, error) = match fresnel {
+        Fresnel::Dielectric => {
+            let error = refraction::fresnel_dielectric(v_half, Off::exact(ior));
+            (specular * optics::fresnel_dielectric(v_half.value, ior), specular * error)
+        }
+        Fresnel::Conductor { eta, absorption } => {
+            let (eta, absorption) = (eta.as_dvec3(), absorption.as_dvec3());
+            let channel = |at: usize| refraction::fresnel_conductor(v_half, eta[at], absorption[at]);
+            let error = DVec3::new(channel(0), channel(1), channel(2));
+            (specular * optics::fresnel_conductor(v_half.value, eta, absorption), specular * error)
+        }
+        Fresnel::NormalReflectance => {
+            let channel = |at: usize| refraction::fresnel_normal_reflectance(v_half, specular[at]);
+            let error = DVec3::new(channel(0), channel(1), channel(2));
+            (optics::fresnel_normal_reflectance(v_half.value, specular), error)
+        }
+    };
+    let size = reflected.abs() + error;
+    let error = size * lobe.error + error * lobe.value + 2.0 * U * reflected.abs() * lobe.value;
+    let (open, in_front) = gates(directions);
+    let other = reflected * if in_front { 0.0 } else { lobe.value };
+    Allowed::from(error + DVec3::splat(FLUSHED)).or(open, || Numbers::from_slice(&other.to_array()))
+}
+
+/// torrance_sparrow: the same of a dielectric.
+pub fn torrance_sparrow(directions: [DVec3; 3], shininess: f64, ior: f64) -> Allowed {
+    let kind = (Distribution::TrowbridgeReitz, Fresnel::Dielectric);
+    let all = microfacet_reflection(kind, directions, shininess, DVec3::X, ior);
+    let other = all.other.map(|other| Numbers::from_slice(&other[..1]));
+    Allowed { error: Numbers::from_slice(&all.error[..1]), other }
 }

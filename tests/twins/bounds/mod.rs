@@ -7,6 +7,7 @@ pub mod atmosphere;
 pub mod lights;
 pub mod lobes;
 pub mod microfacets;
+pub mod polygons;
 pub mod powers;
 pub mod refraction;
 pub mod shading;

@@ -17,21 +17,22 @@ fn root(square: f64, error: f64) -> Off {
 }
 
 /// g² = (η - 1)(η + 1) + cos²: 3 u of the one, u of the other, u of the sum, and what the cosine brings along.
-fn g(index: f64, cosine: Off) -> (f64, Off) {
-    let difference = (index - 1.0) * (index + 1.0);
+fn g(index: Off, cosine: Off) -> (f64, Off) {
+    let difference = (index.value - 1.0) * (index.value + 1.0);
     let square = cosine.value * cosine.value;
     let value = difference + square;
-    let brought = cosine.error * (2.0 * cosine.value.abs() + cosine.error);
+    let brought = cosine.error * (2.0 * cosine.value.abs() + cosine.error)
+        + index.error * (2.0 * index.value + index.error);
     let error = U * (3.0 * difference.abs() + square + value.abs()) + brought + 2.0 * FLUSHED;
     (error, root(value, error))
 }
 
 /// fresnel_dielectric: each amplitude (x - y)/(x + y) is off by 2 (y δx + x δy)/(x + y)² and 7 u of itself; F by the amplitudes times
-/// their errors, and 2 u. The cosine may be off itself.
-pub fn fresnel_dielectric(cosine: Off, eta: f64) -> f64 {
+/// their errors, and 2 u. Cosine and index may be off themselves.
+pub fn fresnel_dielectric(cosine: Off, eta: Off) -> f64 {
     let cosine = Off { value: cosine.value.clamp(0.0, 1.0), ..cosine };
-    let index = eta.clamp(1e-4, 1e4);
-    let (_, g) = g(index, cosine);
+    let index = eta.value.clamp(1e-4, 1e4);
+    let (_, g) = g(Off { value: index, ..eta }, cosine);
     let part = |x: Off| {
         let least = ((x.value - x.error).max(0.0) + (g.value - g.error).max(0.0)).max(1e-15);
         let sum = (x.value + g.value).max(1e-15);
@@ -41,19 +42,33 @@ pub fn fresnel_dielectric(cosine: Off, eta: f64) -> f64 {
         amplitude.abs() * error + 0.5 * error * error
     };
     let along = index * index * cosine.value;
-    let reflectance = lumbre_optics::fresnel_dielectric(cosine.value, eta);
-    let along = Off { value: along, error: 3.0 * U * along + index * index * cosine.error };
+    let reflectance = lumbre_optics::fresnel_dielectric(cosine.value, eta.value);
+    let of_index = eta.error * (2.0 * index + eta.error) * cosine.value;
+    let along = Off { value: along, error: 3.0 * U * along + index * index * cosine.error + of_index };
     (part(cosine) + part(along) + 2.0 * U * reflectance).min(1.0)
+}
+
+/// fresnel_normal_reflectance, a channel: the index (1 + r)/(1 - r) of a root r that is off by 9 u, 7 u for its own sum, difference
+/// and quotient.
+pub fn fresnel_normal_reflectance(cosine: Off, reflectance: f64) -> f64 {
+    let root = reflectance.max(0.0).sqrt().min(f64::from(0.9998f32));
+    let index = (1.0 + root) / (1.0 - root);
+    // Reflectances under the normal numbers may count as none.
+    let of_root = 9.0 * U * root + if reflectance.abs() < 2.0 * FLUSHED { FLUSHED.sqrt() * 2.0 } else { 0.0 };
+    let of_index = index * 7.0 * U + 2.0 * of_root / ((1.0 - root) * (1.0 - root));
+    fresnel_dielectric(cosine, Off { value: index, error: of_index })
 }
 
 /// fresnel_conductor, a channel: the complex root's parts a and b with the errors of what they are roots of, then two quotients of
 /// sums of squares.
-pub fn fresnel_conductor(cosine: f64, eta: f64, absorption: f64) -> f64 {
-    let (c, n, k) = (cosine.clamp(0.0, 1.0), eta.clamp(0.0, 1e4), absorption.clamp(0.0, 1e4));
+pub fn fresnel_conductor(cosine: Off, eta: f64, absorption: f64) -> f64 {
+    let of_cosine = cosine.error;
+    let (c, n, k) = (cosine.value.clamp(0.0, 1.0), eta.clamp(0.0, 1e4), absorption.clamp(0.0, 1e4));
     let sine_squared = (1.0 - c) * (1.0 + c);
     let difference = (n - k) * (n + k);
     let real = difference - sine_squared;
-    let of_real = U * (3.0 * difference.abs() + 3.0 * sine_squared + real.abs()) + FLUSHED;
+    let of_sine_squared = 3.0 * U * sine_squared + of_cosine * (2.0 * c + of_cosine);
+    let of_real = U * (3.0 * difference.abs() + real.abs()) + of_sine_squared + FLUSHED;
     let product = n * k;
     let modulus_squared = real * real + 4.0 * product * product;
     let of_square =
@@ -82,12 +97,14 @@ pub fn fresnel_conductor(cosine: f64, eta: f64, absorption: f64) -> f64 {
         let error = (of_above + value * of_below) / (below - of_below).max(1e-30) + 5.0 * U * value;
         (value, error.min(1.0))
     };
-    let (across, of_across) = quotient(c - a, of_a + U * (c - a).abs(), c + a, of_a + U * (c + a), b, of_b);
+    let (across, of_across) =
+        quotient(c - a, of_a + of_cosine + U * (c - a).abs(), c + a, of_a + of_cosine + U * (c + a), b, of_b);
     let ca = c * a;
-    let of_ca = c * of_a + U * ca;
+    let of_ca = c * of_a + a * of_cosine + U * ca;
     let (minus, plus) = (ca - sine_squared, ca + sine_squared);
-    let of_sum = |sum: f64| of_ca + 3.0 * U * sine_squared + U * sum.abs();
-    let (along, of_along) = quotient(minus, of_sum(minus), plus, of_sum(plus), c * b, c * of_b + U * c * b);
+    let of_sum = |sum: f64| of_ca + of_sine_squared + U * sum.abs();
+    let (along, of_along) =
+        quotient(minus, of_sum(minus), plus, of_sum(plus), c * b, c * of_b + b * of_cosine + U * c * b);
     let reflectance = 0.5 * across * (1.0 + along);
     0.5 * of_across * (1.0 + along + of_along) + 0.5 * across * of_along + 3.0 * U * reflectance
 }
@@ -111,7 +128,7 @@ pub fn transmitted_cosine(sine: f64, eta: f64) -> f64 {
 pub fn transmitted_direction(normal: DVec3, light: DVec3, eta: f64) -> Allowed {
     let index = eta.clamp(SMALLEST_INDEX, 1e4);
     let cosine = Off { value: normal.dot(light), error: vectors::dot(normal, light) };
-    let (of_square, g) = g(index, cosine);
+    let (of_square, g) = g(Off::exact(index), cosine);
     let square = (index - 1.0) * (index + 1.0) + cosine.value * cosine.value;
     let bent = cosine.value - g.value;
     let of_bent = cosine.error + g.error + U * bent.abs();

@@ -19,7 +19,7 @@ pub fn specular_factor(
         ReflectionModel::Blinn4n => lobes::blinn_phong_4n(normal, light, viewer, shininess, sharp),
         ReflectionModel::BlinnMatched => lobes::blinn_phong_matched(normal, light, viewer, shininess, sharp),
         ReflectionModel::TorranceSparrow => {
-            microfacets::torrance_sparrow(normal, light, viewer, shininess, ior)
+            microfacets::torrance_sparrow([normal, light, viewer], shininess, ior)
         }
     }
 }

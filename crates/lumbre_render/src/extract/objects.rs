@@ -8,7 +8,7 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use glam::DVec3;
-use lumbre_optics::{Material, Shading};
+use lumbre_optics::{Material, ReflectionModel, Shading};
 use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh};
 
 use super::Traits;
@@ -47,7 +47,7 @@ type ObjectQuery<'w, 's> = Query<
         Ref<'static, GlobalTransform>,
         Option<Ref<'static, MaterialTextures>>,
         Option<Ref<'static, Lightmap>>,
-        Option<&'static Shading>,
+        (Option<&'static Shading>, Option<&'static ReflectionModel>),
     ),
     Without<Hidden>,
 >;
@@ -109,7 +109,8 @@ impl Objects {
         let Some((id, mut state)) = self.state.take() else { return Ok(()) };
         if let Ok(query) = state.get(world) {
             let found = query.iter().filter(|found| found.3.0.is_finite());
-            for (entity, mesh, material, transform, maps, lightmap, shading) in found {
+            for (entity, mesh, material, transform, maps, lightmap, (shading, reflection)) in found {
+                let choices = (shading.copied(), reflection.copied());
                 let (slot, new) = self.slot(entity);
                 let remeshed = new || mesh.is_changed();
                 let transformed = new || moved || transform.is_changed();
@@ -117,7 +118,7 @@ impl Objects {
                 let map_changed = lightmap.as_ref().is_some_and(Ref::is_changed);
                 let maps = maps.map(Ref::into_inner);
                 let lightmap = lightmap.map(Ref::into_inner);
-                let traits = Traits::new(&material, maps, &mesh.0, lightmap.is_some(), shading.copied());
+                let traits = Traits::new(&material, maps, &mesh.0, lightmap.is_some(), choices);
                 let mut object = match self.objects[slot].take() {
                     Some(object) => object,
                     None => Object::new(entity, meshes.insert(&mesh.0), traits),

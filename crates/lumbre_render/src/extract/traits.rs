@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, FogMode, Material, Shading, Surface};
+use lumbre_optics::{AlphaMode, Distribution, FogMode, Fresnel, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{MaterialTextures, SceneSettings};
 
 use super::LightSet;
@@ -26,14 +26,17 @@ pub(crate) struct Traits {
     /// Whether a highlight may be sharper than plain powers can tell.
     pub sharp: bool,
     pub lightmapped: bool,
+    pub distribution: Distribution,
+    pub fresnel: Fresnel,
     pub shading: Option<Shading>,
+    pub reflection: Option<ReflectionModel>,
 }
 
 /// What all variants of a frame have in common.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrameFeatures {
     pub shading: Option<Shading>,
-    pub reflection: lumbre_optics::ReflectionModel,
+    pub reflection: Option<ReflectionModel>,
     pub lightmaps: bool,
     pub specular_antialiasing: bool,
     pub clamp: bool,
@@ -54,7 +57,7 @@ impl Traits {
         maps: Option<&MaterialTextures>,
         mesh: &TriangleMesh,
         lightmapped: bool,
-        shading: Option<Shading>,
+        (shading, reflection): (Option<Shading>, Option<ReflectionModel>),
     ) -> Self {
         let (uv0, uv1) = maps.map_or((false, false), texture_sets::coordinate_sets);
         let back = material.back.as_ref().map_or(Vec3::ZERO, |back| back.specular);
@@ -73,7 +76,10 @@ impl Traits {
                 || material.back.as_ref().is_some_and(Surface::has_sharp_highlight)
                 || maps.is_some_and(|maps| maps.metallic_roughness.is_some()),
             lightmapped: lightmapped && !mesh.uv1.is_empty(),
+            distribution: material.distribution,
+            fresnel: material.fresnel,
             shading,
+            reflection,
         }
     }
 
@@ -94,7 +100,8 @@ impl Traits {
     /// The features that it calls for in such a frame.
     pub fn variant(&self, settings: &SceneSettings, frame: &FrameFeatures) -> Variant {
         let shading = frame.shading.or(self.shading).unwrap_or(settings.shading);
-        let mut variant = Variant::new(shading, frame.reflection);
+        let reflection = frame.reflection.or(self.reflection).unwrap_or(settings.reflection);
+        let mut variant = Variant::new(shading, reflection);
         let lit = !self.unlit;
         let lightmapped = self.uses_lightmap(frame.lightmaps);
         for (feature, bound) in texture_sets::features(self.texture_mask) {
@@ -118,6 +125,15 @@ impl Traits {
         variant.set(Feature::SpotLights, spot);
         variant.set(Feature::PolygonLights, polygon);
         variant.set(Feature::SharpHighlights, self.sharp);
+        if self.specular {
+            let (distribution, fresnel) = (self.distribution, self.fresnel);
+            let chosen = (distribution, fresnel) != (Distribution::default(), Fresnel::default());
+            variant.set(Feature::Microfacets, chosen);
+            variant.set(Feature::DistributionCosinePower, distribution == Distribution::CosinePower);
+            variant.set(Feature::DistributionGaussian, distribution == Distribution::Gaussian);
+            variant.set(Feature::FresnelConductor, matches!(fresnel, Fresnel::Conductor { .. }));
+            variant.set(Feature::FresnelNormalReflectance, fresnel == Fresnel::NormalReflectance);
+        }
         variant.set(Feature::LocalViewer, settings.local_viewer);
         if let Some(fog) = &settings.fog {
             variant.set(Feature::Fog, true);

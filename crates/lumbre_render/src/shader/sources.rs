@@ -25,6 +25,7 @@ modules!(
     "optics/fresnel",
     "optics/half_vector",
     "optics/lambert",
+    "optics/microfacet_reflection",
     "optics/microfacets",
     "optics/normalization",
     "optics/phong",

@@ -8,7 +8,7 @@ macro_rules! features {
     ($($(#[$doc:meta])* $name:ident = $bit:literal => $word:literal),+ $(,)?) => {
         /// One thing that a shader may or may not do.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[repr(u32)]
+        #[repr(u64)]
         pub enum Feature {
             $($(#[$doc])* $name = 1 << $bit),+
         }
@@ -82,6 +82,16 @@ features! {
     SpecularAntialiasing = 26 => "SPECULAR_ANTIALIASING",
     /// Knows the faces of emissive objects as lights.
     PolygonLights = 27 => "POLYGON_LIGHTS",
+    /// Torrance-Sparrow with a distribution or a Fresnel reflectance other than the defaults.
+    Microfacets = 28 => "MICROFACETS",
+    /// Microfacets spread as a power of the cosine.
+    DistributionCosinePower = 29 => "DISTRIBUTION_COSINE_POWER",
+    /// Microfacets spread as a Gaussian.
+    DistributionGaussian = 30 => "DISTRIBUTION_GAUSSIAN",
+    /// Microfacets of a conductor.
+    FresnelConductor = 31 => "FRESNEL_CONDUCTOR",
+    /// Microfacets that reflect k_s at normal incidence.
+    FresnelNormalReflectance = 32 => "FRESNEL_NORMAL_REFLECTANCE",
 }
 
 /// A variant of the forward shader.
@@ -91,7 +101,7 @@ pub struct Variant {
     pub shading: Shading,
     /// Specular model.
     pub reflection: ReflectionModel,
-    bits: u32,
+    bits: u64,
 }
 
 impl Variant {
@@ -103,40 +113,47 @@ impl Variant {
     /// Adds a feature if it is called for.
     pub fn set(&mut self, feature: Feature, called_for: bool) {
         if called_for {
-            self.bits |= feature as u32;
+            self.bits |= feature as u64;
         }
     }
 
     /// Whether the feature is in it.
     pub fn has(&self, feature: Feature) -> bool {
-        self.bits & feature as u32 != 0
+        self.bits & feature as u64 != 0
     }
 
     /// The variant with everything that cannot matter taken out, so that fewer pipelines are made.
     pub fn reduced(mut self) -> Self {
         if !self.has(Feature::Lit) {
             // Unlit: neither lights nor normals, whatever the technique.
-            let keep = !(Feature::DynamicLights as u32
-                | Feature::StaticLights as u32
-                | Feature::LocalViewer as u32
-                | Feature::TwoSided as u32
-                | Feature::Lightmap as u32
-                | Feature::MetallicRoughnessTexture as u32);
+            let keep = !(Feature::DynamicLights as u64
+                | Feature::StaticLights as u64
+                | Feature::LocalViewer as u64
+                | Feature::TwoSided as u64
+                | Feature::Lightmap as u64
+                | Feature::MetallicRoughnessTexture as u64);
             self.bits &= keep;
             (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
         }
         if self.shading != Shading::Phong {
             // No highlight is evaluated in a pixel.
-            self.bits &= !(Feature::SpecularAntialiasing as u32);
+            self.bits &= !(Feature::SpecularAntialiasing as u64);
         }
         if !self.has(Feature::DynamicLights) && !self.has(Feature::StaticLights) {
-            self.bits &= !(Feature::DirectionalLights as u32
-                | Feature::PointLights as u32
-                | Feature::SpotLights as u32
-                | Feature::PolygonLights as u32
-                | Feature::SharpHighlights as u32
-                | Feature::SpecularAntialiasing as u32);
+            self.bits &= !(Feature::DirectionalLights as u64
+                | Feature::PointLights as u64
+                | Feature::SpotLights as u64
+                | Feature::PolygonLights as u64
+                | Feature::SharpHighlights as u64
+                | Feature::SpecularAntialiasing as u64);
             self.reflection = ReflectionModel::Phong;
+        }
+        if self.reflection != ReflectionModel::TorranceSparrow {
+            self.bits &= !(Feature::Microfacets as u64
+                | Feature::DistributionCosinePower as u64
+                | Feature::DistributionGaussian as u64
+                | Feature::FresnelConductor as u64
+                | Feature::FresnelNormalReflectance as u64);
         }
         self
     }

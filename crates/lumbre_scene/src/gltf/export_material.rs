@@ -1,7 +1,7 @@
 //! `Material` and its textures into a glTF material, with LUMBRE_materials_phong where metallic-roughness cannot say it.
 
 use glam::Vec3;
-use lumbre_optics::{AlphaMode, Material, Surface, shininess_from_roughness};
+use lumbre_optics::{AlphaMode, Fresnel, Material, Surface, shininess_from_roughness};
 use serde_json::{Map, Value, json};
 
 use super::export::SaveError;
@@ -41,16 +41,25 @@ pub(crate) fn material(
     let plain = front_from_metallic_roughness(base, metallic, roughness, emission, material.unlit);
     let exact = textures.metallic_roughness.is_some() || plain == material.front;
     let defaults = Material::default();
+    // What a reader takes where nothing is said: as in `import_material`.
+    let textured = textures.metallic_roughness.is_some();
+    let plain_fresnel = material.fresnel == Fresnel::NormalReflectance;
     let beyond = material.back.is_some()
         || material.mirror != defaults.mirror
         || material.transmission != defaults.transmission
-        || material.ior != defaults.ior;
+        || material.ior != defaults.ior
+        || material.distribution != defaults.distribution
+        || !plain_fresnel;
     if !exact || beyond {
         let front = if textures.metallic_roughness.is_some() {
             // Naming coefficients would replace the texture.
             PhongSurface::default()
         } else {
             surface(&material.front)
+        };
+        let conductor = match material.fresnel {
+            Fresnel::Conductor { eta, absorption } => Some((eta, absorption)),
+            Fresnel::Dielectric | Fresnel::NormalReflectance => None,
         };
         let phong = PhongMaterial {
             front,
@@ -59,6 +68,13 @@ pub(crate) fn material(
             transmission: (material.transmission != defaults.transmission)
                 .then(|| color(material.transmission)),
             ior: (material.ior != defaults.ior).then(|| f64::from(material.ior)),
+            distribution: (material.distribution != defaults.distribution)
+                .then(|| material.distribution.name().to_owned()),
+            fresnel: (material.fresnel
+                != if textured { Fresnel::NormalReflectance } else { Fresnel::Dielectric })
+            .then(|| material.fresnel.name().to_owned()),
+            eta: conductor.map(|(eta, _)| color(eta)),
+            absorption: conductor.map(|(_, absorption)| color(absorption)),
         };
         let phong = serde_json::to_value(phong).map_err(|source| SaveError::Json { source })?;
         extensions.insert("LUMBRE_materials_phong".to_owned(), phong);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{Light, Material, Shading};
+use lumbre_optics::{Light, Material, ReflectionModel, Shading};
 use serde_json::{Map, Value, json};
 
 use super::error::{Note, Notes};
@@ -35,6 +35,7 @@ pub(crate) struct Nodes {
 #[derive(Clone, PartialEq)]
 struct Appearance {
     shading: Option<Shading>,
+    reflection: Option<ReflectionModel>,
     lightmap: Option<Arc<LightmapImage>>,
     hidden: bool,
     emissive_light: bool,
@@ -255,8 +256,15 @@ impl Nodes {
             });
             node.insert("mesh".to_owned(), index.into());
         }
+        let mut choices = Map::new();
         if let Some(shading) = appearance.shading {
-            extend(node, "LUMBRE_shading", json!({"technique": shading.name()}));
+            choices.insert("technique".to_owned(), shading.name().into());
+        }
+        if let Some(reflection) = appearance.reflection {
+            choices.insert("reflection".to_owned(), reflection.name().into());
+        }
+        if !choices.is_empty() {
+            extend(node, "LUMBRE_shading", choices.into());
         }
         if let Some(image) = &appearance.lightmap {
             extend(node, "LUMBRE_lightmap", lightmaps.reference(image, name, number));
@@ -300,6 +308,7 @@ fn is_primitive(world: &World, entity: Entity) -> bool {
 fn appearance(world: &World, entity: Entity, dynamic: bool) -> Appearance {
     Appearance {
         shading: world.get::<Shading>(entity).copied(),
+        reflection: world.get::<ReflectionModel>(entity).copied(),
         lightmap: world.get::<Lightmap>(entity).map(|lightmap| lightmap.image.clone()),
         hidden: world.get::<Hidden>(entity).is_some(),
         emissive_light: world.get::<EmissiveLight>(entity).is_some(),

@@ -20,6 +20,16 @@ pub(crate) struct PhongMaterial {
     pub transmission: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ior: Option<f64>,
+    /// cosine-power, gaussian or trowbridge-reitz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distribution: Option<String>,
+    /// dielectric, conductor or normal-reflectance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fresnel: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub eta: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub absorption: Option<Color>,
 }
 
 /// The coefficients of one side.
@@ -123,6 +133,7 @@ pub(crate) struct FogExtension {
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 pub(crate) struct ShadingExtension {
     pub technique: Option<String>,
+    pub reflection: Option<String>,
 }
 
 /// `nodes[i].extensions.LUMBRE_lightmap`.

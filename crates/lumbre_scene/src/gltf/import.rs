@@ -175,6 +175,9 @@ fn spawn_primitive(world: &mut World, node: &PreparedNode, primitive: &PreparedP
     if primitive.textures != MaterialTextures::default() {
         entity.insert(primitive.textures.clone());
     }
+    if let Some(reflection) = node.reflection {
+        entity.insert(reflection);
+    }
     if let Some(shading) = node.shading {
         entity.insert(shading);
     }

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumbre_optics::{AlphaMode, Material, Surface};
+use lumbre_optics::{AlphaMode, Distribution, Fresnel, Material, Surface};
 
 use super::document::{self, extension, shortened};
 use super::error::{LoadProblem, Notes};
 use super::extensions::{EmissiveStrength, PhongMaterial, PhongSurface};
 use super::import_image::Images;
+use super::import_scene::unknown;
 use super::value::{color, number};
 use crate::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
 
@@ -73,7 +74,10 @@ pub(crate) fn material(
 
     let unlit = source.extensions.contains_key("KHR_materials_unlit");
     let front = front_from_metallic_roughness(base, metallic, roughness, emission, unlit);
-    let mut material = Material { front, unlit, ..Material::default() };
+    // Of a metallic-roughness material k_s is the reflectance at normal incidence.
+    let replaced = phong.is_some() && textures.metallic_roughness.is_none();
+    let fresnel = if replaced { Fresnel::Dielectric } else { Fresnel::NormalReflectance };
+    let mut material = Material { front, unlit, fresnel, ..Material::default() };
     if let Some(phong) = phong {
         if textures.metallic_roughness.is_none() {
             let default = Surface { ambient: base, diffuse: base, emission, ..Surface::default() };
@@ -85,6 +89,13 @@ pub(crate) fn material(
         material.mirror = phong.mirror.map_or(material.mirror, color);
         material.transmission = phong.transmission.map_or(material.transmission, color);
         material.ior = number(phong.ior, material.ior);
+        if let Some(name) = &phong.distribution {
+            material.distribution = Distribution::from_name(name).ok_or_else(|| {
+                let names = Distribution::ALL.iter().map(|choice| choice.name());
+                unknown(place, "LUMBRE_materials_phong.distribution", name, names)
+            })?;
+        }
+        material.fresnel = fresnel_of(&phong, material.fresnel, place)?;
     }
     material.alpha = alpha as f32;
     material.alpha_mode = match source.alpha_mode.as_deref() {
@@ -118,6 +129,25 @@ pub(crate) fn front_from_metallic_roughness(
         front.diffuse = base;
     }
     front
+}
+
+/// A conductor where its index is given, unless it says otherwise.
+fn fresnel_of(phong: &PhongMaterial, default: Fresnel, place: &str) -> Result<Fresnel, LoadProblem> {
+    let conductor = Fresnel::Conductor {
+        eta: phong.eta.map_or(Vec3::ZERO, color),
+        absorption: phong.absorption.map_or(Vec3::ZERO, color),
+    };
+    match phong.fresnel.as_deref() {
+        None if phong.eta.is_some() || phong.absorption.is_some() => Ok(conductor),
+        None => Ok(default),
+        Some("dielectric") => Ok(Fresnel::Dielectric),
+        Some("conductor") => Ok(conductor),
+        Some("normal-reflectance") => Ok(Fresnel::NormalReflectance),
+        Some(other) => {
+            let names = ["dielectric", "conductor", "normal-reflectance"].into_iter();
+            Err(unknown(place, "LUMBRE_materials_phong.fresnel", other, names))
+        }
+    }
 }
 
 impl PhongSurface {

@@ -37,10 +37,7 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     settings.local_viewer = found.local_viewer.unwrap_or(settings.local_viewer);
     settings.two_sided = found.two_sided.unwrap_or(settings.two_sided);
     if let Some(name) = &found.reflection {
-        settings.reflection = ReflectionModel::from_name(name).ok_or_else(|| {
-            let names = ReflectionModel::ALL.iter().map(|model| model.name());
-            unknown(&place, "LUMBRE_scene.reflection", name, names)
-        })?;
+        settings.reflection = reflection(name, &place, "LUMBRE_scene.reflection")?;
     }
     if let Some(name) = &found.shading {
         settings.shading = shading(name, &place, "LUMBRE_scene.shading")?;
@@ -66,7 +63,19 @@ pub(crate) fn shading(name: &str, place: &str, field: &str) -> Result<Shading, L
         .ok_or_else(|| unknown(place, field, name, Shading::ALL.iter().map(|technique| technique.name())))
 }
 
-fn unknown(place: &str, field: &str, value: &str, names: impl Iterator<Item = &'static str>) -> LoadProblem {
+/// The specular model with a name.
+pub(crate) fn reflection(name: &str, place: &str, field: &str) -> Result<ReflectionModel, LoadProblem> {
+    let names = ReflectionModel::ALL.iter().map(|model| model.name());
+    ReflectionModel::from_name(name).ok_or_else(|| unknown(place, field, name, names))
+}
+
+/// A name that stands for none of the choices.
+pub(crate) fn unknown(
+    place: &str,
+    field: &str,
+    value: &str,
+    names: impl Iterator<Item = &'static str>,
+) -> LoadProblem {
     LoadProblem::Value {
         place: place.to_owned(),
         field: field.to_owned(),

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{Light, Material, Shading};
+use lumbre_optics::{Light, Material, ReflectionModel, Shading};
 
 use super::accessor::Buffers;
 use super::document::{self, Document, element, extension};
@@ -42,6 +42,7 @@ pub(crate) struct PreparedNode {
     pub camera: Option<Camera>,
     pub active_camera: bool,
     pub shading: Option<Shading>,
+    pub reflection: Option<ReflectionModel>,
     pub lightmap: Option<Lightmap>,
     pub dynamic: bool,
     pub hidden: bool,
@@ -136,9 +137,13 @@ pub(crate) fn prepare(
             }
             None => None,
         };
-        let shading = extension::<ShadingExtension>(&node.extensions, "LUMBRE_shading", &place)?
-            .and_then(|shading| shading.technique)
+        let choices = extension::<ShadingExtension>(&node.extensions, "LUMBRE_shading", &place)?;
+        let (technique, model) = choices.map_or((None, None), |own| (own.technique, own.reflection));
+        let shading = technique
             .map(|name| import_scene::shading(&name, &place, "LUMBRE_shading.technique"))
+            .transpose()?;
+        let reflection = model
+            .map(|name| import_scene::reflection(&name, &place, "LUMBRE_shading.reflection"))
             .transpose()?;
         let lightmap = match extension::<LightmapExtension>(&node.extensions, "LUMBRE_lightmap", &place)? {
             Some(source) => Some(lightmaps.lightmap(&source, &place, base, &limits, &mut images.budget)?),
@@ -167,6 +172,7 @@ pub(crate) fn prepare(
             camera,
             active_camera: node.camera.is_some() && lens.active,
             shading,
+            reflection,
             lightmap,
             dynamic: dynamic.contains(&index),
             hidden: object.hidden,

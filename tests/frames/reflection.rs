@@ -1,0 +1,130 @@
+//! Reflection models object by object, and the microfacet model in every distribution and Fresnel reflectance, against the f64 twin.
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use lumbre_mesh::shapes;
+use lumbre_optics::{Distribution, Fresnel, Light, Material, ReflectionModel, Shading, Surface};
+use lumbre_render::FrameOptions;
+use lumbre_scene::{Camera, Mesh, SceneSettings, Transform};
+use lumbre_tests::compare::compare;
+use lumbre_tests::scenes::{ball, every_light};
+use lumbre_tests::twin::{self, TwinOptions};
+
+use crate::adapter::{Canvas, draw, linear};
+
+const SIZE: usize = 192;
+/// As the ball's: f32 against f64. The Fresnel reflectance of a conductor adds some twenty roundings, of a Gaussian distribution forty.
+const LARGEST: f64 = 1e-4;
+const RELATIVE_L2: f64 = 1e-5;
+
+fn gold() -> Fresnel {
+    Fresnel::Conductor { eta: Vec3::new(0.17, 0.42, 1.38), absorption: Vec3::new(3.15, 2.35, 1.92) }
+}
+
+fn material_of(world: &mut World) -> Mut<'_, Material> {
+    let mut query = world.query::<&mut Material>();
+    query.iter_mut(world).next().expect("the ball has a material")
+}
+
+#[test]
+fn every_distribution_and_fresnel_reflectance_agrees_with_the_twin() {
+    let (_, light) = every_light().swap_remove(2);
+    let model = Some(ReflectionModel::TorranceSparrow);
+    let mut frames: Vec<Vec<DVec3>> = Vec::new();
+    for distribution in Distribution::ALL {
+        for fresnel in [Fresnel::Dielectric, gold(), Fresnel::NormalReflectance] {
+            for shading in Shading::ALL {
+                let mut world = ball(light.clone());
+                {
+                    let mut material = material_of(&mut world);
+                    (material.distribution, material.fresnel) = (*distribution, fresnel);
+                    material.front.shininess = 40.0;
+                    material.front.specular = Vec3::new(0.9, 0.5, 0.04);
+                }
+                let twin_options =
+                    TwinOptions { shading: Some(*shading), reflection: model, ..TwinOptions::default() };
+                let expected = twin::draw(&mut world, SIZE, SIZE, twin_options)
+                    .inside_surfaces(*shading == Shading::Flat);
+                let options = FrameOptions { shading: Some(*shading), reflection: model, ..linear() };
+                let (got, _) = draw(&mut world, SIZE as u32, SIZE as u32, &options);
+                if *shading == Shading::Phong {
+                    assert!(!frames.contains(&got), "{distribution:?} {fresnel:?} draws another's frame");
+                    frames.push(got.clone());
+                }
+                let difference = compare(&got.into_iter().map(Some).collect::<Vec<_>>(), &expected);
+                println!(
+                    "{:16} {:18} {:8} {difference:?}",
+                    distribution.name(),
+                    fresnel.name(),
+                    shading.name()
+                );
+                assert!(difference.pixels > SIZE * SIZE / 30, "{difference:?}");
+                assert!(difference.largest < LARGEST, "{distribution:?} {fresnel:?}: {difference:?}");
+                assert!(difference.relative_l2 < RELATIVE_L2, "{distribution:?} {fresnel:?}: {difference:?}");
+            }
+        }
+    }
+}
+
+/// A plane lit and, by a viewer infinitely far away, seen straight on: what is left of the model is its Fresnel reflectance.
+fn straight_on(material: Material) -> DVec3 {
+    let mut world = World::new();
+    // The plane's own normal is +Y: turned to the camera.
+    let turned = Transform {
+        rotation: glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2),
+        ..Transform::default()
+    };
+    world.spawn((Mesh(std::sync::Arc::new(shapes::plane(20.0, 20.0, 1, 1))), material, turned));
+    let above = Transform::from_xyz(0.0, 0.0, 5.0).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Light::directional(Vec3::ONE), above));
+    world.spawn((Camera::default(), above));
+    let model = ReflectionModel::TorranceSparrow;
+    world.insert_resource(SceneSettings {
+        reflection: model,
+        local_viewer: false,
+        ..SceneSettings::default()
+    });
+    let (pixels, _) = draw(&mut world, 9, 9, &linear());
+    pixels[40]
+}
+
+#[test]
+fn metallic_roughness_materials_reflect_what_gltf_says_at_normal_incidence() {
+    let base = Vec3::new(0.5, 0.25, 0.75);
+    let mut plastic = Material::from_metallic_roughness(base, 0.0, 0.3);
+    (plastic.front.diffuse, plastic.front.ambient) = (Vec3::ZERO, Vec3::ZERO);
+    let metal = Material::from_metallic_roughness(base, 1.0, 0.3);
+    for (name, material, expected) in
+        [("plastic", plastic, DVec3::splat(0.04)), ("metal", metal, base.as_dvec3())]
+    {
+        let got = straight_on(material);
+        // Some tens of roundings in the Fresnel term, and f32's 0.04.
+        assert!((got - expected).abs().max_element() < 1e-5, "{name}: {got} is not {expected}");
+    }
+    let front = Surface { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess: 80.0, ..Surface::default() };
+    let glass = straight_on(Material { front, ..Material::default() });
+    assert!((glass - 0.04).abs().max_element() < 1e-5, "glass of index 1.5 reflects 0.04, not {glass}");
+}
+
+#[test]
+fn an_object_has_a_model_of_its_own_from_one_frame_to_the_next() {
+    let (_, light) = every_light().swap_remove(2);
+    let mut world = ball(light);
+    let ball = world.query_filtered::<Entity, With<Mesh>>().iter(&world).next().unwrap();
+    let mut canvas = Canvas::new(SIZE as u32, SIZE as u32);
+    let by_options = |model| FrameOptions { reflection: Some(model), ..linear() };
+    let (scenes, _) = canvas.draw(&mut world, &linear());
+    for model in ReflectionModel::ALL {
+        world.entity_mut(ball).insert(*model);
+        let (own, _) = canvas.draw(&mut world, &linear());
+        let expected = twin::draw(&mut world, SIZE, SIZE, TwinOptions::default()).inside_surfaces(false);
+        let difference = compare(&own.iter().copied().map(Some).collect::<Vec<_>>(), &expected);
+        assert!(difference.largest < LARGEST, "{}: {difference:?}", model.name());
+        // The caller decides last.
+        let (forced, _) = canvas.draw(&mut world, &by_options(ReflectionModel::Phong));
+        assert!(forced == scenes, "{}: the option does not override the object's own", model.name());
+        assert!((own == scenes) == (*model == ReflectionModel::Phong), "{} has no effect", model.name());
+    }
+    world.entity_mut(ball).remove::<ReflectionModel>();
+    assert!(canvas.draw(&mut world, &linear()).0 == scenes, "the scene's model comes back");
+}
