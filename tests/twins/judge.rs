@@ -37,6 +37,9 @@ const EXTREMES: [f32; 12] = [
 
 type Function<T> = Arc<dyn Fn(&[f64]) -> T + Send + Sync>;
 
+/// Makes a random input.
+type Maker = dyn Fn(&mut Sequence) -> Vec<f32> + Send + Sync;
+
 /// A function and its twin.
 #[derive(Clone)]
 pub struct Twin {
@@ -44,7 +47,7 @@ pub struct Twin {
     pub kernel: Kernel,
     expected: Function<Numbers>,
     allowed: Function<Allowed>,
-    random: Arc<dyn Fn(&mut Sequence) -> Vec<f32> + Send + Sync>,
+    random: Arc<Maker>,
     corners: Vec<Vec<f32>>,
     /// Where results lie, and the largest component of an input for which they do.
     range: Option<(f64, f64, f32)>,

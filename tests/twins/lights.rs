@@ -1,5 +1,7 @@
 //! Lights: distance, cones, and a light as a point meets it.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use glam::Vec3;
 use lumbre_optics::*;
 use lumbre_tests::kernel::{Kernel, Type};
@@ -97,7 +99,8 @@ fn placed(sequence: &mut Sequence, directional: bool, smooth: bool) -> Vec<f32> 
 fn hard_lights() -> Vec<Vec<f32>> {
     let near =
         [Vec3::ZERO, Vec3::Y, Vec3::new(1e-20, 0.0, 0.0), Vec3::splat(1e5), Vec3::new(0.0, -0.005, 0.0)];
-    let cones = [[0.0, 0.0], [0.5, 128.0], [1.0, 1.0], [0.707_106_8, 0.707_106_8], [-2.0, 0.0], [0.0, 1.0]];
+    let cones =
+        [[0.0, 0.0], [0.5, 128.0], [1.0, 1.0], [FRAC_1_SQRT_2, FRAC_1_SQRT_2], [-2.0, 0.0], [0.0, 1.0]];
     let heads: Vec<Vec<f32>> = near.iter().map(|position| position.to_array().to_vec()).collect();
     let axes: Vec<Vec<f32>> = [Vec3::NEG_Y, Vec3::X, Vec3::ZERO].map(|v| v.to_array().to_vec()).to_vec();
     let laws: Vec<Vec<f32>> =

@@ -1,12 +1,13 @@
 //! Every lighting function of `shaders/optics` on the GPU against its f64 twin, over a million random and a hundred thousand hard
 //! inputs each. `cargo test --workspace --test twins -- --nocapture` prints the table; `LUMBRE_TWIN=name` runs the functions with
-//! that in their names, `LUMBRE_TWIN_WORST=1` prints the worst input of each as `regressions.rs` has it.
+//! that in their names, `LUMBRE_TWIN_WORST=1` prints the worst input of each as `worst_inputs.rs` has it.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 #![allow(clippy::print_stdout, reason = "the table is what the test is for")]
 
 mod atmosphere;
 mod bounds;
+mod completeness;
 mod highlights;
 mod inputs;
 mod judge;
@@ -19,6 +20,7 @@ mod regressions;
 mod shading;
 mod vectors;
 mod verdict;
+mod worst_inputs;
 
 use std::sync::OnceLock;
 

@@ -1,5 +1,7 @@
 //! Microfacets: the three distributions, their half-value angles, Torrance and Sparrow's factor.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use glam::DVec3;
 use lumbre_optics::*;
 use lumbre_tests::kernel::{Kernel, Type};
@@ -19,7 +21,7 @@ fn distribution(sequence: &mut Sequence) -> Vec<f32> {
 }
 
 fn hard_distributions() -> Vec<Vec<f32>> {
-    let angles = [0.0f64, 1e-6, 1e-3, 0.1, 0.44, 0.46, 0.8, 1.2, 1.5707];
+    let angles = [0.0f64, 1e-6, 1e-3, 0.1, 0.44, 0.46, 0.8, 1.2, 1.57];
     let angles: Vec<Vec<f32>> = angles.iter().map(|a| vec![a.cos() as f32, a.sin().powi(2) as f32]).collect();
     crossed(&angles, &product(&[&EXPONENTS]))
 }
@@ -40,8 +42,8 @@ fn angles() -> [Twin; 4] {
                 vec![angle.sin() as f32, angle.cos().max(0.0) as f32]
             })
             .corners(product(&[
-                &[0.0, 1e-20, 1e-7, 0.5, 0.707_106_8, 1.0],
-                &[0.0, 1e-20, 1e-7, 0.5, 0.707_106_8, 1.0],
+                &[0.0, 1e-20, 1e-7, 0.5, FRAC_1_SQRT_2, 1.0],
+                &[0.0, 1e-20, 1e-7, 0.5, FRAC_1_SQRT_2, 1.0],
             ])),
         Twin::new("microfacets", "one_minus_exp", &[], &[Type::Number], Type::Number)
             .expect(|x| -(-x[0]).exp_m1())

@@ -88,12 +88,19 @@ fn conditions_on_the_wrong_side() {
 }
 
 #[test]
+fn a_contour_that_does_not_close() {
+    // As it was: where a corner lies on the horizon, rounding let the contour set without rising.
+    let from = "select(height + dot(normal, end), first, index == 3u)";
+    is_seen("polygon_form_factor", "polygon_light", from, "height + dot(normal, end)", 10.0);
+}
+
+#[test]
 fn parts_and_channels_mixed_up() {
     is_seen(
         "light_contribution (phong)",
         "shade",
-        "surface.specular * light.specular",
-        "surface.specular * light.diffuse",
+        "specular * light.specular * factor",
+        "specular * light.diffuse * factor",
         10.0,
     );
     is_seen("fog_depth_cue", "fog", "near_weight * (1.0 - far)", "far_weight * (1.0 - far)", 10.0);

@@ -83,7 +83,7 @@ pub fn twins() -> Vec<Twin> {
             })
             .within(|x| {
                 let [corner, u, v] = [0, 3, 6].map(|at| vector(x, at));
-                polygons::polygon_form_factor(corner, u, v, x[9] > 0.5, vector(x, 10))
+                polygons::polygon_form_factor(corner, u, v, x[9] > 0.5, vector(x, 10), vector(x, 13))
             })
             .random(polygon)
             .corners(hard_polygons())

@@ -1,5 +1,7 @@
 //! Vectors: unit lengths, half vectors, facing, viewers, Lambert's cosine, emission.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use glam::DVec3;
 use lumbre_optics::*;
 use lumbre_tests::kernel::Type;
@@ -29,7 +31,7 @@ fn two(sequence: &mut Sequence) -> Vec<f32> {
 /// Vectors of every length from none to what a square can hold.
 fn lengths() -> Vec<Vec<f32>> {
     let lengths = [0.0, 1e-38, 1e-19, 6e-16, 1e-15, 1.1e-15, 1e-10, 1e-3, 1.0, 1e10, 1e18];
-    let directions = [[1.0, 0.0, 0.0], [0.6, -0.8, 0.0], [0.5, 0.5, -0.707_106_8], [1e-7, 1.0, -0.0]];
+    let directions = [[1.0, 0.0, 0.0], [0.6, -0.8, 0.0], [0.5, 0.5, -FRAC_1_SQRT_2], [1e-7, 1.0, -0.0]];
     lengths.iter().flat_map(|length| directions.map(|v: [f32; 3]| v.map(|c| c * length).to_vec())).collect()
 }
 

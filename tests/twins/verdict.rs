@@ -73,7 +73,7 @@ impl Verdict {
 }
 
 impl Verdict {
-    /// The worst input as a line of `regressions.rs`.
+    /// The worst input as a line of `worst_inputs.rs`.
     pub fn regression(&self) -> String {
         let slug: String = self
             .name
@@ -82,11 +82,11 @@ impl Verdict {
             .collect();
         let slug = slug.split_whitespace().collect::<Vec<_>>().join("_");
         let worst = self.worst();
-        let bits: Vec<String> = worst.input.iter().map(|x| format!("{:#010x}", x.to_bits())).collect();
+        let bits: Vec<String> = worst.input.iter().map(|x| format!("{:x}", x.to_bits())).collect();
         let numbers =
             |numbers: &[f64]| numbers.iter().map(|x| format!("{x:e}")).collect::<Vec<_>>().join(", ");
         let (expected, bound) = (numbers(&worst.expected), numbers(&worst.bound));
-        format!("worst!({slug}, {:?}, [{}], [{expected}], [{bound}]);", self.name, bits.join(", "))
+        format!("worst!({slug}, {:?}, {:?}, [{expected}], [{bound}]);", self.name, bits.join(" "))
     }
 }
 

@@ -44,6 +44,7 @@ pub fn explain(
         specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
         lightmaps: options.lightmaps,
         clamp: options.display == Display::Clamp,
+        half: !options.full_precision,
         lights,
     };
     let mut query = world.query_filtered::<(

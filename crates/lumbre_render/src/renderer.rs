@@ -139,6 +139,7 @@ impl Renderer {
             specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
             lightmaps: options.lightmaps,
             clamp: options.display == Display::Clamp,
+            half: plan.format == wgpu::TextureFormat::Rgba16Float,
             lights,
         };
         let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);

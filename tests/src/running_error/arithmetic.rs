@@ -35,8 +35,8 @@ impl Number {
     fn rounded(value: f64, propagated: f64, roundings: f64) -> Self {
         let size = value.abs() + propagated;
         let error = propagated + roundings * ROUNDING * size + FLUSHED;
-        let overflows = !(size + error <= f64::from(f32::MAX));
-        Self { value, error: if overflows || error.is_nan() { f64::INFINITY } else { error } }
+        let fits = size + error <= f64::from(f32::MAX);
+        Self { value, error: if fits && !error.is_nan() { error } else { f64::INFINITY } }
     }
 
     fn low(self) -> f64 {

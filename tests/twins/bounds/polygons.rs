@@ -12,8 +12,15 @@ pub fn arc_excess(excess: f64) -> f64 {
 }
 
 /// polygon_form_factor: a few u times the aspect of what the polygon would be face on, beyond its size; nearer, 2·10⁻⁵ and 8 u
-/// of its size over the distance to its nearest edge. Any value at the polygon itself where rounding decides on which side of its plane the point is.
-pub fn polygon_form_factor(corner: DVec3, u: DVec3, v: DVec3, triangle: bool, point: DVec3) -> Allowed {
+/// of its size over the distance to its nearest edge, the horizon among them. Any value at the polygon itself where rounding decides on which side of its plane the point is.
+pub fn polygon_form_factor(
+    corner: DVec3,
+    u: DVec3,
+    v: DVec3,
+    triangle: bool,
+    point: DVec3,
+    normal: DVec3,
+) -> Allowed {
     let area_vector = u.cross(v);
     let middle = (u + v) * if triangle { 1.0 / 3.0 } else { 0.5 };
     let center = corner - point + middle;
@@ -25,7 +32,16 @@ pub fn polygon_form_factor(corner: DVec3, u: DVec3, v: DVec3, triangle: bool, po
     let error = match distance > longest {
         true => (1e-6 + 3e-7 * aspect) * face_on,
         // A corner relative to the point is off by u of the polygon's size, an edge's direction by that over its distance.
-        false => 2e-5 * (1.0 + 0.1 * aspect) + (8.0 * U * longest / nearest_edge(corner - point, u, v, triangle)).min(1.0),
+        false => {
+            let mut nearest = nearest_edge(corner - point, u, v, triangle);
+            let corners =
+                [corner, corner + u, corner + v, corner + u + v].map(|corner| normal.dot(corner - point));
+            if corners.iter().any(|height| *height < 0.0) && corners.iter().any(|height| *height >= 0.0) {
+                // The horizon is an edge too, and passes as near as the plane.
+                nearest = nearest.min(area_vector.dot(center).abs() / area.max(1e-30)).max(1e-30);
+            }
+            2e-5 * (1.0 + 0.1 * aspect) + (8.0 * U * longest / nearest).min(1.0)
+        }
     };
     let size = vectors::cross_size(u, v).dot(center.abs());
     let open = area_vector.dot(center).abs() <= 8.0 * U * size + 10.0 * FLUSHED;

@@ -40,6 +40,8 @@ pub(crate) struct FrameFeatures {
     pub lightmaps: bool,
     pub specular_antialiasing: bool,
     pub clamp: bool,
+    /// The frame is kept in half floats.
+    pub half: bool,
     pub lights: LightSet,
 }
 
@@ -150,6 +152,8 @@ impl Traits {
         let filtered = frame.specular_antialiasing && lit && !per_vertex && self.specular;
         variant.set(Feature::SpecularAntialiasing, filtered);
         variant.set(Feature::Clamp, frame.clamp);
+        // What is clamped to 1 overflows nothing.
+        variant.set(Feature::HalfRange, frame.half && !frame.clamp);
         variant.set(Feature::ClampVertices, frame.clamp && per_vertex);
         variant.set(Feature::Modulated, per_vertex && variant.has(Feature::BaseColorTexture));
         variant.reduced()

@@ -92,6 +92,8 @@ features! {
     FresnelConductor = 31 => "FRESNEL_CONDUCTOR",
     /// Microfacets that reflect k_s at normal incidence.
     FresnelNormalReflectance = 32 => "FRESNEL_NORMAL_REFLECTANCE",
+    /// Writes into half floats: what is brighter than the largest of them is as bright as that.
+    HalfRange = 33 => "HALF_RANGE",
 }
 
 /// A variant of the forward shader.
