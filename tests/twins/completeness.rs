@@ -10,7 +10,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("specular_reflection", "in every light_contribution; its microfacets are microfacet_reflection"),
     ("contour_term", "five times in polygon_form_factor"),
     ("polygon_light_contribution", "polygon_form_factor, and polygon_highlight"),
-    ("polygon_highlight", "a sum of light_contribution over points; against its f64 twin in lumbre_optics and in frames"),
+    (
+        "polygon_highlight",
+        "a sum of light_contribution over points; against its f64 twin in lumbre_optics and in frames",
+    ),
     ("lobe_width", "where polygon_highlight puts its points"),
     ("lobe_axis", "where polygon_highlight puts its points"),
     ("axis_sample", "where polygon_highlight puts its points"),

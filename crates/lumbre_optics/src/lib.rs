@@ -53,12 +53,14 @@ mod fresnel;
 mod half_vector;
 mod lambert;
 mod light;
+mod light_matrix;
 mod light_validation;
 mod material;
 mod material_validation;
 mod microfacet_reflection;
 mod microfacets;
 mod normalization;
+mod normalized_highlight;
 mod phong;
 mod polygon_light;
 mod power;
@@ -87,6 +89,7 @@ pub use fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
 pub use half_vector::{half_vector, try_half_vector};
 pub use lambert::lambert;
 pub use light::{BakeMode, Light, LightKind};
+pub use light_matrix::{LightMatrix, LightMatrixError};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
 pub use material_validation::MaterialError;
@@ -98,6 +101,9 @@ pub use microfacets::{
     half_value_sine_squared,
 };
 pub use normalization::{TINY_LENGTH_SQUARED, safe_length, safe_normalize, try_normalize};
+pub use normalized_highlight::{
+    blinn_phong_normalization, blinn_phong_normalization_approximate, phong_normalization,
+};
 pub use phong::{phong, reflected_direction};
 pub use polygon_light::{
     HIGHLIGHT_SAMPLES, PolygonLight, polygon_form_factor, polygon_highlight, polygon_light_contribution,

@@ -256,4 +256,60 @@ proptest! {
             prop_assert!(fog_weight(&mode, near.min(far)) >= fog_weight(&mode, near.max(far)));
         }
     }
+
+    #[test]
+    fn light_is_linear_in_each_of_its_colours(
+        (light, viewer) in (above(), above()),
+        surface in any_surface(),
+        model in model(),
+        (a, b) in (color(), color()),
+        part in 0..3usize,
+    ) {
+        // L(a) + L(b) = L(a + b) in the ambient, the diffuse and the specular colour by itself.
+        let lit = |color: Vec3| {
+            let mut sample = LightSample { direction: light, attenuation: 0.5, spot: 0.75, ..LightSample::DARK };
+            let parts = [&mut sample.ambient, &mut sample.diffuse, &mut sample.specular];
+            *parts.into_iter().nth(part).expect("one of three") = color.as_dvec3();
+            light_contribution(model, &surface, &sample, DVec3::Z, viewer).total()
+        };
+        let (sum, whole) = (lit(a) + lit(b), lit(a + b));
+        // Colours are f32: their sum is rounded.
+        prop_assert!((sum - whole).abs().max_element() <= 1e-6 * (1.0 + whole.max_element()), "{sum} {whole}");
+    }
+
+    #[test]
+    fn microfacets_are_reciprocal_with_every_choice(
+        (light, viewer) in (above(), above()),
+        shininess in 0.0..500.0f64,
+        distribution in prop::sample::select(Distribution::ALL.to_vec()),
+        fresnel in prop::sample::select(vec![
+            Fresnel::Dielectric,
+            Fresnel::NormalReflectance,
+            Fresnel::Conductor { eta: Vec3::new(0.2, 0.9, 1.4), absorption: Vec3::new(3.0, 2.5, 2.0) },
+        ]),
+    ) {
+        // Times n.v it is symmetric: G and D are, and F knows h alone. Above the floor of the view cosine.
+        let reflect = |l: DVec3, v: DVec3| {
+            let kind = (distribution, fresnel);
+            microfacet_reflection(kind, DVec3::Z, l, v, shininess, DVec3::new(0.9, 0.5, 0.04), 1.5) * v.z
+        };
+        let (there, back) = (reflect(light, viewer), reflect(viewer, light));
+        prop_assert!((there - back).abs().max_element() <= 1e-9 * (1.0 + there.max_element()), "{there} {back}");
+    }
+
+    #[test]
+    fn microfacets_reflect_no_more_than_fresnel_allows(
+        incident in 0.0..1.4f64,
+        shininess in 1.0..200.0f64,
+        distribution in prop::sample::select(Distribution::ALL.to_vec()),
+    ) {
+        // The mirror direction of a mirror: k_s D G F/(n.v) with D = 1 is at most 1/(n.v), so times n.v at most 1.
+        let light = DVec3::new(incident.sin(), 0.0, incident.cos());
+        let kind = (distribution, Fresnel::NormalReflectance);
+        for azimuth in [0.0f64, 0.3, 3.0] {
+            let viewer = DVec3::new(-light.x * azimuth.cos(), light.x * azimuth.sin(), light.z);
+            let sent = microfacet_reflection(kind, DVec3::Z, light, viewer, shininess, DVec3::ONE, 1.5) * viewer.z;
+            prop_assert!(sent.max_element() <= 1.0 + 1e-12, "{sent}");
+        }
+    }
 }

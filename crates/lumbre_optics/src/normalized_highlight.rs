@@ -1,0 +1,148 @@
+//! Highlights of one energy at every exponent: what a specular factor is multiplied by so that a surface with k_s = 1 sends on at most
+//! what it receives. Not the models themselves, whose highlights are 1 at the peak and gain or lose energy with the exponent.
+//!
+//! The documents' models, OpenGL and this renderer's frames use the bare factors: their k_s is a brightness. Use these where k_s is to
+//! be the reflected part of the light: to set materials by measured reflectance, to keep an object as bright when its exponent changes,
+//! to compare with a path tracer or a physically based renderer, or as the reflectance of a photon or a ray.
+//!
+//! As everywhere here a light's colour is irradiance / π, so a factor f stands for the reflectance distribution f/(π n·l): the constants
+//! are those of the books times π, and the two Phong forms have the cosine n·l, which their bare factors lack.
+
+use std::f64::consts::LN_2;
+
+use glam::DVec3;
+
+use crate::blinn_phong::blinn_phong;
+use crate::lambert::lambert;
+use crate::microfacet_reflection::Distribution;
+use crate::microfacets::{half_value_angle, trowbridge_reitz_width_squared};
+use crate::phong::phong;
+
+/// Beyond this exponent 2^(-n/2) is nothing beside n, and f32's exp2 need not be asked.
+const LARGEST_EXPONENT: f64 = 200.0;
+
+/// (n + 2)/2: Phong's lobe as a reflectance is (n + 2)/(2 π) (r·v)ⁿ (Lewis 1994). Exact at normal incidence; else less is sent on, as
+/// part of the lobe is behind the surface.
+///
+/// # Error of the f32 twin
+///
+/// u: a sum.
+pub fn phong_normalization(shininess: f64) -> f64 {
+    0.5 * (shininess.max(0.0) + 2.0)
+}
+
+/// (n + 2)(n + 4)/(8 (2^(-n/2) + n)): exact at normal incidence, where the lobe in the half vector is cut off at 45 degrees.
+///
+/// The usual (n + 8)/8 is near it, and gains up to 7.5 % (at n = 9).
+///
+/// # Error of the f32 twin
+///
+/// 9 u, and exp2's 2 u (3 + n) 2^(-n/2)/(2^(-n/2) + n): at most 15 u.
+pub fn blinn_phong_normalization(shininess: f64) -> f64 {
+    let n = shininess.max(0.0);
+    (n + 2.0) * (n + 4.0) / (8.0 * ((-0.5 * n.min(LARGEST_EXPONENT)).exp2() + n))
+}
+
+/// [`phong`] with its energy: (n + 2)/2 (r·v)ⁿ (n·l). Times k_s and the light's colour, like the bare factor.
+///
+/// # Error of the f32 twin
+///
+/// [`phong`]'s times the rest, 3 u Σ|n l| of what multiplies the cosine, and 3 u.
+pub fn normalized_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
+    phong_normalization(shininess) * phong(normal, light, viewer, shininess) * lambert(normal, light)
+}
+
+/// [`blinn_phong`] with its energy, and with the cosine n·l.
+///
+/// # Error of the f32 twin
+///
+/// [`blinn_phong`]'s times the rest, 3 u Σ|n l| of what multiplies the cosine, and 17 u.
+pub fn normalized_blinn_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64) -> f64 {
+    let factor = blinn_phong(normal, light, viewer, shininess);
+    blinn_phong_normalization(shininess) * factor * lambert(normal, light)
+}
+
+/// π/(4 ∫ D cos dω): what D G F/(n·v) of [`microfacet_lobe`](crate::microfacet_lobe) and Torrance and Sparrow's model is multiplied by.
+/// The microfacets' areas, seen from above, then add up to the surface's, and with Blinn's G no light is gained (the cavities of
+/// Torrance and Sparrow conserve it; Heitz 2014).
+///
+/// (n + 2)/8 for cosine powers, 1/(4 c₃²) for Trowbridge and Reitz. The Gaussian's integral has no closed form; ln 2/(4 β²) is its limit
+/// for sharp highlights and loses energy in wide ones: 5 % at n = 10, 40 % at n = 1.
+///
+/// Below an exponent of 6 it is less than 1: there the bare model can send on more than it receives.
+pub fn microfacet_normalization(distribution: Distribution, shininess: f64) -> f64 {
+    match distribution {
+        Distribution::CosinePower => 0.125 * (shininess.max(0.0) + 2.0),
+        Distribution::Gaussian => {
+            let beta = half_value_angle(shininess);
+            LN_2 / (4.0 * beta * beta)
+        }
+        Distribution::TrowbridgeReitz => 0.25 / trowbridge_reitz_width_squared(shininess),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponent_zero_is_lambert() {
+        // A lobe that is 1 everywhere: k_s of the light, evenly.
+        assert_eq!(phong_normalization(0.0), 1.0);
+        assert_eq!(blinn_phong_normalization(0.0), 1.0);
+        let light = DVec3::new(0.6, 0.8, 0.0);
+        assert_eq!(normalized_phong(DVec3::Y, light, DVec3::Y, 0.0), 0.8);
+        assert_eq!(normalized_blinn_phong(DVec3::Y, light, DVec3::Y, 0.0), 0.8);
+    }
+
+    #[test]
+    fn sharp_lobes_grow_as_known() {
+        // Half and an eighth of n: the half vector turns by half.
+        assert!((phong_normalization(1e6) / 5e5 - 1.0).abs() < 3e-6);
+        assert!((blinn_phong_normalization(1e6) / 1.25e5 - 1.0).abs() < 7e-6);
+        // Four times the exponent, the same width of the highlight: n/2 and 4 n/8.
+        assert!((blinn_phong_normalization(4e6) / phong_normalization(1e6) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_usual_constant_gains_seven_and_a_half_per_cent() {
+        let gain = |n: f64| (n + 8.0) / 8.0 / blinn_phong_normalization(n);
+        let (at, most) =
+            (0..2000).map(|step| f64::from(step) * 0.01).map(|n| (n, gain(n))).fold((0.0, 0.0), |most, one| {
+                if one.1 > most.1 { one } else { most }
+            });
+        assert!((most - 1.0752).abs() < 1e-4 && (at - 9.0).abs() < 0.5, "{at} {most}");
+    }
+
+    /// ∫ D cos dω by the midpoint rule in sin².
+    fn projected_area(density: impl Fn(f64, f64) -> f64) -> f64 {
+        let steps = 1_000_000;
+        let sum: f64 = (0..steps)
+            .map(|step| {
+                let sine_squared = (f64::from(step) + 0.5) / f64::from(steps);
+                density((1.0 - sine_squared).sqrt(), sine_squared)
+            })
+            .sum();
+        sum * std::f64::consts::PI / f64::from(steps)
+    }
+
+    #[test]
+    fn microfacets_cover_the_surface_once() {
+        use crate::microfacets::{
+            distribution_cosine_power, distribution_gaussian, distribution_trowbridge_reitz,
+        };
+        for n in [0.0, 1.0, 10.0, 300.0] {
+            let covered = |distribution, area: f64| {
+                4.0 * microfacet_normalization(distribution, n) * area / std::f64::consts::PI
+            };
+            let power = projected_area(|c, s| distribution_cosine_power(c, s, n));
+            let tail = projected_area(|_, s| distribution_trowbridge_reitz(s, n));
+            let bell = projected_area(|c, s| distribution_gaussian(c, s, n));
+            // The rule's error is (1/steps)² times a curvature of up to n², over an area of 1/n.
+            assert!((covered(Distribution::CosinePower, power) - 1.0).abs() < 1e-6, "{n}");
+            assert!((covered(Distribution::TrowbridgeReitz, tail) - 1.0).abs() < 1e-6, "{n}");
+            let gaussian = covered(Distribution::Gaussian, bell);
+            assert!(gaussian <= 1.0 && (n < 100.0 || gaussian > 0.995), "{n}: {gaussian}");
+        }
+    }
+}
