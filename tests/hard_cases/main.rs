@@ -11,6 +11,7 @@ mod files;
 mod frames;
 mod functions;
 mod many_lights;
+mod overflow;
 mod places;
 
 use case::{Case, HEADING};
@@ -34,7 +35,15 @@ macro_rules! cases {
 }
 
 fn all() -> Vec<Case> {
-    [functions::cases(), files::cases(), frames::cases(), places::cases(), many_lights::cases()].concat()
+    [
+        functions::cases(),
+        files::cases(),
+        frames::cases(),
+        places::cases(),
+        many_lights::cases(),
+        overflow::cases(),
+    ]
+    .concat()
 }
 
 #[test]

@@ -89,7 +89,7 @@ pub use fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
 pub use half_vector::{half_vector, try_half_vector};
 pub use lambert::lambert;
 pub use light::{BakeMode, Light, LightKind};
-pub use light_matrix::{LightMatrix, LightMatrixError};
+pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
 pub use material_validation::MaterialError;
@@ -102,7 +102,8 @@ pub use microfacets::{
 };
 pub use normalization::{TINY_LENGTH_SQUARED, safe_length, safe_normalize, try_normalize};
 pub use normalized_highlight::{
-    blinn_phong_normalization, blinn_phong_normalization_approximate, phong_normalization,
+    blinn_phong_normalization, microfacet_normalization, normalized_blinn_phong, normalized_phong,
+    phong_normalization,
 };
 pub use phong::{phong, reflected_direction};
 pub use polygon_light::{

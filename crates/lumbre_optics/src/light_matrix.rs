@@ -48,11 +48,7 @@ impl LightMatrix {
 
     /// The matrix as the document writes it, row by row: ambient, diffuse, specular.
     pub fn from_rows([ambient, diffuse, specular]: [[f64; 3]; 3]) -> Self {
-        Self {
-            ambient: DVec3::from(ambient),
-            diffuse: DVec3::from(diffuse),
-            specular: DVec3::from(specular),
-        }
+        Self { ambient: DVec3::from(ambient), diffuse: DVec3::from(diffuse), specular: DVec3::from(specular) }
     }
 
     /// The rows: ambient, diffuse, specular.
@@ -83,11 +79,7 @@ impl LightMatrix {
 
     /// Every row times a colour, channel by channel: a gel before the lamp.
     pub fn filtered(self, color: DVec3) -> Self {
-        Self {
-            ambient: self.ambient * color,
-            diffuse: self.diffuse * color,
-            specular: self.specular * color,
-        }
+        Self { ambient: self.ambient * color, diffuse: self.diffuse * color, specular: self.specular * color }
     }
 
     /// I = R_a L_a + R_d L_d + R_s L_s, channel by channel: the diagonal of the product R L.

@@ -69,10 +69,15 @@ pub fn distribution_gaussian(cosine: f64, sine_squared: f64, shininess: f64) -> 
 /// q² for q = A/(A + B), A = c₃², B = sin² α (1 - A): q is off by q (1 - q) times the relative errors of A
 /// ((1 - A) times that of [`half_value_sine_squared`], and 8 u) and of 1 - A, and 6 u of itself; D by 2 q times that. At most 30 u. A squared sine that is off by δ itself counts q² (1 - A) δ/A.
 pub fn distribution_trowbridge_reitz(sine_squared: f64, shininess: f64) -> f64 {
-    let half_value = half_value_sine_squared(shininess);
-    let c3_squared = half_value / (SQRT_2 - 1.0 + half_value);
+    let c3_squared = trowbridge_reitz_width_squared(shininess);
     let ratio = c3_squared / (c3_squared + sine_squared.clamp(0.0, 1.0) * (1.0 - c3_squared));
     ratio * ratio
+}
+
+/// c₃², from 0 for a mirror to .71 for the exponent 0: the squared roughness α² of those who write this distribution as GGX.
+pub(crate) fn trowbridge_reitz_width_squared(shininess: f64) -> f64 {
+    let half_value = half_value_sine_squared(shininess);
+    half_value / (SQRT_2 - 1.0 + half_value)
 }
 
 #[cfg(test)]
