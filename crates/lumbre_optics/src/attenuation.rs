@@ -48,12 +48,7 @@ impl Attenuation {
     /// The factor at a distance, or nothing where the formula itself has none: 1/0 at the light, (0, 0, 0), a
     /// negative or non-finite coefficient, a range of 0 or less, a distance that is negative or not finite.
     pub fn try_factor(&self, distance: f64) -> Option<f64> {
-        let coefficients = self.coefficients().as_dvec3();
-        let usable = coefficients.is_finite() && coefficients.min_element() >= 0.0 && self.range > 0.0;
-        let defined = distance.is_finite()
-            && distance >= 0.0
-            && coefficients.dot(DVec3::new(1.0, distance, distance * distance)) > 0.0;
-        (usable && defined).then(|| self.factor(distance))
+        try_attenuate(self.coefficients().as_dvec3(), self.clamp, f64::from(self.range), distance)
     }
 
     /// The largest factor that [`attenuate`] gives, which is the one at distance 0.
@@ -116,6 +111,16 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
     let ratio_squared = ratio * ratio;
     let window = (1.0 - ratio_squared * ratio_squared).max(0.0);
     window * if clamp_to_one { factor.min(1.0) } else { factor }
+}
+
+/// [`attenuate`], or nothing where the formula itself has no value: 1/0 at the light or for coefficients that are all 0, a negative or
+/// non-finite coefficient, a range of 0 or less, a distance that is negative or not finite.
+pub fn try_attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: f64) -> Option<f64> {
+    let usable = coefficients.is_finite() && coefficients.min_element() >= 0.0 && range > 0.0;
+    let defined = distance.is_finite()
+        && distance >= 0.0
+        && coefficients.dot(DVec3::new(1.0, distance, distance * distance)) > 0.0;
+    (usable && defined).then(|| attenuate(coefficients, clamp_to_one, range, distance))
 }
 
 impl Default for Attenuation {
@@ -190,6 +195,10 @@ mod tests {
         }
         assert_eq!(triple(0.0, 0.0, 0.0).try_factor(1.0), None);
         assert_eq!(triple(f32::NAN, 0.0, 0.0).try_factor(1.0), None);
+        assert_eq!(try_attenuate(DVec3::ZERO, true, f64::INFINITY, 1.0), None);
+        assert_eq!(try_attenuate(DVec3::Z, false, -1.0, 1.0), None);
+        assert_eq!(try_attenuate(DVec3::Z, false, f64::NAN, 1.0), None);
+        assert_eq!(try_attenuate(DVec3::Z, false, f64::INFINITY, 2.0), Some(0.25));
     }
 
     #[test]

@@ -3,7 +3,9 @@
 
 use glam::DVec3;
 
-use crate::normalization::{safe_length, safe_normalize};
+use thiserror::Error;
+
+use crate::normalization::{safe_length, safe_normalize, try_normalize};
 use crate::spot::{SpotCosines, spot_factor};
 use crate::{Light, LightKind};
 
@@ -80,6 +82,59 @@ pub fn evaluate_light(light: &Light, light_position: DVec3, light_axis: DVec3, p
     }
 }
 
+/// Why a light cannot be evaluated at a point. [`evaluate_light`] has a value there all the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum NoLight {
+    /// The light is off.
+    #[error("the light is off")]
+    Off,
+    /// A directional light or a spotlight without an axis: its node is scaled to nothing.
+    #[error("the light has no direction to shine in: give its node a scale that is not 0")]
+    NoAxis,
+    /// The point is the light's own position.
+    #[error("the point is the light's own position, from which no direction leads to it")]
+    AtTheLight,
+    /// The law of distance has no value: see [`try_attenuate`](crate::try_attenuate).
+    #[error("the attenuation has no value there: give coefficients that are at least 0 and not all 0")]
+    NoAttenuation,
+    /// The cone has none: see [`SpotCone::try_factor`](crate::SpotCone::try_factor).
+    #[error("the cone has no value: give angles from 0 to π/2 and an exponent of at least 0")]
+    NoCone,
+}
+
+/// [`evaluate_light`], or why there is nothing to evaluate.
+///
+/// # Errors
+/// [`NoLight`], the first reason in the order of its list.
+pub fn try_evaluate_light(
+    light: &Light,
+    light_position: DVec3,
+    light_axis: DVec3,
+    point: DVec3,
+) -> Result<LightSample, NoLight> {
+    if !light.enabled {
+        return Err(NoLight::Off);
+    }
+    let directional = light.kind == LightKind::Directional;
+    if light.kind != LightKind::Ambient {
+        if (directional || light.spot.is_some()) && try_normalize(light_axis).is_none() {
+            return Err(NoLight::NoAxis);
+        }
+        let half_way = light_position * 0.5 - point * 0.5;
+        if !directional {
+            let direction = try_normalize(half_way).ok_or(NoLight::AtTheLight)?;
+            let distance = 2.0 * safe_length(half_way);
+            light.attenuation.try_factor(distance).ok_or(NoLight::NoAttenuation)?;
+            if let Some(cone) = light.spot {
+                cone.try_factor(light_axis, -direction).ok_or(NoLight::NoCone)?;
+            }
+        } else if let Some(cone) = light.spot {
+            cone.try_factor(light_axis, light_axis).ok_or(NoLight::NoCone)?;
+        }
+    }
+    Ok(evaluate_light(light, light_position, light_axis, point))
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -127,6 +182,35 @@ mod tests {
         let sample = evaluate_light(&Light::point(Vec3::ONE), DVec3::ONE, -DVec3::Y, DVec3::ONE);
         assert_eq!(sample.direction, DVec3::ZERO);
         assert!((sample.attenuation / 1e4 - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn every_reason_for_no_light() {
+        let tried = |light: &Light, axis: DVec3, point: DVec3| {
+            try_evaluate_light(light, DVec3::Y, axis, point).map(|sample| sample.spot)
+        };
+        let lamp = Light::point(Vec3::ONE);
+        let cone = SpotCone::Exponent { cutoff: 1.0, exponent: 0.0 };
+        let spot = Light::spot(Vec3::ONE, cone);
+        assert_eq!(tried(&lamp, DVec3::ZERO, DVec3::ZERO), Ok(1.0));
+        assert_eq!(tried(&lamp, DVec3::ZERO, DVec3::Y), Err(NoLight::AtTheLight));
+        assert_eq!(
+            tried(&Light { enabled: false, ..lamp.clone() }, -DVec3::Y, DVec3::ZERO),
+            Err(NoLight::Off)
+        );
+        assert_eq!(tried(&spot, -DVec3::Y, DVec3::ZERO), Ok(1.0));
+        assert_eq!(tried(&spot, DVec3::ZERO, DVec3::ZERO), Err(NoLight::NoAxis));
+        assert_eq!(tried(&Light::directional(Vec3::ONE), DVec3::ZERO, DVec3::ZERO), Err(NoLight::NoAxis));
+        let none = Attenuation { constant: 0.0, ..Attenuation::NONE };
+        let nowhere = Light { attenuation: none, ..lamp };
+        assert_eq!(tried(&nowhere, -DVec3::Y, DVec3::ZERO), Err(NoLight::NoAttenuation));
+        let turned = Light { spot: Some(SpotCone::Smooth { inner: 1.0, outer: 0.1 }), ..spot };
+        assert_eq!(tried(&turned, -DVec3::Y, DVec3::ZERO), Err(NoLight::NoCone));
+        let sun = Light { spot: turned.spot, ..Light::directional(Vec3::ONE) };
+        assert_eq!(tried(&sun, -DVec3::Y, DVec3::ZERO), Err(NoLight::NoCone));
+        assert_eq!(tried(&Light::ambient(Vec3::ONE), DVec3::ZERO, DVec3::Y), Ok(1.0));
+        // The plain twin is guarded: no light, or as much as there is.
+        assert_eq!(evaluate_light(&spot, DVec3::Y, DVec3::ZERO, DVec3::ZERO).spot, 0.0);
     }
 
     #[test]

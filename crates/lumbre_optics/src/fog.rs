@@ -151,6 +151,26 @@ pub fn fog_weight(mode: &FogMode, distance: f64) -> f64 {
     }
 }
 
+/// [`fog_weight`], or nothing where the formula has none: a linear fog or depth cue that ends where it starts (a step, there), a number
+/// that is not finite, a density or distance that is negative, a weight outside [0, 1].
+pub fn try_fog_weight(mode: &FogMode, distance: f64) -> Option<f64> {
+    let span = |start: f32, end: f32| {
+        let span = f64::from(end) - f64::from(start);
+        span.is_finite() && span.abs() >= SMALLEST_SPAN
+    };
+    let usable = match *mode {
+        FogMode::Linear { start, end } => span(start, end),
+        FogMode::Exponential { density } | FogMode::ExponentialSquared { density } => {
+            density.is_finite() && density >= 0.0
+        }
+        FogMode::DepthCue { start, end, near_weight, far_weight } => {
+            span(start, end) && [near_weight, far_weight].iter().all(|weight| (0.0..=1.0).contains(weight))
+        }
+    };
+    let defined = usable && distance.is_finite() && distance >= 0.0;
+    defined.then(|| fog_weight(mode, distance))
+}
+
 /// `weight * lit + (1 - weight) * fog_color`, linear RGB. Alpha is untouched.
 ///
 /// # Error of the f32 twin
@@ -182,6 +202,29 @@ mod tests {
         let mode = FogMode::DepthCue { start: 5.0, end: 5.0, near_weight: 0.75, far_weight: 0.25 };
         assert_eq!(fog_weight(&mode, 4.0), 0.75);
         assert_eq!(fog_weight(&mode, 6.0), 0.25);
+        assert_eq!(try_fog_weight(&mode, 6.0), None);
+        assert_eq!(try_fog_weight(&FogMode::Linear { start: 5.0, end: 5.0 }, 4.0), None);
+    }
+
+    #[test]
+    fn fogs_that_have_no_weight() {
+        let linear = FogMode::Linear { start: 2.0, end: 10.0 };
+        assert_eq!(try_fog_weight(&linear, 4.0), Some(0.75));
+        let cue = |near_weight| FogMode::DepthCue { start: 0.0, end: 1.0, near_weight, far_weight: 0.0 };
+        assert_eq!(try_fog_weight(&cue(0.5), 0.0), Some(0.5));
+        for distance in [-1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(try_fog_weight(&linear, distance), None);
+        }
+        let bad = [
+            FogMode::Linear { start: f32::NAN, end: 1.0 },
+            FogMode::Linear { start: 0.0, end: f32::INFINITY },
+            FogMode::Exponential { density: -1.0 },
+            FogMode::ExponentialSquared { density: f32::NAN },
+            cue(1.5),
+        ];
+        for mode in bad {
+            assert_eq!(try_fog_weight(&mode, 1.0), None, "{mode:?}");
+        }
     }
 
     #[test]

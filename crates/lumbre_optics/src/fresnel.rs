@@ -39,6 +39,12 @@ pub fn fresnel_dielectric(cos_incident: f64, eta: f64) -> f64 {
     0.5 * (across * across + along * along)
 }
 
+/// [`fresnel_dielectric`], or nothing for a cosine outside [0, 1] or an index outside [10⁻⁴, 10⁴], to which it clamps them.
+pub fn try_fresnel_dielectric(cos_incident: f64, eta: f64) -> Option<f64> {
+    let usable = (0.0..=1.0).contains(&cos_incident) && (SMALLEST_INDEX..=LARGEST_CONSTANT).contains(&eta);
+    usable.then(|| fresnel_dielectric(cos_incident, eta))
+}
+
 /// The part of the light that a conductor in vacuum or air reflects, per channel, in [0, 1].
 ///
 /// `eta` and `absorption` are the real and imaginary parts of its index of refraction. With no absorption and
@@ -70,6 +76,21 @@ pub fn fresnel_conductor(cos_incident: f64, eta: DVec3, absorption: DVec3) -> DV
         0.5 * across * (1.0 + along)
     };
     DVec3::new(channel(eta.x, absorption.x), channel(eta.y, absorption.y), channel(eta.z, absorption.z))
+}
+
+/// [`fresnel_conductor`], or nothing for a cosine outside [0, 1]; for constants outside [0, 10⁴], to which it clamps them; for an index
+/// of 0 (neither part is positive); and for no boundary at all (η = 1, k = 0) at exactly 90 degrees.
+pub fn try_fresnel_conductor(cos_incident: f64, eta: DVec3, absorption: DVec3) -> Option<DVec3> {
+    let usable = |channel: usize| {
+        let (eta, absorption) = (eta[channel], absorption[channel]);
+        let constants = 0.0..=LARGEST_CONSTANT;
+        constants.contains(&eta)
+            && constants.contains(&absorption)
+            && (eta > 0.0 || absorption > 0.0)
+            && !(cos_incident == 0.0 && eta == 1.0 && absorption == 0.0)
+    };
+    let defined = (0.0..=1.0).contains(&cos_incident) && (0..3).all(usable);
+    defined.then(|| fresnel_conductor(cos_incident, eta, absorption))
 }
 
 /// Schlick's approximation: f0 + (1 - f0)(1 - cos θ)⁵, with f0 the reflectance at normal incidence.
@@ -157,6 +178,30 @@ mod tests {
         let (eta, absorption) = (DVec3::splat(3.11), DVec3::splat(3.31));
         assert!((fresnel_conductor(1.0, eta, absorption).x - expected).abs() < 1e-15);
         assert!((fresnel_conductor(0.0, eta, absorption).x - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn constants_that_are_none_have_no_reflectance() {
+        assert_eq!(try_fresnel_dielectric(0.5, 1.5), Some(fresnel_dielectric(0.5, 1.5)));
+        for (cosine, eta) in [(-0.1, 1.5), (1.1, 1.5), (0.5, 0.0), (0.5, -1.5), (0.5, 2e4), (0.5, f64::NAN)] {
+            assert_eq!(try_fresnel_dielectric(cosine, eta), None, "{cosine} {eta}");
+        }
+        let conductor = |cosine, eta, absorption| {
+            try_fresnel_conductor(cosine, DVec3::new(0.2, eta, 1.4), DVec3::new(3.0, absorption, 2.0))
+        };
+        assert!(conductor(0.5, 0.0, 2.0).is_some() && conductor(0.5, 1.5, 0.0).is_some());
+        let bad = [
+            (1.5, 1.0, 1.0),
+            (0.5, 0.0, 0.0),
+            (0.5, -0.1, 1.0),
+            (0.5, 1.0, -0.1),
+            (0.5, f64::NAN, 1.0),
+            (0.5, 1.0, f64::INFINITY),
+            (0.0, 1.0, 0.0),
+        ];
+        for (cosine, eta, absorption) in bad {
+            assert_eq!(conductor(cosine, eta, absorption), None, "{cosine} {eta} {absorption}");
+        }
     }
 
     #[test]

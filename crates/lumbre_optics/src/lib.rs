@@ -15,7 +15,8 @@
 //!                          apply_fog ◄── add_emission ◄── Contribution { ambient, diffuse, specular }
 //!
 //!   beside it: polygon_light_contribution (an emissive polygon in place of a LightSample),
-//!              transmitted_direction (Snell), fresnel_conductor, facing_normal (two-sided)
+//!              transmitted_direction (Snell), facing_normal (two-sided), LightMatrix (document [I]'s 3x3 matrices),
+//!              normalized_phong (highlights of one energy)
 //! ```
 //!
 //! Directions are unit and point away from the surface: `normal`, `light`, `viewer`. The zero vector stands
@@ -54,12 +55,14 @@ mod half_vector;
 mod lambert;
 mod light;
 mod light_matrix;
+mod light_matrix;
 mod light_validation;
 mod material;
 mod material_validation;
 mod microfacet_reflection;
 mod microfacets;
 mod normalization;
+mod normalized_highlight;
 mod normalized_highlight;
 mod phong;
 mod polygon_light;
@@ -76,25 +79,31 @@ mod validation;
 mod viewer;
 
 pub use angle::quarter_angle;
-pub use attenuation::{Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate};
+pub use attenuation::{
+    Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, try_attenuate,
+};
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
 pub use emission::{add_emission, exitance};
-pub use evaluate_light::{LightSample, evaluate_light};
+pub use evaluate_light::{LightSample, NoLight, evaluate_light, try_evaluate_light};
 pub use fog::{
     Fog, FogMode, apply_fog, fog_depth_cue, fog_exponential, fog_exponential_squared, fog_fraction,
-    fog_linear, fog_weight,
+    fog_linear, fog_weight, try_fog_weight,
 };
 pub use fog_validation::FogError;
-pub use fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
+pub use fresnel::{
+    fresnel_conductor, fresnel_dielectric, fresnel_schlick, try_fresnel_conductor, try_fresnel_dielectric,
+};
 pub use half_vector::{half_vector, try_half_vector};
 pub use lambert::lambert;
 pub use light::{BakeMode, Light, LightKind};
+pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
 pub use material_validation::MaterialError;
 pub use microfacet_reflection::{
     Distribution, Fresnel, fresnel_normal_reflectance, microfacet_lobe, microfacet_reflection,
+    try_fresnel_normal_reflectance,
 };
 pub use microfacets::{
     distribution_cosine_power, distribution_gaussian, distribution_trowbridge_reitz, half_value_angle,
@@ -105,7 +114,11 @@ pub use normalized_highlight::{
     blinn_phong_normalization, microfacet_normalization, normalized_blinn_phong, normalized_phong,
     phong_normalization,
 };
-pub use phong::{phong, reflected_direction};
+pub use normalized_highlight::{
+    blinn_phong_normalization, microfacet_normalization, normalized_blinn_phong, normalized_phong,
+    phong_normalization,
+};
+pub use phong::{phong, reflected_direction, try_reflected_direction};
 pub use polygon_light::{
     HIGHLIGHT_SAMPLES, PolygonLight, polygon_form_factor, polygon_highlight, polygon_light_contribution,
 };
@@ -117,7 +130,7 @@ pub use shade::{
 pub use shading::{FlatRule, ReflectionModel, Shading};
 pub use snell::{
     critical_angle, is_totally_reflected, transmitted_cosine, transmitted_direction, transmitted_highlight,
-    try_transmitted_direction,
+    try_transmitted_cosine, try_transmitted_direction,
 };
 pub use specular_antialiasing::{
     FILTER_VARIANCE, FilteredLobe, LARGEST_WIDENING, filtered_lobe, lobe_widening,
@@ -127,4 +140,4 @@ pub use torrance_sparrow::{
     MINIMUM_VIEW_COSINE, geometric_attenuation, torrance_sparrow, torrance_sparrow_geometry,
 };
 pub use two_sided::{facing_normal, shading_normal};
-pub use viewer::viewer_direction;
+pub use viewer::{try_viewer_direction, viewer_direction};

@@ -30,7 +30,8 @@ pub enum BakeMode {
     Static,
 }
 
-/// A light source. Its three colours are the columns of document \[I\]'s 3x3 matrix: a material with ambient,
+/// A light source. Its three colours are the rows of document \[I\]'s 3x3 matrix
+/// ([`LightMatrix`](crate::LightMatrix)): a material with ambient,
 /// diffuse and specular coefficients k receives
 /// `k_a ambient + attenuation spot (k_d diffuse (l·n) + k_s specular (r·v)^n)`.
 ///

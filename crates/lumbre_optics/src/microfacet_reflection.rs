@@ -85,6 +85,15 @@ pub fn fresnel_normal_reflectance(cos_incident: f64, reflectance: DVec3) -> DVec
     DVec3::new(channel(reflectance.x), channel(reflectance.y), channel(reflectance.z))
 }
 
+/// [`fresnel_normal_reflectance`], or nothing for a cosine outside [0, 1] or a reflectance outside [0, .9996], beyond which the index is
+/// kept at 10⁴ (and 1 has none).
+pub fn try_fresnel_normal_reflectance(cos_incident: f64, reflectance: DVec3) -> Option<DVec3> {
+    let channels = reflectance.to_array();
+    let usable = channels.iter().all(|k| (0.0..=LARGEST_ROOT * LARGEST_ROOT).contains(k));
+    ((0.0..=1.0).contains(&cos_incident) && usable)
+        .then(|| fresnel_normal_reflectance(cos_incident, reflectance))
+}
+
 /// D G / (n·v) with any of the three distributions, where light and viewer are in front, else 0. All directions unit. In [0, 10⁴].
 ///
 /// In WGSL the distribution is the feature `DISTRIBUTION_COSINE_POWER` or `DISTRIBUTION_GAUSSIAN`, else Trowbridge and Reitz's.
@@ -182,6 +191,15 @@ mod tests {
         assert!((1.0 - fresnel_normal_reflectance(1.0, DVec3::ONE).x) < 4.1e-4);
         // At 90 degrees everything is a mirror.
         assert!((fresnel_normal_reflectance(0.0, DVec3::splat(0.04)) - 1.0).length() < 1e-12);
+    }
+
+    #[test]
+    fn reflectances_that_no_index_has() {
+        assert!(try_fresnel_normal_reflectance(0.5, DVec3::new(0.0, 0.04, 0.999)).is_some());
+        for k in [-0.1, 1.0, 1.5, f64::NAN] {
+            assert_eq!(try_fresnel_normal_reflectance(0.5, DVec3::new(0.04, k, 0.04)), None, "{k}");
+        }
+        assert_eq!(try_fresnel_normal_reflectance(-0.5, DVec3::splat(0.04)), None);
     }
 
     #[test]

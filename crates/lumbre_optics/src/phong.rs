@@ -3,9 +3,11 @@
 
 use glam::DVec3;
 
+use crate::normalization::try_normalize;
 use crate::power::cosine_lobe;
 
-/// r = 2 (l·n) n - l: the direction in which a mirror with unit normal n sends light that comes from l.
+/// r = 2 (l·n) n - l: the direction in which a mirror with unit normal n sends light that comes from l. With the zero normal it is -l,
+/// with no light zero.
 ///
 /// # Error of the f32 twin
 ///
@@ -13,6 +15,11 @@ use crate::power::cosine_lobe;
 /// product with n, one of the difference.
 pub fn reflected_direction(normal: DVec3, light: DVec3) -> DVec3 {
     2.0 * light.dot(normal) * normal - light
+}
+
+/// [`reflected_direction`] of vectors of any length, unit; or nothing where either has no direction.
+pub fn try_reflected_direction(normal: DVec3, light: DVec3) -> Option<DVec3> {
+    Some(reflected_direction(try_normalize(normal)?, try_normalize(light)?))
 }
 
 /// (r·v)ⁿ where the light is in front of the surface (n·l > 0), else 0. All directions unit, away from the
@@ -45,6 +52,15 @@ mod tests {
     fn it_peaks_in_the_mirror_direction() {
         assert!((reflected_direction(DVec3::Y, at(40.0)) - at(-40.0)).length() < 1e-15);
         assert!((phong(DVec3::Y, at(40.0), at(-40.0), 100.0) - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn without_a_direction_there_is_no_reflection() {
+        assert_eq!(try_reflected_direction(DVec3::ZERO, DVec3::Y), None);
+        assert_eq!(try_reflected_direction(DVec3::Y, DVec3::NAN), None);
+        assert_eq!(reflected_direction(DVec3::ZERO, at(40.0)), -at(40.0));
+        let long = try_reflected_direction(3.0 * DVec3::Y, 0.1 * at(40.0)).expect("both have one");
+        assert!((long - at(-40.0)).length() < 1e-15);
     }
 
     #[test]

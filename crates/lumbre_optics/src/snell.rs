@@ -43,6 +43,13 @@ pub fn transmitted_cosine(sin_incident: f64, eta: f64) -> f64 {
     ((1.0 - sine) * (1.0 + sine)).max(0.0).sqrt()
 }
 
+/// [`transmitted_cosine`], or nothing under total internal reflection, for a sine outside [0, 1], or for an eta that is outside
+/// [0.01, 10⁴], within which [`transmitted_cosine`] keeps it.
+pub fn try_transmitted_cosine(sin_incident: f64, eta: f64) -> Option<f64> {
+    let usable = (0.0..=1.0).contains(&sin_incident) && (SMALLEST_INDEX..=LARGEST_INDEX).contains(&eta);
+    (usable && !is_totally_reflected(sin_incident, eta)).then(|| transmitted_cosine(sin_incident, eta))
+}
+
 /// t = -(1/eta) l - (cos θ_t - cos θ_i / eta) n: the unit direction, away from the light, in which light from
 /// l (unit, on the side of the unit normal n) goes on behind the surface. The zero vector under total
 /// internal reflection.
@@ -131,6 +138,11 @@ mod tests {
         assert_eq!(transmitted_cosine(eta, eta), 0.0);
         assert_eq!(transmitted_direction(DVec3::Y, at(critical + 1e-12), eta), DVec3::ZERO);
         assert_eq!(try_transmitted_direction(DVec3::Y, at(critical + 1e-12), eta), None);
+        assert_eq!(try_transmitted_cosine(eta, eta), Some(0.0));
+        assert_eq!(try_transmitted_cosine(eta.next_up(), eta), None);
+        for (sine, eta) in [(-0.1, 1.5), (1.1, 1.5), (0.5, 0.0), (0.5, f64::NAN), (f64::NAN, 1.5)] {
+            assert_eq!(try_transmitted_cosine(sine, eta), None, "{sine} {eta}");
+        }
         let inside = transmitted_direction(DVec3::Y, at(critical - 1e-12), eta);
         // cos θ_t = sqrt(2 δ cos θ_i / eta) = 1.5e-6 at δ = 10⁻¹².
         assert!((inside.x + 1.0).abs() < 1e-11 && inside.y < 0.0 && inside.y > -2e-6, "{inside}");

@@ -1,5 +1,8 @@
 //! Spot cones: how a light narrows around its axis. Not the distance: that is `attenuation`.
 
+use glam::DVec3;
+
+use crate::normalization::try_normalize;
 use crate::power::safe_pow;
 
 /// The cone of a spotlight around the -Z axis of its entity.
@@ -100,6 +103,27 @@ pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine
     if outer < cosine { safe_pow(cosine, inner_or_exponent) } else { 0.0 }
 }
 
+impl SpotCone {
+    /// The factor in the direction `from_light` of a light that shines along `axis`, both of any length; or nothing where there is none:
+    /// an axis or a direction of length 0, angles that are not from 0 to π/2 (or π, as a cutoff), an inner angle beyond the outer one,
+    /// an exponent that is negative or not finite. [`spot_factor`] takes the cosine, which is then 0: no light.
+    pub fn try_factor(&self, axis: DVec3, from_light: DVec3) -> Option<f64> {
+        // f32's π/2 is a little more than it.
+        let right_angle = 0.0..=std::f32::consts::FRAC_PI_2;
+        let usable = match *self {
+            Self::Exponent { cutoff, exponent } => {
+                (right_angle.contains(&cutoff) || self.is_everywhere())
+                    && exponent.is_finite()
+                    && exponent >= 0.0
+            }
+            Self::Smooth { inner, outer } => right_angle.contains(&outer) && (0.0..=outer).contains(&inner),
+        };
+        let cosine = try_normalize(axis)?.dot(try_normalize(from_light)?);
+        let SpotCosines { smooth_cone, outer, inner_or_exponent } = self.cosines();
+        usable.then(|| spot_factor(smooth_cone, outer, inner_or_exponent, cosine))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
@@ -165,5 +189,27 @@ mod tests {
         // The cosine with a zero axis is 0.
         assert_eq!(factor(SpotCone::Exponent { cutoff: 1.0, exponent: 0.0 }, 0.0), 0.0);
         assert_eq!(factor(SpotCone::Smooth { inner: 0.1, outer: 1.0 }, 0.0), 0.0);
+        let cone = SpotCone::Smooth { inner: 0.1, outer: 1.0 };
+        assert_eq!(cone.try_factor(DVec3::ZERO, DVec3::Y), None);
+        assert_eq!(cone.try_factor(DVec3::Y, DVec3::ZERO), None);
+        assert_eq!(cone.try_factor(DVec3::Y * 5.0, DVec3::Y * 0.1), Some(1.0));
+    }
+
+    #[test]
+    fn cones_that_are_none() {
+        let bad = [
+            SpotCone::Exponent { cutoff: -0.1, exponent: 1.0 },
+            SpotCone::Exponent { cutoff: 2.0, exponent: 1.0 },
+            SpotCone::Exponent { cutoff: 1.0, exponent: -1.0 },
+            SpotCone::Exponent { cutoff: f32::NAN, exponent: 1.0 },
+            SpotCone::Smooth { inner: 1.0, outer: 0.5 },
+            SpotCone::Smooth { inner: 0.0, outer: 3.0 },
+        ];
+        for cone in bad {
+            assert_eq!(cone.try_factor(DVec3::Y, DVec3::Y), None, "{cone:?}");
+        }
+        for cutoff in [0.0, FRAC_PI_2, PI] {
+            assert!(SpotCone::Exponent { cutoff, exponent: 0.0 }.try_factor(DVec3::Y, DVec3::X).is_some());
+        }
     }
 }

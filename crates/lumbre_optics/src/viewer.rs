@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::normalization::safe_normalize;
+use crate::normalization::{safe_normalize, try_normalize};
 
 /// v: the unit direction to the viewer.
 ///
@@ -17,6 +17,16 @@ pub fn viewer_direction(local_viewer: bool, eye: DVec3, backward: DVec3, point: 
     if local_viewer { safe_normalize(eye - point) } else { backward }
 }
 
+/// [`viewer_direction`], or nothing where the point is the eye, or the distant viewer has no direction.
+pub fn try_viewer_direction(
+    local_viewer: bool,
+    eye: DVec3,
+    backward: DVec3,
+    point: DVec3,
+) -> Option<DVec3> {
+    try_normalize(if local_viewer { eye - point } else { backward })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -27,5 +37,8 @@ mod tests {
         assert_eq!(viewer_direction(true, eye, backward, DVec3::ZERO), DVec3::new(0.0, 0.6, 0.8));
         assert_eq!(viewer_direction(false, eye, backward, DVec3::ZERO), DVec3::Z);
         assert_eq!(viewer_direction(true, eye, backward, eye), DVec3::ZERO);
+        assert_eq!(try_viewer_direction(true, eye, backward, eye), None);
+        assert_eq!(try_viewer_direction(false, eye, backward, eye), Some(DVec3::Z));
+        assert_eq!(try_viewer_direction(false, eye, DVec3::ZERO, DVec3::ZERO), None);
     }
 }

@@ -7,8 +7,12 @@ use std::collections::HashMap;
 use bevy_ecs::entity::Entity;
 use glam::DVec3;
 
+use crate::RenderError;
 use crate::extract::LightReach;
 use crate::layout::InstanceData;
+
+/// Bytes of one index on the device.
+const INDEX_BYTES: u64 = size_of::<u32>() as u64;
 
 /// Lists of light indices; objects that the same lights reach share one.
 #[derive(Debug)]
@@ -18,12 +22,16 @@ pub(crate) struct LightLists<'a> {
     pub indices: Vec<u32>,
     known: HashMap<Vec<u32>, InstanceData>,
     lengths: (u64, u64),
+    /// Indices that the device takes, and those that are needed: past the first none is stored, and [`check`](Self::check) refuses.
+    most: u64,
+    needed: u64,
 }
 
 impl<'a> LightLists<'a> {
-    /// No lists yet. Baked lights stand last in `reaches`.
-    pub fn new(reaches: &'a [LightReach]) -> Self {
-        Self { reaches, indices: Vec::new(), known: HashMap::new(), lengths: (0, 0) }
+    /// No lists yet. Baked lights stand last in `reaches`; the device's buffers hold `bytes`.
+    pub fn new(reaches: &'a [LightReach], bytes: u64) -> Self {
+        let most = (bytes / INDEX_BYTES).min(u64::from(u32::MAX));
+        Self { reaches, indices: Vec::new(), known: HashMap::new(), lengths: (0, 0), most, needed: 0 }
     }
 
     /// The list of an object with this bounding box in the world (its `object` is 0).
@@ -43,6 +51,11 @@ impl<'a> LightLists<'a> {
         if let Some(known) = self.known.get(&list) {
             return *known;
         }
+        self.needed += list.len() as u64;
+        if self.needed > self.most {
+            return InstanceData::default();
+        }
+        // `most` is a u32.
         let end = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
         let first_light = end(self.indices.len());
         let dynamic = list.iter().filter(|index| !self.reaches[**index as usize].baked).count();
@@ -55,6 +68,19 @@ impl<'a> LightLists<'a> {
         };
         self.known.insert(list, instance);
         instance
+    }
+
+    /// Whether all lists fit into the device's buffer: a light that is lost silently would be a wrong picture.
+    ///
+    /// # Errors
+    /// [`RenderError::BufferTooLarge`].
+    pub fn check(&self) -> Result<(), RenderError> {
+        if self.needed <= self.most {
+            return Ok(());
+        }
+        let what = "light lists (each object has one of the lights whose range reaches it; give lights a shorter range)";
+        let (bytes, limit) = (self.needed * INDEX_BYTES, self.most * INDEX_BYTES);
+        Err(RenderError::BufferTooLarge { what, bytes, limit })
     }
 
     /// Lights per object, on average over the calls of `reaching`.
@@ -84,7 +110,7 @@ mod tests {
             light(1.0, 1.0, true),
             light(30.0, 1.0, true),
         ];
-        let mut lists = LightLists::new(&reaches);
+        let mut lists = LightLists::new(&reaches, u64::MAX);
         let near = lists.reaching(object, DVec3::ZERO, DVec3::splat(0.5));
         assert_eq!(lists.indices, [0, 1, 3]);
         assert_eq!((near.first_light, near.dynamic_end, near.static_end), (0, 2, 3));
@@ -99,12 +125,34 @@ mod tests {
     }
 
     #[test]
+    fn lists_beyond_the_devices_buffer_are_refused_and_not_stored() {
+        let light = |x: f64| LightReach { center: DVec3::X * x, radius: 1.5, baked: false, polygon: None };
+        let reaches: Vec<LightReach> = (0..10).map(|x| light(f64::from(x))).collect();
+        // Two lights reach each point half way between neighbours: each object has a list of its own.
+        let fill = |objects: u32, bytes: u64| {
+            let mut lists = LightLists::new(&reaches, bytes);
+            for object in 0..objects {
+                let middle = DVec3::X * (f64::from(object) + 0.5);
+                lists.reaching(Entity::PLACEHOLDER, middle, DVec3::ZERO);
+            }
+            (lists.indices.len(), lists.check())
+        };
+        let per_object = fill(1, u64::MAX).0;
+        assert_eq!(per_object, 3);
+        assert!(matches!(fill(5, 4 * 16), (16, Ok(()))), "{:?}", fill(5, 4 * 16));
+        let (stored, refused) = fill(9, 4 * 16);
+        assert_eq!(stored, 16, "nothing is stored past the limit");
+        let Err(RenderError::BufferTooLarge { bytes, limit, .. }) = refused else { panic!("{refused:?}") };
+        assert!(bytes > limit && limit == 64, "{bytes} {limit}");
+    }
+
+    #[test]
     fn a_polygon_reaches_what_lies_before_it_and_is_not_its_own() {
         let [lamp, other] = [1, 2].map(|index| Entity::from_raw_u32(index).unwrap());
         let polygon = Some(PolygonReach { front: DVec3::new(0.0, -1e-3, 0.0), emitter: lamp });
         let light = LightReach { center: DVec3::Y * 2.0, radius: f64::INFINITY, baked: false, polygon };
         let reaches = [light];
-        let mut lists = LightLists::new(&reaches);
+        let mut lists = LightLists::new(&reaches, u64::MAX);
         let mut count = |entity, y: f64, half: f64| {
             let list = lists.reaching(entity, DVec3::Y * y, DVec3::splat(half));
             list.static_end - list.first_light

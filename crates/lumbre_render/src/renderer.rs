@@ -143,9 +143,11 @@ impl Renderer {
             lights,
         };
         let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
-        let mut lists = LightLists::new(&reaches);
+        let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
+        let mut lists = LightLists::new(&reaches, limit);
         let target_kind = (plan.format, plan.samples);
         let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
+        lists.check()?;
         self.instances.replace(draws.instances.iter().copied());
         self.light_list.replace(lists.indices.iter().copied());
         let uploaded_bytes = self.upload(&view, &settings, &lights, exposure)?;

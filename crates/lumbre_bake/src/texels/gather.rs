@@ -105,7 +105,7 @@ impl Outgoing<'_> {
                 // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
                 let turn =
                     (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
-                let checked = turn % CHECKED == 0;
+                let checked = turn.is_multiple_of(CHECKED);
                 let found = self.towards(receiver.origin, direction, sequence, sample, checked);
                 *sum += found.light;
                 gathered.rays += u64::from(found.rays);

@@ -28,6 +28,7 @@ modules!(
     "optics/microfacet_reflection",
     "optics/microfacets",
     "optics/normalization",
+    "optics/normalized_highlight",
     "optics/phong",
     "optics/polygon_light",
     "optics/power",
