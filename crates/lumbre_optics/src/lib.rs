@@ -55,14 +55,12 @@ mod half_vector;
 mod lambert;
 mod light;
 mod light_matrix;
-mod light_matrix;
 mod light_validation;
 mod material;
 mod material_validation;
 mod microfacet_reflection;
 mod microfacets;
 mod normalization;
-mod normalized_highlight;
 mod normalized_highlight;
 mod phong;
 mod polygon_light;
@@ -97,7 +95,6 @@ pub use half_vector::{half_vector, try_half_vector};
 pub use lambert::lambert;
 pub use light::{BakeMode, Light, LightKind};
 pub use light_matrix::{LightMatrix, ReflectionMatrix};
-pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
 pub use material_validation::MaterialError;
@@ -110,10 +107,6 @@ pub use microfacets::{
     half_value_sine_squared,
 };
 pub use normalization::{TINY_LENGTH_SQUARED, safe_length, safe_normalize, try_normalize};
-pub use normalized_highlight::{
-    blinn_phong_normalization, microfacet_normalization, normalized_blinn_phong, normalized_phong,
-    phong_normalization,
-};
 pub use normalized_highlight::{
     blinn_phong_normalization, microfacet_normalization, normalized_blinn_phong, normalized_phong,
     phong_normalization,
