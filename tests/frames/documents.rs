@@ -58,10 +58,10 @@ fn table_2_1_agrees_with_the_twin() {
 fn the_plain_ambient_ball_is_everywhere_the_same_and_exactly_k_a_i_a() {
     // "No se observa tridimensionalidad": one colour, whatever the normal.
     let surface = twin_of(&mut table_2_1(0, 0)).inside_surfaces(false);
-    for column in 0..3 {
+    for (column, ambient) in AMBIENT.into_iter().enumerate() {
         // Products of few digits: f32 has them exactly.
-        let expected = (COLOR * AMBIENT[column] * AMBIENT_LIGHT).as_dvec3();
-        assert_eq!(expected, COLOR.as_dvec3() * f64::from(AMBIENT[column]) * f64::from(AMBIENT_LIGHT));
+        let expected = (COLOR * ambient * AMBIENT_LIGHT).as_dvec3();
+        assert_eq!(expected, COLOR.as_dvec3() * f64::from(ambient) * f64::from(AMBIENT_LIGHT));
         let pixels = frame(&mut table_2_1(0, column));
         for (pixel, inside) in pixels.iter().zip(&surface) {
             assert!(*pixel == expected || (inside.is_none() && *pixel == BACKGROUND.as_dvec3()), "{pixel}");
@@ -138,8 +138,8 @@ fn highlights_have_the_peak_and_the_half_width_of_their_exponent() {
     // Across the plane of l and v, and along it.
     let across = light.cross(viewer).normalize();
     let along = across.cross(half_vector);
-    for column in 0..3 {
-        let n = f64::from(EXPONENTS[column]);
+    for (column, exponent) in EXPONENTS.into_iter().enumerate() {
+        let n = f64::from(exponent);
         let diffuse = frame(&mut from_afar(table_2_1(1, column)));
         let specular = frame(&mut from_afar(table_2_1(2, column)));
         // cos^n = 1/2 at this angle between r and v.

@@ -162,8 +162,24 @@ fn filtered() -> [Twin; 3] {
     ]
 }
 
+fn normalizations() -> [Twin; 2] {
+    let constant = |name: &str, value: fn(f64) -> f64, bound: fn(f64) -> f64| {
+        Twin::new("normalized_highlight", name, &[], &[Type::Number], Type::Number)
+            .expect(move |x| value(x[0]))
+            .within(move |x| bound(x[0]))
+            .random(|s| vec![s.decades(-3.0, 6.0)])
+            .corners(product(&[&[&EXPONENTS[..], &[-1.0, 199.9, 200.0, 200.1, 4e6]].concat()]))
+    };
+    [
+        constant("phong_normalization", phong_normalization, lobes::phong_normalization).range(1.0, 1.8e38),
+        constant("blinn_phong_normalization", blinn_phong_normalization, lobes::blinn_phong_normalization)
+            .range(0.0, 1.8e38),
+    ]
+}
+
 pub fn twins() -> Vec<Twin> {
     let mut all: Vec<Twin> = powers_of_cosines().into_iter().chain(filtered()).collect();
+    all.extend(normalizations());
     for sharp in [false, true] {
         all.push(bare_lobe(sharp));
         all.push(highlight("phong", "phong", phong, lobes::phong, sharp));
@@ -172,6 +188,15 @@ pub fn twins() -> Vec<Twin> {
         let matched =
             ("blinn_phong_matched", blinn_phong_matched as Model, lobes::blinn_phong_matched as Bound);
         all.push(highlight("blinn_phong", matched.0, matched.1, matched.2, sharp));
+        let module = "normalized_highlight";
+        let blinn = (normalized_blinn_phong as Model, lobes::normalized_blinn_phong as Bound);
+        for (name, model, bound) in [
+            ("normalized_phong", normalized_phong as Model, lobes::normalized_phong as Bound),
+            ("normalized_blinn_phong", blinn.0, blinn.1),
+        ] {
+            // At most the constant of the largest exponent.
+            all.push(highlight(module, name, model, bound, sharp).range_up_to(0.0, 500_001.0, 1e6));
+        }
     }
     all
 }

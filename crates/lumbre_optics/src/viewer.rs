@@ -18,12 +18,7 @@ pub fn viewer_direction(local_viewer: bool, eye: DVec3, backward: DVec3, point: 
 }
 
 /// [`viewer_direction`], or nothing where the point is the eye, or the distant viewer has no direction.
-pub fn try_viewer_direction(
-    local_viewer: bool,
-    eye: DVec3,
-    backward: DVec3,
-    point: DVec3,
-) -> Option<DVec3> {
+pub fn try_viewer_direction(local_viewer: bool, eye: DVec3, backward: DVec3, point: DVec3) -> Option<DVec3> {
     try_normalize(if local_viewer { eye - point } else { backward })
 }
 

@@ -82,6 +82,61 @@ pub fn blinn_phong_matched(
     blinn(normal, light, viewer, Off { value, error }, sharp)
 }
 
+/// phong_normalization: a sum.
+pub fn phong_normalization(shininess: f64) -> f64 {
+    U * lumbre_optics::phong_normalization(shininess)
+}
+
+/// blinn_phong_normalization: 9 u, and exp2's error in the sum 2^(-n/2) + n.
+pub fn blinn_phong_normalization(shininess: f64) -> f64 {
+    let n = shininess.max(0.0);
+    let half = 0.5 * n.min(200.0);
+    let power = (-half).exp2();
+    let relative = 9.0 * U + powers::exponential(half) * power / (power + n);
+    lumbre_optics::blinn_phong_normalization(shininess) * relative
+}
+
+/// A bare lobe times its constant and n·l: the lobe's error and the cosine's times the rest, and two products.
+fn normalized(
+    bare: Allowed,
+    lobe: f64,
+    (constant, error): (f64, f64),
+    cosine: f64,
+    of_cosine: f64,
+) -> Allowed {
+    let of_lobe = bare.error[0];
+    let size = constant * (lobe + of_lobe) * (cosine + of_cosine);
+    let own = constant * (of_lobe * (cosine + of_cosine) + lobe * of_cosine);
+    let roundings = (error / constant + 2.0 * U) * size;
+    let other = bare.other.map(|other| Numbers::from_slice(&[constant * other[0] * cosine]));
+    Allowed { error: Numbers::from_slice(&[own + roundings + constant * FLUSHED + FLUSHED]), other }
+}
+
+/// normalized_phong.
+pub fn normalized_phong(normal: DVec3, light: DVec3, viewer: DVec3, shininess: f64, sharp: bool) -> Allowed {
+    let lobe = lumbre_optics::phong(normal, light, viewer, shininess);
+    let constant = (lumbre_optics::phong_normalization(shininess), phong_normalization(shininess));
+    let cosine = lumbre_optics::lambert(normal, light);
+    let bare = phong(normal, light, viewer, shininess, sharp);
+    normalized(bare, lobe, constant, cosine, vectors::dot(normal, light))
+}
+
+/// normalized_blinn_phong.
+pub fn normalized_blinn_phong(
+    normal: DVec3,
+    light: DVec3,
+    viewer: DVec3,
+    shininess: f64,
+    sharp: bool,
+) -> Allowed {
+    let lobe = lumbre_optics::blinn_phong(normal, light, viewer, shininess);
+    let constant =
+        (lumbre_optics::blinn_phong_normalization(shininess), blinn_phong_normalization(shininess));
+    let cosine = lumbre_optics::lambert(normal, light);
+    let bare = blinn_phong(normal, light, viewer, shininess, sharp);
+    normalized(bare, lobe, constant, cosine, vectors::dot(normal, light))
+}
+
 /// lobe_widening: two roundings; .18 is one too.
 pub fn lobe_widening(squared_change_x: f64, squared_change_y: f64) -> f64 {
     2.0 * U * lumbre_optics::lobe_widening(squared_change_x, squared_change_y) + FLUSHED

@@ -141,7 +141,7 @@ impl Executor {
         let results = probe.map(FiniteProbe::results);
         let to_wait_for = queries.resolve(device, &mut encoder, results);
         queries.report.frame = self.frame;
-        queries.report.probed = probe.is_some();
+        queries.report.probed = !queries.probed.is_empty();
         let submission = queue.submit([encoder.finish()]);
         queries.report.cpu_ms = start.map(|start| start.elapsed().as_secs_f64() * 1e3);
         if let Some(report) = self.ring.end(queries, to_wait_for) {

@@ -128,10 +128,13 @@ pub(crate) fn looks(plan: &Plan, step: &Step) -> Vec<(usize, Part)> {
         for declared in plan.declarations.passes[pass].accesses.iter().filter(|access| access.access.writes())
         {
             let planned = &plan.resources[declared.resource];
-            let imported = plan.declarations.resources[declared.resource].origin == Origin::Imported;
-            let Shape::Texture(texture) = planned.shape else { continue };
-            // Of an imported texture it is not known whether it may be looked at, unless another pass samples it.
-            let bindable = texture.usage.contains(wgpu::TextureUsages::TEXTURE_BINDING);
+            let resource = &plan.declarations.resources[declared.resource];
+            let imported = resource.origin == Origin::Imported;
+            let (Shape::Texture(texture), Shape::Texture(described)) = (planned.shape, resource.shape) else {
+                continue;
+            };
+            // Whether an imported texture may be looked at is its maker's word: what the passes need of it is no answer.
+            let bindable = described.usage.contains(wgpu::TextureUsages::TEXTURE_BINDING);
             if !can_probe(&texture) || planned.lifetime.is_none() || (imported && !bindable) {
                 continue;
             }

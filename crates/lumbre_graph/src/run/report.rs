@@ -125,7 +125,7 @@ pub struct FrameReport {
     pub passes: Vec<PassReport>,
     /// The first value that is not finite, if the probe was on and found one.
     pub non_finite: Option<NonFinite>,
-    /// Whether the probe was on.
+    /// Whether the probe was on and there was a texture that it could look at.
     pub probed: bool,
     /// What could not be measured, and why.
     pub notes: Vec<String>,
