@@ -35,6 +35,14 @@ pub fn draw(world: &mut World, width: u32, height: u32, options: &FrameOptions) 
     Canvas::new(width, height).draw(world, options)
 }
 
+/// Draws a frame as people see it: half floats, the display's curve, eight bits. RGBA, top row first; fails as [`draw`] does.
+#[allow(dead_code, reason = "shared with the hard cases, which show what overflows")]
+pub fn shown(world: &mut World, width: u32, height: u32, options: &FrameOptions) -> Vec<u8> {
+    let mut canvas = Canvas::of(width, height, OffscreenFormat::Rgba8);
+    canvas.probed(world, options);
+    canvas.frame.read_rgba8(gpu()).unwrap()
+}
+
 /// One renderer and one target for several frames, so that what it keeps from frame to frame is under test too.
 pub struct Canvas {
     renderer: Renderer,
@@ -44,24 +52,33 @@ pub struct Canvas {
 impl Canvas {
     /// A fresh renderer and a target of linear floats.
     pub fn new(width: u32, height: u32) -> Self {
+        Self::of(width, height, OffscreenFormat::LinearFloat)
+    }
+
+    fn of(width: u32, height: u32, format: OffscreenFormat) -> Self {
         let gpu = gpu();
-        let frame = Offscreen::new(gpu, width, height, OffscreenFormat::LinearFloat).unwrap();
+        let frame = Offscreen::new(gpu, width, height, format).unwrap();
         Self { renderer: Renderer::new(gpu), frame }
     }
 
     /// Draws a frame; fails if any pass left a value that is not finite, or if wgpu's validation complained.
     pub fn draw(&mut self, world: &mut World, options: &FrameOptions) -> (Vec<DVec3>, FrameReport) {
-        let _guard = one_at_a_time();
-        let report = self.renderer.render(world, &self.frame.target(), options).unwrap();
-        if options.probe {
-            let measured = self.renderer.wait().unwrap().expect("a frame was drawn");
-            assert!(measured.probed);
-            assert_eq!(measured.non_finite, None);
-        }
+        let report = self.probed(world, options);
         let pixels = self.frame.read_linear(gpu()).unwrap();
+        (pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(), report)
+    }
+
+    /// Every frame of a test goes through here, whatever its options say: the hard cases look that there is no other way.
+    fn probed(&mut self, world: &mut World, options: &FrameOptions) -> FrameReport {
+        let _guard = one_at_a_time();
+        let options = FrameOptions { probe: true, ..options.clone() };
+        let report = self.renderer.render(world, &self.frame.target(), &options).unwrap();
+        let measured = self.renderer.wait().unwrap().expect("a frame was drawn");
+        assert!(measured.probed, "the probe looked at nothing");
+        assert_eq!(measured.non_finite, None);
         let complaints = std::mem::take(&mut *COMPLAINTS.lock().unwrap_or_else(PoisonError::into_inner));
         assert!(complaints.is_empty(), "wgpu complains: {complaints:#?}");
-        (pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(), report)
+        report
     }
 
     /// Tries to draw what cannot be drawn.

@@ -317,7 +317,7 @@ fn what_a_polygon_costs_beside_a_point_light() {
                 false => world.spawn((Light::point(Vec3::ONE), place)),
             };
         }
-        let options = FrameOptions { probe: false, ..linear() };
+        let options = linear();
         let mut canvas = Canvas::new(256, 256);
         canvas.draw(&mut world, &options);
         let mut times: Vec<f64> = (0..5)

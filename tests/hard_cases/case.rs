@@ -56,15 +56,25 @@ impl Outcome {
 }
 
 /// The heading of the table.
-pub const HEADING: &str =
-    "| row | case | expected | got | bound | why | pass |\n|---|---|---|---|---|---|---|";
+pub const HEADING: &str = "| case | expected | got | bound | why | pass |\n|---|---|---|---|---|---|";
+
+/// Nine digits, in whichever notation shows them.
+fn shortest(number: f64) -> String {
+    let size = number.abs();
+    if size == 0.0 || (1e-4..1e6).contains(&size) {
+        format!("{number:.9}").trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{number:.8e}")
+    }
+}
 
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let pass = if self.passes() { "yes" } else { "NO" };
         match self {
             Self::Number { expected, got, bound, because } => {
-                write!(f, "{expected:.9} | {got:.9} | {bound:.1e} | {because} | {pass}")
+                let (expected, got) = (shortest(*expected), shortest(*got));
+                write!(f, "{expected} | {got} | {bound:.1e} | {because} | {pass}")
             }
             Self::Text { expected, got } => {
                 let got: String = got.chars().take(110).collect();

@@ -73,16 +73,25 @@ fn refusal(light: Value, phong: Value) -> String {
 }
 
 fn attenuation_all_zero() -> Outcome {
-    Outcome::text("the lamp", refusal(json!({}), json!({"attenuation": [0, 0, 0]})))
+    Outcome::text(
+        "light \"the lamp\": attenuation is (0, 0, 0)",
+        refusal(json!({}), json!({"attenuation": [0, 0, 0]})),
+    )
 }
 
 fn attenuation_negative() -> Outcome {
-    Outcome::text("the lamp", refusal(json!({}), json!({"attenuation": [1, -1, 0]})))
+    Outcome::text(
+        "light \"the lamp\": attenuation.linear is -1",
+        refusal(json!({}), json!({"attenuation": [1, -1, 0]})),
+    )
 }
 
 fn attenuation_too_large() -> Outcome {
     // JSON has no NaN; this is what becomes infinite in f32.
-    Outcome::text("the lamp", refusal(json!({}), json!({"attenuation": [1e300, 0, 0]})))
+    Outcome::text(
+        "light \"the lamp\": attenuation.constant is inf",
+        refusal(json!({}), json!({"attenuation": [1e300, 0, 0]})),
+    )
 }
 
 fn light_of(intensity: f64) -> f64 {
@@ -103,14 +112,17 @@ fn intensity_1e30() -> Outcome {
 }
 
 fn intensity_beyond() -> Outcome {
-    Outcome::text("the lamp", refusal(json!({}), json!({"diffuse": [1e31, 0, 0]})))
+    Outcome::text(
+        "light \"the lamp\": diffuse is up to",
+        refusal(json!({}), json!({"diffuse": [1e31, 0, 0]})),
+    )
 }
 
 fn colour_infinite() -> Outcome {
-    Outcome::text("the lamp", refusal(json!({"color": [1e39, 1, 1]}), Value::Null))
+    Outcome::text("light \"the lamp\": diffuse is inf", refusal(json!({"color": [1e39, 1, 1]}), Value::Null))
 }
 
 fn cutoff_beyond() -> Outcome {
     let phong = json!({"spot": {"cutoff": 2.0, "exponent": 1}});
-    Outcome::text("the lamp", refusal(json!({}), phong))
+    Outcome::text("light \"the lamp\": spot.cutoff is 2 rad", refusal(json!({}), phong))
 }

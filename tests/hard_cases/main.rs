@@ -10,9 +10,14 @@ mod case;
 mod files;
 mod frames;
 mod functions;
+mod highlights;
+mod lists;
 mod many_lights;
+mod normals;
 mod overflow;
 mod places;
+mod probe;
+mod spots;
 
 use case::{Case, HEADING};
 
@@ -34,29 +39,71 @@ macro_rules! cases {
     };
 }
 
+/// The rows of the list, in its order.
+const ROWS: [&str; 17] = [
+    "normal of length 0",
+    "light at the surface, d = 0 and a = b = 0",
+    "l = -v, half vector 0",
+    "pow(0, 0), pow(negative, n), n = 0",
+    "n = 1 to 10^6",
+    "specular aliasing",
+    "grazing v, Fresnel at 90 degrees, the critical angle",
+    "spot cutoff 0, 90, 180; inner = outer; exponent 0, 128; direction 0",
+    "attenuation (0,0,0), negative, not a number; intensity 0, 1e-30, 1e30; colour infinite",
+    "the largest product stays below the target's overflow",
+    "0, 1, 10 000 lights; all in one place; all behind the camera; a light larger than the world",
+    "lists of lights: around, beside and behind the camera, at the end of a range, empty",
+    "depth: near 1e-3, far 1e6; coplanar faces",
+    "world at 10^5 to 10^7 m from the origin",
+    "singular or mirroring transform, scale 0 or negative, non-uniform scale",
+    "Gouraud with a spot inside one triangle",
+    "zero-size window, 1x1, minimised, resize each frame, device lost",
+];
+
+/// And the last two: what holds for every frame, and fog.
+const OF_ALL_FRAMES: [&str; 2] = ["NaN in any frame", "fog"];
+
+/// Every case, by row.
 fn all() -> Vec<Case> {
-    [
+    let mut all = [
         functions::cases(),
+        normals::cases(),
+        highlights::cases(),
+        spots::cases(),
         files::cases(),
         frames::cases(),
         places::cases(),
         many_lights::cases(),
+        lists::cases(),
         overflow::cases(),
+        probe::cases(),
     ]
-    .concat()
+    .concat();
+    let rows = || ROWS.iter().chain(&OF_ALL_FRAMES);
+    let row = |case: &Case| {
+        rows().position(|row| *row == case.row).unwrap_or_else(|| panic!("no row {}", case.row))
+    };
+    all.sort_by_key(row);
+    assert!(rows().all(|row| all.iter().any(|case| case.row == *row)), "a row without a case");
+    all
 }
 
 #[test]
 fn table() {
-    println!("{}\n{HEADING}", adapter::gpu().describe());
-    let failed: Vec<String> = all()
-        .iter()
-        .filter_map(|case| {
-            let outcome = (case.run)();
-            println!("| {} | {} | {outcome} |", case.row, case.name.replace('_', " "));
-            (!outcome.passes()).then(|| format!("{}: {outcome}", case.name))
-        })
-        .collect();
+    println!("{}\n", adapter::gpu().describe());
+    let mut failed = Vec::new();
+    let mut row = "";
+    for case in all() {
+        if case.row != row {
+            row = case.row;
+            println!("\n## {row}\n\n{HEADING}");
+        }
+        let outcome = (case.run)();
+        println!("| {} | {outcome} |", case.name.replace('_', " "));
+        if !outcome.passes() {
+            failed.push(format!("{}: {outcome}", case.name));
+        }
+    }
     assert!(failed.is_empty(), "{failed:#?}");
 }
 

@@ -14,7 +14,7 @@ crate::cases! {
         no_light, one_light, ten_thousand_lights_in_one_place, ten_thousand_lights_behind_the_camera,
         a_light_larger_than_the_world, a_light_exactly_at_its_range, ten_thousand_lights_on_a_thousand_objects,
     }
-    "cluster slices: depth of zero or behind the camera" { an_object_across_the_cameras_plane }
+    "lists of lights: around, beside and behind the camera, at the end of a range, empty" { an_object_across_the_cameras_plane }
 }
 
 fn grey(color: DVec3) -> f64 {

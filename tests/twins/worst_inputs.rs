@@ -547,3 +547,45 @@ worst!(
     [1.0000001192092824e0, 9.999999701976812e-1, 9.999999999999942e3],
     [1.192093073143488e-7, 1.1920928777442505e-7, 1.1920929310349389e-3]
 );
+worst!(
+    phong_normalization,
+    "phong_normalization",
+    "447f8001",
+    [5.120000305175781e2],
+    [3.0517579943989404e-5]
+);
+worst!(
+    blinn_phong_normalization,
+    "blinn_phong_normalization",
+    "41f4176f",
+    [4.5967010119712395e0],
+    [2.4658779621704407e-6]
+);
+worst!(
+    normalized_phong_plain,
+    "normalized_phong (plain)",
+    "2 3f800003 0 0 3f800000 0 bc1cf720 3f7ffcfe b991a84c 43800000",
+    [1.2749199548959072e2],
+    [8.212280835868546e-2]
+);
+worst!(
+    normalized_blinn_phong_plain,
+    "normalized_blinn_phong (plain)",
+    "bd93d478 bebc2a6f 3f6d5de0 80000001 bf800002 80000003 3d595115 bf3ad8d5 bf2e784a 3a83126f",
+    [3.611614693828435e-1],
+    [3.6116246426652615e-1]
+);
+worst!(
+    normalized_phong_sharp,
+    "normalized_phong (sharp)",
+    "3f7368b7 3e194198 be8ada7a 3f65e552 3e69e6b8 bec08156 3f7d2b15 3e0dac7b 3d5b0010 45538000",
+    [1.9167955835568595e-35],
+    [3.962100539768824e-35]
+);
+worst!(
+    normalized_blinn_phong_sharp,
+    "normalized_blinn_phong (sharp)",
+    "bd93d475 bebc2a70 3f6d5de0 0 bf800000 80000000 3d595112 bf3ad8d5 bf2e784a 3a83126f",
+    [3.6066329016556037e-1],
+    [3.606642840558283e-1]
+);

@@ -8,7 +8,7 @@ const TINY_COSINE: f64 = 1e-15;
 /// Keeps 0/0 away where squares of cosines are divided.
 const TINY: f64 = 1e-30;
 /// Optical constants are clamped to this, beyond any that is measured, so that their fourth power is an f32.
-const LARGEST_CONSTANT: f64 = 1e4;
+pub(crate) const LARGEST_CONSTANT: f64 = 1e4;
 /// Smallest relative index of refraction: keeps f32 from dividing by a square that underflows.
 const SMALLEST_INDEX: f64 = 1e-4;
 

@@ -97,7 +97,7 @@ pub use light::{BakeMode, Light, LightKind};
 pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
 pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
-pub use material_validation::MaterialError;
+pub use material_validation::{LARGEST_COEFFICIENT, MaterialError};
 pub use microfacet_reflection::{
     Distribution, Fresnel, fresnel_normal_reflectance, microfacet_lobe, microfacet_reflection,
     try_fresnel_normal_reflectance,

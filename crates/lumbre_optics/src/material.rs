@@ -37,9 +37,9 @@ impl Default for Surface {
 }
 
 impl Surface {
-    /// The exponent clamped to what is used, 0 to [`MAX_SHININESS`].
+    /// The exponent clamped to what is used, 0 to [`MAX_SHININESS`]; 0 for no number.
     pub fn shininess_in_range(&self) -> f32 {
-        self.shininess.clamp(0.0, MAX_SHININESS)
+        if self.shininess.is_nan() { 0.0 } else { self.shininess.clamp(0.0, MAX_SHININESS) }
     }
 
     /// Whether the highlight needs the shader feature `SHARP_HIGHLIGHTS`: above [`SHARP_SHININESS`] with

@@ -1,10 +1,17 @@
 //! What a material may not be. Checked when materials are loaded; the equations themselves stay finite
 //! whatever they are given.
 
+use glam::Vec3;
 use thiserror::Error;
 
+use crate::fresnel::LARGEST_CONSTANT;
 use crate::validation::{color_fault, fault};
-use crate::{AlphaMode, Fresnel, Material, Surface};
+use crate::{AlphaMode, Fresnel, LARGEST_INTENSITY, Material, Surface};
+
+/// Largest reflection coefficient and vertex colour: with both, the strongest light
+/// ([`LARGEST_INTENSITY`]) and a highlight 10⁴ times its light (see `torrance_sparrow`), less one of the two,
+/// the light of one lamp stays under 10³⁷, and thirty such lamps under f32's end.
+pub const LARGEST_COEFFICIENT: f32 = 1e3;
 
 /// Why a material is refused.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -40,18 +47,14 @@ pub enum MaterialError {
 impl Material {
     /// Checks that the material can be lit, and names it, the field, the value and the remedy if it cannot.
     ///
-    /// Coefficients above 1 pass: files have them, OpenGL takes them, and the baker clamps and says so.
+    /// Coefficients above 1 pass: files have them, OpenGL takes them, and the baker clamps and says so. Above
+    /// [`LARGEST_COEFFICIENT`], or with an emission above [`LARGEST_INTENSITY`], light overflows f32.
     ///
     /// # Errors
     /// [`MaterialError`], the first fault in the order of the fields.
     pub fn validate(&self, name: &str) -> Result<(), MaterialError> {
         if let Fresnel::Conductor { eta, absorption } = self.fresnel {
-            for (field, value) in [("eta", eta), ("absorption", absorption)] {
-                if let Some((value, reason)) = color_fault(value) {
-                    let (material, field) = (name.to_owned(), format!("fresnel.{field}"));
-                    return Err(MaterialError::Number { material, field, value, reason });
-                }
-            }
+            validate_index(eta, absorption, name)?;
         }
         validate_surface(&self.front, name, "front")?;
         if let Some(back) = &self.back {
@@ -87,6 +90,26 @@ impl Material {
     }
 }
 
+/// The complex index of refraction of a conductor.
+fn validate_index(eta: Vec3, absorption: Vec3, name: &str) -> Result<(), MaterialError> {
+    for (field, constants) in [("fresnel.eta", eta), ("fresnel.absorption", absorption)] {
+        let (material, field) = (name.to_owned(), field.to_owned());
+        if let Some((value, reason)) = color_fault(constants) {
+            return Err(MaterialError::Number { material, field, value, reason });
+        }
+        let value = constants.max_element();
+        if value > LARGEST_CONSTANT as f32 {
+            return Err(MaterialError::Range { material, field, value, allowed: "from 0 to 10000" });
+        }
+    }
+    if (eta + absorption).min_element() > 0.0 {
+        return Ok(());
+    }
+    let (material, field) = (name.to_owned(), "fresnel.eta".to_owned());
+    let allowed = "above 0 in every channel whose absorption is 0 (1 is air's)";
+    Err(MaterialError::Range { material, field, value: 0.0, allowed })
+}
+
 fn validate_surface(surface: &Surface, name: &str, side: &str) -> Result<(), MaterialError> {
     let colors = [
         ("ambient", surface.ambient),
@@ -94,6 +117,15 @@ fn validate_surface(surface: &Surface, name: &str, side: &str) -> Result<(), Mat
         ("specular", surface.specular),
         ("emission", surface.emission),
     ];
+    for (field, color) in colors {
+        let largest = if field == "emission" { LARGEST_INTENSITY as f32 } else { LARGEST_COEFFICIENT };
+        let value = color.max_element();
+        if value > largest && value.is_finite() {
+            let allowed = if field == "emission" { "up to 1e30" } else { "up to 1000" };
+            let (material, field) = (name.to_owned(), format!("{side}.{field}"));
+            return Err(MaterialError::Range { material, field, value, allowed });
+        }
+    }
     let color = colors.into_iter().find_map(|(field, color)| color_fault(color).map(|fault| (field, fault)));
     let number = fault(surface.shininess).map(|reason| ("shininess", (surface.shininess, reason)));
     match color.or(number) {
@@ -109,8 +141,6 @@ fn validate_surface(surface: &Surface, name: &str, side: &str) -> Result<(), Mat
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
 
     fn message(material: &Material) -> String {
@@ -146,6 +176,26 @@ mod tests {
         );
         let back = Some(Surface { diffuse: Vec3::new(-1.0, 0.0, 0.0), ..Surface::default() });
         assert!(message(&Material { back, ..Material::default() }).contains("back.diffuse is -1"));
+    }
+
+    #[test]
+    fn indices_of_conductors() {
+        let conductor = |eta: f32, absorption: f32| Material {
+            fresnel: Fresnel::Conductor {
+                eta: Vec3::new(0.2, eta, 1.4),
+                absorption: Vec3::new(3.0, absorption, 2.0),
+            },
+            ..Material::default()
+        };
+        for (eta, absorption) in [(0.4, 2.4), (0.0, 2.4), (1.5, 0.0), (1e4, 1e4)] {
+            assert_eq!(conductor(eta, absorption).validate("gold"), Ok(()), "{eta} {absorption}");
+        }
+        assert!(message(&conductor(-0.5, 1.0)).contains("fresnel.eta is -0.5, which is negative"));
+        assert!(message(&conductor(1.0, f32::NAN)).contains("fresnel.absorption"));
+        assert!(
+            message(&conductor(2e4, 1.0)).contains("fresnel.eta is 20000; give a number from 0 to 10000")
+        );
+        assert!(message(&conductor(0.0, 0.0)).contains("fresnel.eta is 0; give a number above 0"));
     }
 
     #[test]

@@ -136,7 +136,7 @@ pub fn microfacet_lobe(
 /// assert!((reflected - plastic).length() < 1e-12);
 /// ```
 pub fn microfacet_reflection(
-    (distribution, fresnel): (Distribution, Fresnel),
+    kind: (Distribution, Fresnel),
     normal: DVec3,
     light: DVec3,
     viewer: DVec3,
@@ -144,6 +144,7 @@ pub fn microfacet_reflection(
     specular: DVec3,
     ior: f64,
 ) -> DVec3 {
+    let (distribution, fresnel) = kind;
     let v_half = half_cosine(light + viewer);
     let reflected = match fresnel {
         Fresnel::Dielectric => specular * fresnel_dielectric(v_half, ior),

@@ -164,6 +164,8 @@ pub fn specular_reflection(
 /// assert_eq!(lit.diffuse, DVec3::splat(0.5));
 /// ```
 ///
+/// In WGSL the feature `MATT`, for surfaces with k_s = 0, leaves the highlight out.
+///
 /// # Error of the f32 twin
 ///
 /// Ambient: 3 u. Diffuse: 4 u of itself and 3 u Σ|n l| of what multiplies the cosine. Specular: 4 u of itself

@@ -1,5 +1,8 @@
 //! What holds for all inputs: finite, monotone, linear, symmetric, reciprocal.
 
+#[path = "properties/energy.rs"]
+mod energy;
+
 use glam::{DVec3, Vec3};
 use lumbre_optics::*;
 use proptest::prelude::*;
@@ -310,6 +313,56 @@ proptest! {
             let viewer = DVec3::new(-light.x * azimuth.cos(), light.x * azimuth.sin(), light.z);
             let sent = microfacet_reflection(kind, DVec3::Z, light, viewer, shininess, DVec3::ONE, 1.5) * viewer.z;
             prop_assert!(sent.max_element() <= 1.0 + 1e-12, "{sent}");
+        }
+    }
+
+    #[test]
+    fn a_nearer_light_lights_no_less(
+        model in model(), surface in any_surface(), (normal, toward, viewer) in (above(), above(), above()),
+        (near, far) in (0.0..100.0f64, 0.0..100.0f64), colors in [color(), color(), color()],
+        [constant, linear, quadratic] in [0.0..2.0f32, 0.0..2.0f32, 0.01..2.0f32],
+        (clamp, range) in (any::<bool>(), prop_oneof![Just(f32::INFINITY), 1.0..100.0f32]),
+    ) {
+        let attenuation = Attenuation { constant, linear, quadratic, clamp, range };
+        let [ambient, diffuse, specular] = colors;
+        let light = Light { ambient, diffuse, specular, attenuation, ..Light::point(Vec3::ONE) };
+        // The same direction at every distance.
+        let lit = |distance: f64| {
+            let sample = evaluate_light(&light, toward * distance.max(1e-3), DVec3::ZERO, DVec3::ZERO);
+            let sample = LightSample { direction: toward, ..sample };
+            light_contribution(model, &surface, &sample, normal, viewer).total()
+        };
+        prop_assert!((lit(near.min(far)) - lit(near.max(far))).min_element() >= 0.0);
+    }
+
+    #[test]
+    fn the_fallible_twins_agree_where_they_have_a_value(
+        (a, b, point) in (any_vector(), any_vector(), any_vector()), (x, y) in (any_number(), any_number()),
+        (eta, absorption) in (any_vector(), any_vector()), light in any_light(), axis in unit(), flag in any::<bool>(),
+    ) {
+        if let Some(direction) = try_reflected_direction(a, b) {
+            prop_assert!((direction.length() - 1.0).abs() < 1e-14);
+        }
+        if let Some(reflectance) = try_fresnel_dielectric(x, y) {
+            prop_assert_eq!(reflectance, fresnel_dielectric(x, y));
+        }
+        if let Some(reflectance) = try_fresnel_conductor(x, eta, absorption) {
+            prop_assert_eq!(reflectance, fresnel_conductor(x, eta, absorption));
+        }
+        if let Some(reflectance) = try_fresnel_normal_reflectance(x, eta) {
+            prop_assert_eq!(reflectance, fresnel_normal_reflectance(x, eta));
+        }
+        if let Some(cosine) = try_transmitted_cosine(x, y) {
+            prop_assert_eq!(cosine, transmitted_cosine(x, y));
+        }
+        if let Some(factor) = try_attenuate(a, flag, x, y) {
+            prop_assert_eq!(factor, attenuate(a, flag, x, y));
+        }
+        if let Some(direction) = try_viewer_direction(flag, a, b, point) {
+            prop_assert!((direction.length() - 1.0).abs() < 1e-14);
+        }
+        if let Ok(sample) = try_evaluate_light(&light, a, axis, point) {
+            prop_assert_eq!(sample, evaluate_light(&light, a, axis, point));
         }
     }
 }

@@ -129,6 +129,80 @@ fn a_shade_variant_holds_no_other_models_functions() {
     }
 }
 
+/// A compiled shade with these features, and what is not reached from it stripped.
+fn stripped_shade(features: &[&str]) -> String {
+    let mut compiler = Wesl::new(shaders());
+    compiler.keep_declarations(vec!["light_contribution".to_owned()]);
+    for feature in features {
+        compiler.set_feature(feature, true);
+    }
+    let path = "package::optics::shade".parse().expect("a module path");
+    compiler.compile(&path).unwrap_or_else(|error| panic!("{features:?}: {error}")).to_string()
+}
+
+#[test]
+fn a_microfacet_variant_holds_its_own_choices_only() {
+    let distributions = [
+        ("", "distribution_trowbridge_reitz"),
+        ("DISTRIBUTION_COSINE_POWER", "distribution_cosine_power"),
+        ("DISTRIBUTION_GAUSSIAN", "distribution_gaussian"),
+    ];
+    let fresnels = [
+        ("", "fresnel_dielectric"),
+        ("FRESNEL_CONDUCTOR", "fresnel_conductor"),
+        ("FRESNEL_NORMAL_REFLECTANCE", "fresnel_normal_reflectance"),
+    ];
+    for (distribution, own_distribution) in distributions {
+        for (fresnel, own_fresnel) in fresnels {
+            let features = ["REFLECTION_TORRANCE_SPARROW", "MICROFACETS", distribution, fresnel];
+            let source = stripped_shade(&features);
+            validate(&format!("shade {features:?}"), &source);
+            for (_, function) in distributions {
+                assert_eq!(
+                    source.contains(function),
+                    function == own_distribution,
+                    "{features:?}: {function}"
+                );
+            }
+            for (_, function) in fresnels {
+                // The reflectance at normal incidence is a dielectric's.
+                let called = fresnel == "FRESNEL_NORMAL_REFLECTANCE" && function == "fresnel_dielectric";
+                let own = function == own_fresnel || called;
+                assert_eq!(source.contains(function), own, "{features:?}: {function}");
+            }
+        }
+    }
+    // A matt surface has no model at all.
+    for model in reflection_features() {
+        let matt = stripped_shade(&[model, "MICROFACETS", "MATT"]);
+        validate(&format!("matt shade, {model}"), &matt);
+        for foreign in ["phong", "half", "fresnel", "microfacet_lobe", "pow("] {
+            assert!(!matt.contains(foreign), "{model}: {foreign}\n{matt}");
+        }
+    }
+    // The default choices are the plain model.
+    let plain = stripped_shade(&["REFLECTION_TORRANCE_SPARROW"]);
+    for foreign in ["microfacet_lobe", "conductor", "absorption", "gaussian"] {
+        assert!(!plain.contains(foreign), "{foreign}\n{plain}");
+    }
+}
+
+/// What stands before the bracket that closes one opened before, without what inner brackets hold.
+fn up_to_its_bracket(text: &str) -> Option<String> {
+    let mut depth = 0;
+    let mut outer = String::new();
+    for character in text.chars() {
+        match character {
+            '(' => depth += 1,
+            ')' if depth == 0 => return Some(outer),
+            ')' => depth -= 1,
+            _ if depth == 0 => outer.push(character),
+            _ => {}
+        }
+    }
+    None
+}
+
 /// The functions of a source file and the names of their arguments.
 fn signatures(source: &str) -> BTreeMap<String, Vec<String>> {
     let mut found = BTreeMap::new();
@@ -136,7 +210,7 @@ fn signatures(source: &str) -> BTreeMap<String, Vec<String>> {
     let source = source.split("#[cfg(test)]").next().unwrap_or_default();
     for piece in source.split("fn ").skip(1) {
         let Some((name, rest)) = piece.split_once('(') else { continue };
-        let Some((arguments, _)) = rest.split_once(')') else { continue };
+        let Some(arguments) = up_to_its_bracket(rest) else { continue };
         if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             continue;
         }
@@ -152,7 +226,17 @@ fn signatures(source: &str) -> BTreeMap<String, Vec<String>> {
 #[test]
 fn twins_have_the_same_names_and_arguments() {
     // Where Rust takes the choice as an argument, WESL takes it as a feature or a struct.
-    let choices = ["model", "mode", "parameters", "light_position", "light_axis"];
+    let choices = [
+        "model",
+        "mode",
+        "parameters",
+        "light_position",
+        "light_axis",
+        "kind",
+        "distribution",
+        "eta",
+        "absorption",
+    ];
     // Called by a public twin, in f64 a library function, a closure or an operator.
     let helpers = [
         "is_point_light",
@@ -161,6 +245,7 @@ fn twins_have_the_same_names_and_arguments() {
         "one_minus_exp",
         "fog_fraction",
         "fresnel_conductor_channel",
+        "fresnel_normal_reflectance_channel",
     ];
     let mut twins = 0;
     for stem in stems() {

@@ -6,7 +6,9 @@ use std::fmt::Write;
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Explanation, TextureDescriptor};
 use lumbre_optics::{Material, ReflectionModel, Shading};
-use lumbre_scene::{Census, Hidden, Lightmap, MaterialTextures, Mesh, SceneSettings};
+use lumbre_scene::{
+    Census, Hidden, HiddenCone, Lightmap, MaterialTextures, Mesh, SceneSettings, hidden_cones,
+};
 
 use crate::extract::{FrameFeatures, LightSet, Traits};
 use crate::frame_graph::{FramePlan, declare};
@@ -17,6 +19,8 @@ use crate::{Display, FrameOptions, RenderError};
 pub struct SceneExplanation {
     /// What there is, and what there is none of.
     pub census: Census,
+    /// Spotlights whose cone falls between the points where an object is lit.
+    pub hidden_cones: Vec<HiddenCone>,
     /// The passes and resources of a frame.
     pub frame: Explanation,
     /// Each shader variant in use with the number of objects it draws.
@@ -67,7 +71,12 @@ pub fn explain(
     let plan = FramePlan::new(&traits, options);
     let target = TextureDescriptor::new_2d(width, height, wgpu::TextureFormat::Rgba8Unorm);
     let frame = declare(&plan, target, None, None).compile()?.explain();
-    Ok(SceneExplanation { census: Census::of(world), frame, variants })
+    let hidden_cones = match options.shading {
+        // Whatever the objects ask for.
+        Some(Shading::Phong) => Vec::new(),
+        _ => hidden_cones(world),
+    };
+    Ok(SceneExplanation { census: Census::of(world), hidden_cones, frame, variants })
 }
 
 impl SceneExplanation {
@@ -78,6 +87,14 @@ impl SceneExplanation {
             let mark = if line.called_for { '+' } else { '-' };
             // Writing to a String cannot fail.
             let _ = writeln!(text, "  {mark} {}: {}", line.effect, line.reason);
+        }
+        for cone in &self.hidden_cones {
+            let _ = writeln!(text, "  + cones between vertices: {cone}");
+        }
+        if self.hidden_cones.is_empty() {
+            text.push_str(
+                "  - cones between vertices: no cone falls between the points where a mesh is lit\n",
+            );
         }
         text.push_str("\nThe frame\n");
         for line in self.frame.to_text().lines() {

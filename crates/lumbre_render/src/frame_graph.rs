@@ -14,6 +14,9 @@ use crate::pipelines::{DEPTH_FORMAT, Pipelines};
 use crate::shader::DisplayVariant;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, RenderError};
 
+/// The largest finite half float.
+const LARGEST_HALF: Vec3 = Vec3::splat(65504.0);
+
 /// What draws over the finished frame.
 pub(crate) type Overlay<'a> = Box<dyn FnOnce(&mut wgpu::RenderPass<'static>) + 'a>;
 
@@ -63,6 +66,14 @@ impl FramePlan {
             plan.transparent |= traits.pass(options.lightmaps) == LitPass::Transparent;
         }
         plan
+    }
+
+    /// A colour as the linear frame can hold it.
+    pub fn in_range(&self, color: Vec3) -> Vec3 {
+        match self.format {
+            wgpu::TextureFormat::Rgba16Float => color.clamp(-LARGEST_HALF, LARGEST_HALF),
+            _ => color,
+        }
     }
 
     /// Chooses the format of the linear frame from what the device has.

@@ -34,6 +34,9 @@ pub struct FrameReport {
     pub statistics: Statistics,
     /// Which passes ran, which did not, and why.
     pub plan: Arc<Plan>,
+    /// Lights and fog made in code whose numbers no file may have, each with a sentence that names it: the frame is drawn without them,
+    /// and a warning is logged when one appears.
+    pub left_out: Vec<String>,
     /// The newest measurements that arrived, often of an earlier frame; `Renderer::wait` has this frame's.
     pub measured: Option<lumbre_graph::FrameReport>,
 }

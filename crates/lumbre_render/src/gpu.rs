@@ -101,10 +101,11 @@ impl Gpu {
         if self.is_lost() {
             return Err(RenderError::DeviceLost);
         }
-        match self.fault.lock().ok().and_then(|mut fault| fault.take()) {
-            Some(message) => Err(RenderError::Refused { message }),
-            None => Ok(()),
-        }
+        let Some(message) = self.fault.lock().ok().and_then(|mut fault| fault.take()) else { return Ok(()) };
+        // A device that goes refuses commands at once, and says that it is lost when its queue is empty: that is waited for.
+        let timeout = Some(std::time::Duration::from_secs(1));
+        let _ = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout });
+        Err(if self.is_lost() { RenderError::DeviceLost } else { RenderError::Refused { message } })
     }
 
     /// Name and driver of the adapter, for reports: figures mean little without them.

@@ -2,7 +2,10 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use lumbre_optics::{Fresnel, Light, LightKind, Material, PolygonLight, SpotCone, SpotCosines, Surface};
+use lumbre_optics::{
+    DEFAULT_IOR, Fresnel, LARGEST_COEFFICIENT, LARGEST_INTENSITY, Light, LightKind, Material, PolygonLight,
+    SpotCone, SpotCosines, Surface,
+};
 use lumbre_scene::{GlobalTransform, MaterialTextures, TextureReference};
 
 /// `Frame`.
@@ -66,6 +69,18 @@ pub(crate) fn finite(color: Vec3) -> Vec3 {
     Vec3::new(channel(color.x), channel(color.y), channel(color.z))
 }
 
+/// A reflection coefficient or a vertex colour, within what keeps products with light inside f32: infinity times a cosine of 0 would
+/// be no number.
+pub(crate) fn coefficient(color: Vec3) -> Vec3 {
+    finite(color).clamp(Vec3::splat(-LARGEST_COEFFICIENT), Vec3::splat(LARGEST_COEFFICIENT))
+}
+
+/// Radiance that is added as it is: emission, ambient light, backgrounds, fogs.
+pub(crate) fn radiance(color: Vec3) -> Vec3 {
+    let largest = Vec3::splat(LARGEST_INTENSITY as f32);
+    finite(color).clamp(-largest, largest)
+}
+
 /// `Side`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -87,13 +102,13 @@ impl SideData {
             _ => 0.0,
         };
         Self {
-            ambient: finite(surface.ambient),
+            ambient: coefficient(surface.ambient),
             shininess: surface.shininess_in_range(),
-            diffuse: finite(surface.diffuse),
+            diffuse: coefficient(surface.diffuse),
             alpha: if material.alpha.is_finite() { material.alpha } else { 1.0 },
-            specular: finite(surface.specular),
-            ior: material.ior,
-            emission: finite(surface.emission),
+            specular: coefficient(surface.specular),
+            ior: if material.ior.is_finite() { material.ior } else { DEFAULT_IOR as f32 },
+            emission: radiance(surface.emission),
             alpha_cutoff,
         }
     }
@@ -152,10 +167,12 @@ impl MaterialData {
             base_color: CoordinatesData::new(textures.base_color.as_ref()),
             emissive: CoordinatesData::new(textures.emissive.as_ref()),
             metallic_roughness: CoordinatesData::new(mapped.map(|mapped| &mapped.texture)),
-            base_and_metallic: mapped.map_or([0.0; 4], |m| m.base_color.extend(m.metallic).to_array()),
-            roughness: mapped.map_or([0.0; 4], |m| [m.roughness, 0.0, 0.0, 0.0]),
-            eta: eta.extend(0.0).to_array(),
-            absorption: absorption.extend(0.0).to_array(),
+            base_and_metallic: mapped.map_or([0.0; 4], |m| {
+                coefficient(m.base_color).extend(finite(Vec3::splat(m.metallic)).x).to_array()
+            }),
+            roughness: mapped.map_or([0.0; 4], |m| finite(Vec3::X * m.roughness).extend(0.0).to_array()),
+            eta: finite(eta).extend(0.0).to_array(),
+            absorption: finite(absorption).extend(0.0).to_array(),
         }
     }
 }

@@ -9,6 +9,7 @@ use lumbre_optics::FlatRule;
 use wgpu::util::DeviceExt;
 
 use crate::Gpu;
+use crate::layout::coefficient;
 
 /// Attributes in the order of their shader locations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -135,16 +136,35 @@ fn indexed_attribute(mesh: &TriangleMesh, attribute: Attribute) -> Vec<u8> {
     let count = mesh.positions.len();
     match attribute {
         Attribute::Position | Attribute::Centroid => bytemuck::cast_slice(&mesh.positions).to_vec(),
-        Attribute::Normal => filled(&mesh.normals, Vec3::ZERO, count),
-        Attribute::Uv0 => filled(&mesh.uv0, glam::Vec2::ZERO, count),
-        Attribute::Uv1 => filled(&mesh.uv1, glam::Vec2::ZERO, count),
-        Attribute::Color => filled(&mesh.colors, Vec4::ONE, count),
+        Attribute::Normal => filled(&mesh.normals, Vec3::ZERO, count, usable_normal),
+        Attribute::Uv0 => filled(&mesh.uv0, glam::Vec2::ZERO, count, |uv| uv),
+        Attribute::Uv1 => filled(&mesh.uv1, glam::Vec2::ZERO, count, |uv| uv),
+        Attribute::Color => filled(&mesh.colors, Vec4::ONE, count, usable_color),
     }
 }
 
-fn filled<T: bytemuck::Pod>(values: &[T], neutral: T, count: usize) -> Vec<u8> {
+/// A normal whose square f32 can hold: one that is no vector is the zero vector, which takes ambient light only.
+fn usable_normal(normal: Vec3) -> Vec3 {
+    let largest = normal.abs().max_element();
+    match (normal.is_finite(), largest > LARGEST_NORMAL) {
+        (false, _) => Vec3::ZERO,
+        (true, true) => normal / largest,
+        (true, false) => normal,
+    }
+}
+
+/// Normals longer than this, in metres, are scaled down before they are squared.
+const LARGEST_NORMAL: f32 = 1e9;
+
+/// A vertex colour without numbers that light cannot be multiplied with; coverage that is no number covers.
+fn usable_color(color: Vec4) -> Vec4 {
+    let alpha = if color.w.is_finite() { color.w } else { 1.0 };
+    coefficient(color.truncate()).extend(alpha)
+}
+
+fn filled<T: bytemuck::Pod>(values: &[T], neutral: T, count: usize, usable: impl Fn(T) -> T) -> Vec<u8> {
     if values.len() == count {
-        bytemuck::cast_slice(values).to_vec()
+        bytemuck::cast_slice(&values.iter().map(|value| usable(*value)).collect::<Vec<T>>()).to_vec()
     } else {
         bytemuck::cast_slice(&vec![neutral; count]).to_vec()
     }
@@ -177,7 +197,7 @@ fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule)
             (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::ZERO).as_vec3()
         }),
         (Attribute::Normal, Some(first)) => {
-            spread(mesh, |triangle, _| value(&mesh.normals, Vec3::ZERO, triangle[first]))
+            spread(mesh, |triangle, _| usable_normal(value(&mesh.normals, Vec3::ZERO, triangle[first])))
         }
         (Attribute::Centroid, None) => spread(mesh, |triangle, _| {
             let [a, b, c] = triangle.map(place);
@@ -191,7 +211,7 @@ fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule)
             spread(mesh, |triangle, corner| value(&mesh.uv1, glam::Vec2::ZERO, triangle[corner]))
         }
         (Attribute::Color, provoking) => spread(mesh, |triangle, corner| {
-            let color = |corner: usize| value(&mesh.colors, Vec4::ONE, triangle[corner]);
+            let color = |corner: usize| usable_color(value(&mesh.colors, Vec4::ONE, triangle[corner]));
             let flat = match provoking {
                 Some(first) => color(first),
                 None => (color(0) + color(1) + color(2)) / 3.0,

@@ -10,7 +10,7 @@ use crate::draws::Draws;
 use crate::extract::{CameraView, Emitters, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
 use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
 use crate::growable_buffer::GrowableBuffer;
-use crate::layout::{FrameData, InstanceData, LightData, finite};
+use crate::layout::{FrameData, InstanceData, LightData, radiance};
 use crate::light_lists::LightLists;
 use crate::mesh_buffers::MeshBuffers;
 use crate::pipelines::{Pipelines, attributes, is_flat};
@@ -34,6 +34,8 @@ pub struct Renderer {
     display: DisplayPass,
     frame_uniform: wgpu::Buffer,
     frame_group: Option<wgpu::BindGroup>,
+    /// Of the last frame.
+    left_out: Vec<String>,
 }
 
 impl Renderer {
@@ -59,6 +61,7 @@ impl Renderer {
                 mapped_at_creation: false,
             }),
             frame_group: None,
+            left_out: Vec::new(),
         }
     }
 
@@ -109,7 +112,13 @@ impl Renderer {
         self.gpu.check()?;
         // The system cannot fail: it has no parameter that may be missing.
         let _ = world.run_system_cached(propagate_transforms);
-        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let mut settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        // As lights, a fog made in code whose numbers no file may have is left out.
+        let fog_fault = settings.fog.and_then(|fog| fog.validate("scene").err());
+        let mut left_out: Vec<String> = fog_fault.iter().map(ToString::to_string).collect();
+        if fog_fault.is_some() {
+            settings.fog = None;
+        }
         let camera = find_camera(world, options.camera)?;
         let view = CameraView::new(world, camera, target.aspect())?;
         self.objects.extract(
@@ -121,7 +130,8 @@ impl Renderer {
             view.eye,
         )?;
         let (mut lights, mut reaches) =
-            extract_lights(world, &mut self.emitters, &mut self.lights, self.objects.origin)?;
+            extract_lights(world, &mut self.emitters, &mut self.lights, self.objects.origin, &mut left_out)?;
+        self.warn_once(&left_out);
         if !options.lightmaps {
             lights.dynamic = lights.all;
             reaches.iter_mut().for_each(|reach| reach.baked = false);
@@ -190,12 +200,20 @@ impl Renderer {
             frame_group: self.frame_group.as_ref(),
             display: &self.display,
             display_key,
-            background: finite(settings.background),
+            background: plan.in_range(radiance(settings.background)),
         };
         let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
         self.gpu.check()?;
         let measured = self.executor.latest_report().cloned();
-        Ok(FrameReport { statistics, plan: frame.plan, measured })
+        Ok(FrameReport { statistics, plan: frame.plan, measured, left_out })
+    }
+
+    /// Logs what is left out now and was not in the frame before.
+    fn warn_once(&mut self, left_out: &[String]) {
+        for fault in left_out.iter().filter(|fault| !self.left_out.contains(fault)) {
+            tracing::warn!("left out of the frame: {fault}");
+        }
+        left_out.clone_into(&mut self.left_out);
     }
 
     /// Uploads what changed; answers with its bytes.
@@ -214,9 +232,9 @@ impl Renderer {
             exposure,
             backward: view.basis.z_axis.as_vec3(),
             padding: 0.0,
-            ambient: finite(settings.ambient) + lights.ambient,
+            ambient: radiance(settings.ambient) + lights.ambient,
             padding_2: 0.0,
-            fog_color: fog.map_or(glam::Vec3::ZERO, |fog| fog.color),
+            fog_color: fog.map_or(glam::Vec3::ZERO, |fog| radiance(fog.color)),
             padding_3: 0.0,
             fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
         };

@@ -1,11 +1,11 @@
 //! What a World calls for: the numbers that decide which passes and shader variants exist. Not those decisions.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, ReflectionModel, Shading};
+use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, ReflectionModel, Shading, Surface};
 use serde::Serialize;
 
 use crate::{
@@ -92,6 +92,8 @@ pub struct Census {
     pub phong: usize,
     /// Lit meshes with a specular model of their own.
     pub own_reflection: usize,
+    /// Lit meshes with a highlight, by the name of their specular model; models that nothing uses are missing.
+    pub reflection_models: BTreeMap<&'static str, usize>,
     /// Whether there is fog.
     pub fog: bool,
     /// Cameras.
@@ -109,6 +111,13 @@ pub struct CensusLine {
     pub count: usize,
     /// Why, or why not.
     pub reason: String,
+}
+
+/// Whether either side that is seen has a specular coefficient.
+fn has_highlight(material: &Material, settings: &SceneSettings) -> bool {
+    let shines = |surface: &Surface| surface.specular != Vec3::ZERO;
+    let two_sided = material.double_sided && settings.two_sided;
+    shines(&material.front) || two_sided && material.back.as_ref().is_some_and(shines)
 }
 
 impl Census {
@@ -191,6 +200,10 @@ impl Census {
             self.count_material(material, settings);
             if !material.unlit {
                 self.own_reflection += usize::from(reflection.is_some());
+                if has_highlight(material, settings) {
+                    let model = reflection.copied().unwrap_or(settings.reflection);
+                    *self.reflection_models.entry(model.name()).or_default() += 1;
+                }
                 *match shading.copied().unwrap_or(settings.shading) {
                     Shading::Flat => &mut self.flat,
                     Shading::Gouraud => &mut self.gouraud,
@@ -206,16 +219,14 @@ impl Census {
     fn count_material(&mut self, material: &Material, settings: &SceneSettings) {
         let two_sided = material.double_sided && settings.two_sided;
         let back = material.back.as_ref().filter(|_| two_sided);
-        let either = |of: fn(&lumbre_optics::Surface) -> Vec3| {
-            of(&material.front) != Vec3::ZERO || back.is_some_and(|back| of(back) != Vec3::ZERO)
-        };
+        let emits = |surface: &Surface| surface.emission != Vec3::ZERO;
         self.alpha_mask += usize::from(matches!(material.alpha_mode, AlphaMode::Mask { .. }));
         self.alpha_blend += usize::from(material.alpha_mode == AlphaMode::Blend);
         self.two_sided += usize::from(two_sided);
         self.back_materials += usize::from(back.is_some());
         self.unlit += usize::from(material.unlit);
-        self.emissive += usize::from(either(|surface| surface.emission));
-        self.specular += usize::from(!material.unlit && either(|surface| surface.specular));
+        self.emissive += usize::from(emits(&material.front) || back.is_some_and(emits));
+        self.specular += usize::from(!material.unlit && has_highlight(material, settings));
         self.mirrors += usize::from(material.mirror != Vec3::ZERO);
         self.transmission += usize::from(material.transmission != Vec3::ZERO);
     }
@@ -244,6 +255,10 @@ impl Census {
             let none = format!("no {kind} light is on{off}");
             line(effect, count, &format!("{kind} light"), &format!("{kind} lights"), &none)
         };
+        let model = |effect, model: ReflectionModel| {
+            let count = self.reflection_models.get(model.name()).copied().unwrap_or_default();
+            mesh(effect, count, "with a highlight of that model", "no highlight is of that model")
+        };
         let textured =
             self.base_color_textures.max(self.emissive_textures).max(self.metallic_roughness_textures);
         let scene = |effect, on: bool, yes: &str, no: &str| CensusLine {
@@ -263,6 +278,11 @@ impl Census {
                 "with a specular model of its own",
                 "all take the scene's",
             ),
+            model("Phong reflection", ReflectionModel::Phong),
+            model("Blinn reflection", ReflectionModel::Blinn),
+            model("Blinn 4n reflection", ReflectionModel::Blinn4n),
+            model("matched Blinn reflection", ReflectionModel::BlinnMatched),
+            model("Torrance-Sparrow reflection", ReflectionModel::TorranceSparrow),
             scene(
                 "global ambient",
                 self.global_ambient,

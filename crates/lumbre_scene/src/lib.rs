@@ -39,6 +39,7 @@ mod census;
 mod components;
 mod default_camera;
 mod gltf;
+mod hidden_cone;
 mod image;
 mod settings;
 mod transform;
@@ -56,6 +57,7 @@ pub use gltf::{
     LoadError, LoadLimits, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS, SaveError, SaveReport, load,
     load_slice, load_slice_within, save,
 };
+pub use hidden_cone::{HiddenCone, hidden_cones};
 pub use image::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};
 pub use lumbre_optics::{Light, Material, Shading};
 pub use settings::SceneSettings;

@@ -286,6 +286,14 @@ fn materials_by_phong() {
     let fresnel = Fresnel::Conductor { eta: Vec3::new(0.2, 0.4, 1.4), absorption: Vec3::new(3.0, 2.5, 2.0) };
     let rest = Material::default();
     assert_eq!(all, Material { front, back, mirror, transmission, ior, distribution, fresnel, ..rest });
+    // One part of the index alone: the other is that of air.
+    let (eta, absorption) = (Vec3::new(1.5, 2.0, 2.5), Vec3::new(3.0, 2.5, 2.0));
+    let half = phong(json!({"eta": [1.5, 2, 2.5]}));
+    assert_eq!(half.fresnel, Fresnel::Conductor { eta, absorption: Vec3::ZERO });
+    let half = phong(json!({"absorption": [3, 2.5, 2]}));
+    assert_eq!(half.fresnel, Fresnel::Conductor { eta: Vec3::ONE, absorption });
+    let named = phong(json!({"fresnel": "normal-reflectance", "distribution": "cosine-power"}));
+    assert_eq!((named.fresnel, named.distribution), (Fresnel::NormalReflectance, Distribution::CosinePower));
     // What glTF itself says: k_s is the reflectance at normal incidence.
     let plain = material(json!({"pbrMetallicRoughness": {"metallicFactor": 0.5}}));
     assert_eq!(plain.fresnel, Fresnel::NormalReflectance);
@@ -405,6 +413,28 @@ fn who_moves() {
         (census.meshes, census.distinct_meshes, census.static_objects, census.dynamic_objects),
         (3, 1, 1, 2)
     );
+}
+
+#[test]
+fn reflection_models_of_nodes() {
+    let mut file = File::new();
+    let phong = json!({"extensions": {"LUMBRE_materials_phong": {"specular": [1, 1, 1]}}});
+    file.square(|file, primitive| primitive["material"] = file.push("materials", phong).into());
+    let model = |name: &str| json!({"LUMBRE_shading": {"reflection": name}});
+    file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"reflection": "blinn"}});
+    for extensions in [model("torrance-sparrow"), model("blinn-matched"), model("torrance-sparrow")] {
+        file.node(json!({"mesh": 0, "extensions": extensions}));
+    }
+    let (mut world, _) = file.load().unwrap();
+    let own: Vec<_> = world.query::<&ReflectionModel>().iter(&world).copied().collect();
+    assert_eq!(own.len(), 3);
+    let census = Census::of(&mut world);
+    assert_eq!(census.own_reflection, 3);
+    let used: Vec<_> = census.reflection_models.iter().map(|(name, count)| (*name, *count)).collect();
+    assert_eq!(used, [("blinn", 1), ("blinn-matched", 1), ("torrance-sparrow", 2)]);
+    let line = |effect: &str| census.lines().into_iter().find(|line| line.effect == effect).unwrap();
+    assert_eq!(line("Torrance-Sparrow reflection").reason, "2 meshes with a highlight of that model");
+    assert!(!line("Phong reflection").called_for);
 }
 
 #[test]

@@ -216,6 +216,25 @@ fn lights_and_materials() {
     let wrong =
         json!({"name": "brass", "extensions": {"LUMBRE_materials_phong": {"back": {"shininess": -1}}}});
     assert_matches!(material(wrong), LoadProblem::Material { source, .. } if source.to_string().contains("brass"));
+    let brass = |phong: Value| {
+        material(json!({"name": "brass", "extensions": {"LUMBRE_materials_phong": phong}})).to_string()
+    };
+    for (wrong, told) in [
+        (json!({"distribution": "ggx"}), "use one of cosine-power, gaussian, trowbridge-reitz"),
+        (json!({"fresnel": "metal"}), "use one of dielectric, conductor, normal-reflectance"),
+        (json!({"fresnel": "conductor"}), "give its index of refraction beside it"),
+        (json!({"eta": [1, -1, 1]}), "\"brass\": fresnel.eta is -1, which is negative"),
+        (json!({"absorption": [1e300, 1, 1]}), "fresnel.absorption is inf"),
+        (json!({"absorption": [1, 1, 20000]}), "fresnel.absorption is 20000; give a number from 0 to 10000"),
+        (json!({"eta": [0, 1, 1]}), "fresnel.eta is 0; give a number above 0"),
+        (json!({"eta": [1, 1]}), "brass"),
+    ] {
+        let message = brass(wrong.clone());
+        assert!(message.contains(told), "{wrong}: {message}");
+    }
+    let mut file = square();
+    file.root["nodes"][0]["extensions"] = json!({"LUMBRE_shading": {"reflection": "cook"}});
+    assert!(file.problem().to_string().contains("use one of phong, blinn"));
     assert_matches!(material(json!({"alphaMode": "SOMETIMES"})), LoadProblem::Value { .. });
     assert_matches!(
         material(json!({"pbrMetallicRoughness": {"metallicFactor": 2}})),

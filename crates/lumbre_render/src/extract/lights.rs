@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, Light, LightKind};
-use lumbre_scene::GlobalTransform;
+use lumbre_scene::{GlobalTransform, Name};
 
 use super::emitters::{EmissivePolygon, Emitters};
 use crate::RenderError;
@@ -101,7 +101,8 @@ impl LightReach {
     }
 }
 
-/// Writes the lights that are on and not black; entities in order, so that sums are the same every time.
+/// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
+/// range are `left_out`, each with a sentence.
 ///
 /// # Errors
 /// [`RenderError::TooManyEmissiveFaces`].
@@ -110,13 +111,19 @@ pub(crate) fn extract_lights(
     emitters: &mut Emitters,
     buffer: &mut GrowableBuffer<LightData>,
     origin: DVec3,
+    left_out: &mut Vec<String>,
 ) -> Result<(LightSet, Vec<LightReach>), RenderError> {
     let mut set = LightSet::default();
     let polygons = emitters.polygons(world)?;
     polygons.iter().for_each(|polygon| set.add_polygon(polygon));
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
-    let mut found: Vec<_> =
-        query.iter(world).filter(|(_, light, transform)| shines(light, transform)).collect();
+    let mut found: Vec<_> = query
+        .iter(world)
+        .filter(|(entity, light, transform)| {
+            left_out.extend(fault(world, *entity, light, transform));
+            shines(light, transform)
+        })
+        .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
     found.iter().for_each(|(_, light, _)| set.add(light));
     found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
@@ -131,6 +138,18 @@ pub(crate) fn extract_lights(
     all.sort_by_key(|(reach, _)| reach.baked);
     buffer.replace(all.iter().map(|(_, data)| *data));
     Ok((set, all.into_iter().map(|(reach, _)| reach).collect()))
+}
+
+/// What is wrong with a light that is on, by name; nothing as a rule.
+fn fault(world: &World, entity: Entity, light: &Light, transform: &GlobalTransform) -> Option<String> {
+    if !light.enabled || transform.0.is_finite() && light.validate("").is_ok() {
+        return None;
+    }
+    let name = world.get::<Name>(entity).map_or_else(|| entity.to_string(), ToString::to_string);
+    Some(match light.validate(&name) {
+        Err(error) => error.to_string(),
+        Ok(()) => format!("light \"{name}\": its transform is not finite"),
+    })
 }
 
 /// Whether a light adds anything; one whose numbers are out of range is left out rather than let into a frame.

@@ -126,6 +126,7 @@ impl Traits {
         variant.set(Feature::PointLights, point);
         variant.set(Feature::SpotLights, spot);
         variant.set(Feature::PolygonLights, polygon);
+        variant.set(Feature::Matt, lit && !self.specular);
         variant.set(Feature::SharpHighlights, self.sharp);
         if self.specular {
             let (distribution, fresnel) = (self.distribution, self.fresnel);

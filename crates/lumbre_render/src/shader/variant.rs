@@ -94,6 +94,8 @@ features! {
     FresnelNormalReflectance = 32 => "FRESNEL_NORMAL_REFLECTANCE",
     /// Writes into half floats: what is brighter than the largest of them is as bright as that.
     HalfRange = 33 => "HALF_RANGE",
+    /// Has no highlight: every specular coefficient is 0.
+    Matt = 34 => "MATT",
 }
 
 /// A variant of the forward shader.
@@ -147,7 +149,16 @@ impl Variant {
                 | Feature::SpotLights as u64
                 | Feature::PolygonLights as u64
                 | Feature::SharpHighlights as u64
-                | Feature::SpecularAntialiasing as u64);
+                | Feature::SpecularAntialiasing as u64
+                | Feature::LocalViewer as u64
+                | Feature::Matt as u64);
+            self.reflection = ReflectionModel::Phong;
+        }
+        if self.has(Feature::Matt) {
+            // Without a highlight nothing depends on the viewer.
+            self.bits &= !(Feature::SharpHighlights as u64
+                | Feature::SpecularAntialiasing as u64
+                | Feature::LocalViewer as u64);
             self.reflection = ReflectionModel::Phong;
         }
         if self.reflection != ReflectionModel::TorranceSparrow {

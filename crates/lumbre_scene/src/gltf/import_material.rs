@@ -131,17 +131,24 @@ pub(crate) fn front_from_metallic_roughness(
     front
 }
 
-/// A conductor where its index is given, unless it says otherwise.
+/// A conductor where either part of its index is given, unless it says otherwise. The other part is then that of air: 1, and 0.
 fn fresnel_of(phong: &PhongMaterial, default: Fresnel, place: &str) -> Result<Fresnel, LoadProblem> {
+    let given = phong.eta.is_some() || phong.absorption.is_some();
     let conductor = Fresnel::Conductor {
-        eta: phong.eta.map_or(Vec3::ZERO, color),
+        eta: phong.eta.map_or(Vec3::ONE, color),
         absorption: phong.absorption.map_or(Vec3::ZERO, color),
     };
     match phong.fresnel.as_deref() {
-        None if phong.eta.is_some() || phong.absorption.is_some() => Ok(conductor),
+        None if given => Ok(conductor),
         None => Ok(default),
         Some("dielectric") => Ok(Fresnel::Dielectric),
-        Some("conductor") => Ok(conductor),
+        Some("conductor") if given => Ok(conductor),
+        Some("conductor") => Err(LoadProblem::Value {
+            place: place.to_owned(),
+            field: "LUMBRE_materials_phong.fresnel".to_owned(),
+            value: "\"conductor\"".to_owned(),
+            expected: "give its index of refraction beside it: eta, absorption or both".to_owned(),
+        }),
         Some("normal-reflectance") => Ok(Fresnel::NormalReflectance),
         Some(other) => {
             let names = ["dielectric", "conductor", "normal-reflectance"].into_iter();
