@@ -74,6 +74,7 @@ impl fmt::Display for Outcome {
         match self {
             Self::Number { expected, got, bound, because } => {
                 let (expected, got) = (shortest(*expected), shortest(*got));
+                let because = because.replace('|', "\\|");
                 write!(f, "{expected} | {got} | {bound:.1e} | {because} | {pass}")
             }
             Self::Text { expected, got } => {

@@ -17,6 +17,7 @@ use crate::case::Outcome;
 
 crate::cases! {
     "the largest product stays below the target's overflow" {
+        coefficients_beyond_1000_are_refused_in_files, emission_beyond_1e30_is_refused_in_files,
         the_largest_product_on_the_lit_side, the_largest_product_behind_the_surface, the_brightest_highlight,
         ambient_light_beyond_f32, a_background_beyond_half_floats, emission_beyond_half_floats,
         a_bright_pane_behind_a_bright_glass, an_exposure_of_1e35, fog_over_emission_of_1e38,
@@ -354,4 +355,19 @@ fn a_fog_left_out_is_named() -> Outcome {
     world.insert_resource(SceneSettings { fog, ..SceneSettings::default() });
     let (_, report) = draw(&mut world, 1, 1, &linear());
     Outcome::text("density is NaN", report.left_out.join("; "))
+}
+
+fn refused(front: Surface) -> String {
+    let material = Material { front, ..Material::default() };
+    material.validate("shiny").err().map_or_else(|| "accepted".to_owned(), |error| error.to_string())
+}
+
+fn coefficients_beyond_1000_are_refused_in_files() -> Outcome {
+    let said = refused(Surface { specular: Vec3::new(0.0, 1001.0, 0.0), ..Surface::default() });
+    Outcome::text("material \"shiny\": front.specular is 1001; give a number up to 1000", said)
+}
+
+fn emission_beyond_1e30_is_refused_in_files() -> Outcome {
+    let said = refused(Surface { emission: Vec3::splat(1e31), ..Surface::default() });
+    Outcome::text("give a number up to 1e30", said)
 }
