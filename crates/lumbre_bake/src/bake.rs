@@ -11,7 +11,7 @@ use crate::texels::charts::charts;
 use crate::texels::error_estimate::variances;
 use crate::texels::fill::fill;
 use crate::texels::footprint::{Texel, footprints};
-use crate::texels::gather::Outgoing;
+use crate::texels::gather::{Outgoing, SCRAMBLES};
 use crate::texels::hidden::remove_hidden;
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::{Direct, Sources};
@@ -108,6 +108,8 @@ fn run(
                 patch_indirect: &exchange.indirect,
                 patch_error: &exchange.indirect_error,
                 near: exchange.near,
+                guide: &exchange.guide,
+                run: options.quality.effort().gather[0] / SCRAMBLES as u32,
             };
             Some(rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?)
         }

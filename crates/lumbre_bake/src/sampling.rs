@@ -11,7 +11,7 @@ pub(crate) struct Sequence {
     seed: u32,
 }
 
-/// The crate's limit: the sequence repeats its index beyond.
+/// The crate's limit of one sequence; further points are those of another scramble.
 const LENGTH: u32 = 1 << 16;
 
 impl Sequence {
@@ -20,9 +20,18 @@ impl Sequence {
         Self { seed: hash(hash(hash(seed) ^ purpose.wrapping_mul(0x9e37_79b9)) ^ index) }
     }
 
+    /// Another scramble for each `which`.
+    pub fn of(&self, which: u32) -> Self {
+        Self { seed: hash(self.seed ^ which.wrapping_mul(0x85eb_ca6b)) }
+    }
+
     /// The four dimensions of point `index`, of dimension set `set` (0, 1, …).
     pub fn point(&self, index: u32, set: u32) -> [f32; 4] {
-        sobol_burley::sample_4d(index % LENGTH, set, self.seed)
+        let seed = match index / LENGTH {
+            0 => self.seed,
+            beyond => self.of(beyond).seed,
+        };
+        sobol_burley::sample_4d(index % LENGTH, set, seed)
     }
 }
 

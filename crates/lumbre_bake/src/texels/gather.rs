@@ -2,12 +2,17 @@
 //! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it, one
 //! real bounce more. Emission is not read: `direct` has counted it.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::Vec3;
 
 use super::footprint::{Texel, receiver};
-use crate::sampling::{Sequence, cosine_about};
+use super::tile_sequence::TileSequence;
+use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::transport::direct::Receiver;
+use crate::transport::guide::Guide;
 use crate::transport::patches::Patches;
 
 /// Independent scrambles per texel: their spread is the texel's error.
@@ -28,6 +33,10 @@ pub(crate) struct Outgoing<'a> {
     pub patch_error: &'a [f32],
     /// Hits nearer than this get a real bounce more, canonical units.
     pub near: f32,
+    /// Where each patch's light comes from.
+    pub guide: &'a Guide,
+    /// Samples of each scramble in the first round.
+    pub run: u32,
 }
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
@@ -55,6 +64,18 @@ struct Met {
     reflectance: Vec3,
     /// Direct irradiance there.
     direct: Vec3,
+    /// Of the ray, of unit length, and how far it went.
+    direction: Vec3,
+    distance: f32,
+}
+
+/// Share of the samples that the guide places.
+const GUIDED: f32 = 0.5;
+
+/// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
+fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
+    let below = direction - receiver.geometric_normal * (2.0 * direction.dot(receiver.geometric_normal));
+    (direction.dot(receiver.normal).max(0.0) + below.dot(receiver.normal).max(0.0)) * FRAC_1_PI
 }
 
 /// What a texel has gathered: irradiance by bounces.
@@ -90,23 +111,23 @@ impl Outgoing<'_> {
     /// Adds samples `self.samples..samples` of every scramble.
     pub fn gather(&self, texel: &Texel, gathered: &mut Gathered, samples: u32, seed: u32) {
         for (scramble, sum) in gathered.sums.iter_mut().enumerate() {
-            let sequence = Sequence::new(seed, 16 + scramble as u32, texel.index);
+            let sequence = TileSequence::new(seed, 16 + scramble as u32, texel, self.run);
             for sample in gathered.samples..samples {
                 let [x, y, u, v] = sequence.point(sample, 0);
                 let Some(point) = texel.point(self.scene, x, y) else { continue };
                 let receiver = receiver(self.scene, &point);
-                let mut direction = cosine_about(receiver.normal, u, v);
-                let below = direction.dot(receiver.geometric_normal);
-                if below <= 0.0 {
-                    // Under the facet though above the smooth surface: mirrored up.
-                    direction -= receiver.geometric_normal * (2.0 * below);
-                }
                 gathered.rays += 1;
+                let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
+                let Some(met) =
+                    self.sample(&receiver, region.filter(|&region| self.guide.knows(region)), u, v)
+                else {
+                    continue;
+                };
                 // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
                 let turn =
                     (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
                 let checked = turn.is_multiple_of(CHECKED);
-                let found = self.towards(receiver.origin, direction, sequence, sample, checked);
+                let found = self.read(met, sequence, sample, checked);
                 *sum += found.light;
                 gathered.rays += u64::from(found.rays);
                 gathered.patch_errors += found.error;
@@ -118,18 +139,66 @@ impl Outgoing<'_> {
         gathered.samples = gathered.samples.max(samples);
     }
 
-    /// What a ray meets: its radiosity, emission apart.
-    fn towards(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-        sequence: Sequence,
-        sample: u32,
-        checked: bool,
-    ) -> Reading {
+    /// A point that a receiver's light by bounces comes from, with its weight: half of the samples, if the guide knows
+    /// the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
+    /// (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
+    fn sample(&self, receiver: &Receiver, guided: Option<u32>, u: f32, v: f32) -> Option<(Met, f32)> {
+        let Some(region) = guided else { return self.meet_about(receiver, u, v).map(|met| (met, 1.0)) };
+        let (met, other, probability) = if u < GUIDED {
+            let (other, u, probability) = self.guide.pick(region, u / GUIDED)?;
+            (self.point_of(receiver, other, u, v)?, other, probability)
+        } else {
+            let met = self.meet_about(receiver, (u - GUIDED) / (1.0 - GUIDED), v)?;
+            let other = self.guide.regions.at(met.triangle, met.side, met.at)?;
+            (met, other, self.guide.probability(region, other))
+        };
+        // Densities over the surfaces' area.
+        let by_guide = probability / self.guide.regions.list[other as usize].area;
+        let normal = self.scene.triangles[met.triangle as usize].side_normal(met.side);
+        let cosine = -met.direction.dot(normal);
+        let by_cosine = kernel(receiver, met.direction) * cosine / (met.distance * met.distance);
+        let weight = by_cosine / ((1.0 - GUIDED) * by_cosine + GUIDED * by_guide);
+        (cosine > 0.0 && weight.is_finite()).then_some((met, weight))
+    }
+
+    /// What a ray about a receiver's normal meets.
+    fn meet_about(&self, receiver: &Receiver, u: f32, v: f32) -> Option<Met> {
+        let mut direction = cosine_about(receiver.normal, u, v);
+        let below = direction.dot(receiver.geometric_normal);
+        if below <= 0.0 {
+            // Under the facet though above the smooth surface: mirrored up.
+            direction -= receiver.geometric_normal * (2.0 * below);
+        }
+        self.meet(receiver.origin, direction)
+    }
+
+    /// A point of a region, if the receiver sees it.
+    fn point_of(&self, receiver: &Receiver, region: u32, u: f32, v: f32) -> Option<Met> {
+        let region = &self.guide.regions.list[region as usize];
+        let (triangle, side) = (region.triangle, region.side);
+        let at = self.guide.regions.point(region, triangle_point(u, v));
+        let surface = &self.scene.triangles[triangle as usize];
+        let position = surface.position(at.0, at.1);
+        let apart = position - receiver.position;
+        let distance = apart.length();
+        let direction = apart / distance;
+        let faces =
+            direction.dot(surface.side_normal(side)) < 0.0 && direction.dot(receiver.geometric_normal) > 0.0;
+        if !faces || self.scene.blocked(receiver.origin, self.scene.off_surface(triangle, side, position)) {
+            return None;
+        }
+        let patch = self.patches.at(triangle, side, at)?;
+        let reflectance = self.reflectance(triangle, side, at, patch);
+        let direct = self.direct_at(triangle, side, at, patch);
+        Some(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
+    }
+
+    /// The light that leaves a point that was met, emission apart, times a weight.
+    fn read(&self, (met, weight): (Met, f32), sequence: TileSequence, sample: u32, checked: bool) -> Reading {
         let mut reading = Reading { checked, ..Reading::default() };
-        let Some((met, distance)) = self.meet(origin, direction) else { return reading };
-        let (mut light, mut weight, mut last) = (met.reflectance * met.direct, met.reflectance, met);
+        let distance = met.distance;
+        let reflectance = weight * met.reflectance;
+        let (mut light, mut weight, mut last) = (reflectance * met.direct, reflectance, met);
         if distance < self.near {
             let [u, v, ..] = sequence.point(sample, 1);
             reading.rays += 1;
@@ -157,15 +226,15 @@ impl Outgoing<'_> {
     }
 
     /// The surface that a ray meets, if it reflects at all, and how far it is.
-    fn meet(&self, origin: Vec3, direction: Vec3) -> Option<(Met, f32)> {
+    fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Met> {
         let SurfaceHit::Lit { triangle, side, at, distance } = self.scene.first_hit(origin, direction) else {
             return None;
         };
         let patch = self.patches.at(triangle, side, at)?;
         let reflectance = self.reflectance(triangle, side, at, patch);
         let direct = self.direct_at(triangle, side, at, patch);
-        (reflectance != Vec3::ZERO)
-            .then_some((Met { triangle, side, at, patch, reflectance, direct }, distance))
+        let met = Met { triangle, side, at, patch, reflectance, direct, direction, distance };
+        (reflectance != Vec3::ZERO).then_some(met)
     }
 
     /// What a surface's own light by bounces comes from: one sample.
@@ -173,7 +242,7 @@ impl Outgoing<'_> {
         let surface = &self.scene.triangles[from.triangle as usize];
         let position = surface.position(from.at.0, from.at.1);
         let origin = self.scene.off_surface(from.triangle, from.side, position);
-        self.meet(origin, cosine_about(surface.side_normal(from.side), u, v)).map(|(met, _)| met)
+        self.meet(origin, cosine_about(surface.side_normal(from.side), u, v))
     }
 
     fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {

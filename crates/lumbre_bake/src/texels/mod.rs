@@ -10,6 +10,7 @@ pub(crate) mod hidden;
 pub(crate) mod lighting;
 pub(crate) mod rounds;
 pub(crate) mod smooth;
+pub(crate) mod tile_sequence;
 
 use rayon::prelude::*;
 

@@ -50,7 +50,7 @@ pub(crate) fn gather(
         let raw: Vec<Estimates> = gathered.iter().map(Gathered::estimates).collect();
         let (estimates, smoothing_bias) = match options.denoise {
             true => smooth(&surroundings, &raw),
-            false => (raw, vec![0.0; texels.len()]),
+            false => (raw.clone(), vec![0.0; texels.len()]),
         };
         let patch_bias = patch_bias(&surroundings, texels, &gathered, outgoing.patches.mean_reflectance());
         let errors = GatherErrors {
@@ -70,6 +70,55 @@ pub(crate) fn gather(
         let by_rays = errors.by_rays();
         let helped: f64 = open_variances(texels, &by_rays).sum();
         let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
+        if std::env::var_os("LUMBRE_DEBUG").is_some() {
+            let share = |values: &mut dyn Iterator<Item = f32>| {
+                (values.map(f64::from).sum::<f64>() / open).sqrt() / total * 100.0
+            };
+            eprintln!(
+                "samples {samples} wanted {} est {:.3}: direct {:.3} noise {:.3} smoothing {:.3} factors {:.3} patches {:.3}",
+                wanted.len(),
+                report.estimated_error * 100.0,
+                share(&mut direct.iter().map(|d| d.variance)),
+                share(&mut estimates.iter().map(|e| super::smooth::variance(e).element_sum() / 3.0)),
+                share(&mut smoothing_bias.iter().copied()),
+                share(&mut gathered.iter().map(|g| g.patch_error().powi(2))),
+                share(&mut patch_bias.iter().map(|p| p.rest))
+            );
+        }
+        if std::env::var_os("LUMBRE_DEBUG").is_some_and(|v| v == "2") {
+            let mut order: Vec<usize> = (0..texels.len()).filter(|&i| !texels[i].is_hidden()).collect();
+            order.sort_by(|&a, &b| variances[b].total_cmp(&variances[a]));
+            let mut cumulative = 0.0;
+            for (rank, &i) in order.iter().enumerate() {
+                cumulative += f64::from(variances[i]);
+                if rank < 40 || rank % 2000 == 0 {
+                    let t = &texels[i];
+                    let f = match &t.footprint {
+                        super::footprint::Footprint::Points(p) => p.len(),
+                        _ => 99,
+                    };
+                    eprintln!(
+                        "{rank} share {:.3} obj {} at {} {} points {f}: sd {:.3} value {:.3} direct {:.4} noise {:.4} raw {:.4} smoothing {:.4} factors {:.4} patches {:.4} samples {}",
+                        cumulative / sum,
+                        t.object,
+                        t.x,
+                        t.y,
+                        f64::from(variances[i]).sqrt() / total,
+                        (f64::from(direct[i].baked.element_sum())
+                            + f64::from(mean(&estimates[i]).element_sum()))
+                            / 3.0
+                            / total,
+                        f64::from(direct[i].variance).sqrt() / total,
+                        f64::from(super::smooth::variance(&estimates[i]).element_sum() / 3.0).sqrt() / total,
+                        f64::from(super::smooth::variance(&raw[i]).element_sum() / 3.0).sqrt() / total,
+                        f64::from(smoothing_bias[i]).sqrt() / total,
+                        f64::from(gathered[i].patch_error()) / total,
+                        f64::from(patch_bias[i].rest).sqrt() / total,
+                        gathered[i].samples
+                    );
+                }
+            }
+        }
         helped_before = helped;
         if report.error_reached || samples >= most || late || helpless {
             break (corrected(&estimates, &patch_bias), variances);

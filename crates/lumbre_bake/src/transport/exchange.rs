@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
+use super::guide::Guide;
 use super::patches::{Patch, Patches};
 use super::solver::{self, Solver};
 use crate::progress::Watch;
@@ -25,6 +26,8 @@ pub(crate) struct Exchange {
     pub indirect_error: Vec<f32>,
     /// Below this distance patches are too coarse to read, canonical units.
     pub near: f32,
+    /// Where each patch's light by bounces comes from.
+    pub guide: Guide,
 }
 
 /// Relative residual at which the solver stops: well below what form factors are known to.
@@ -83,7 +86,12 @@ impl Exchange {
         watch.advance(0.5)?;
         let indirect = solve(options.solver, &factors, &patches.list, &direct, report);
         let indirect_error = solution_error(options.solver, &halves, &direct_halves, &patches.list);
-        Ok(Some(Self { patches, direct, indirect, indirect_error, near: 2.0 * side }))
+        let leaves = |(index, patch): (usize, &Patch)| {
+            (patch.reflectance * (direct[index] + indirect[index])).element_sum()
+        };
+        let radiosity: Vec<f32> = patches.list.iter().enumerate().map(leaves).collect();
+        let guide = Guide::new(scene, &patches, side, &factors, &radiosity);
+        Ok(Some(Self { patches, direct, indirect, indirect_error, near: 2.0 * side, guide }))
     }
 }
 

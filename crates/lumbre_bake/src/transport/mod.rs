@@ -9,6 +9,7 @@ pub(crate) mod exchange;
 #[cfg(test)]
 mod form_factor_tests;
 pub(crate) mod form_factors;
+pub(crate) mod guide;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod solver;

@@ -1,0 +1,168 @@
+//! Where the light that arrives comes from, as the solution knows it: the final gather sends a share of its samples there
+//! (Ureña and Torres, "Improved Irradiance Computation by Importance Sampling", 1997). By regions of several patches: few rays
+//! tell each patch's part of the light badly, and many a patch that gives light is met by none. Not the gather.
+
+use super::form_factors::FormFactors;
+use super::patches::Patches;
+use crate::scene::BakeScene;
+
+/// For each region, those that light it by bounces, with a probability in proportion to the irradiance they bring.
+#[derive(Clone, Debug)]
+pub(crate) struct Guide {
+    /// Cut as patches are, but larger.
+    pub regions: Patches,
+    rows: Rows,
+}
+
+/// Patches along a region's side.
+const REGION: f32 = 4.0;
+
+impl Guide {
+    /// From the patches (of `side` canonical units), their exchange and what leaves each of them (any unit).
+    pub fn new(
+        scene: &BakeScene,
+        patches: &Patches,
+        side: f32,
+        factors: &FormFactors,
+        radiosity: &[f32],
+    ) -> Self {
+        let regions = Patches::new(scene, REGION * side);
+        let region_of: Vec<u32> = patches
+            .list
+            .iter()
+            .map(|patch| {
+                let middle = patches.point(patch, (1.0 / 3.0, 1.0 / 3.0));
+                regions.at(patch.triangle, patch.side, middle).unwrap_or(0)
+            })
+            .collect();
+        let mut members: Vec<Vec<u32>> = vec![Vec::new(); regions.list.len()];
+        let mut bright = vec![0.0f64; regions.list.len()];
+        for (patch, &region) in region_of.iter().enumerate() {
+            members[region as usize].push(patch as u32);
+            let share = patches.list[patch].area / regions.list[region as usize].area;
+            bright[region as usize] += f64::from(radiosity[patch].max(0.0) * share);
+        }
+        let mut rows = Rows::default();
+        let mut exchange = vec![0.0f64; regions.list.len()];
+        for members in members {
+            let mut touched: Vec<u32> = Vec::new();
+            for (other, g) in members.iter().flat_map(|&member| factors.row(member as usize)) {
+                let region = region_of[other] as usize;
+                if exchange[region] == 0.0 && g > 0.0 {
+                    touched.push(region as u32);
+                }
+                exchange[region] += g;
+            }
+            touched.sort_unstable();
+            rows.push(touched.iter().map(|&region| {
+                let g = std::mem::take(&mut exchange[region as usize]);
+                (region, g * bright[region as usize])
+            }));
+        }
+        Self { regions, rows }
+    }
+
+    /// Whether the solution knows of light by bounces that arrives at a region.
+    pub fn knows(&self, region: u32) -> bool {
+        self.rows.knows(region)
+    }
+
+    /// Of those that light `region`, the one at `u` in [0, 1); the place within its interval, stretched to [0, 1); its probability.
+    pub fn pick(&self, region: u32, u: f32) -> Option<(u32, f32, f32)> {
+        self.rows.pick(region, u)
+    }
+
+    /// The probability that [`pick`](Self::pick) takes `other`.
+    pub fn probability(&self, region: u32, other: u32) -> f32 {
+        self.rows.probability(region, other)
+    }
+}
+
+/// Discrete distributions over the same numbers, sparse.
+#[derive(Clone, Debug, Default)]
+struct Rows {
+    /// Ends of the rows in the other two.
+    ends: Vec<usize>,
+    /// Ascending in each row.
+    columns: Vec<u32>,
+    /// Running sums of the probabilities of a row; the last is 1.
+    cumulative: Vec<f32>,
+}
+
+impl Rows {
+    /// A row of weights at ascending numbers; empty if none is positive and finite.
+    fn push(&mut self, weights: impl Iterator<Item = (u32, f64)>) {
+        let weights: Vec<(u32, f64)> =
+            weights.filter(|(_, weight)| weight.is_finite() && *weight > 0.0).collect();
+        let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
+        let mut running = 0.0;
+        for (place, (column, weight)) in weights.iter().enumerate() {
+            running += weight / sum;
+            self.columns.push(*column);
+            self.cumulative.push(if place + 1 == weights.len() { 1.0 } else { running as f32 });
+        }
+        self.ends.push(self.columns.len());
+    }
+
+    fn row(&self, row: u32) -> (&[u32], &[f32]) {
+        let start = if row == 0 { 0 } else { self.ends[row as usize - 1] };
+        let range = start..self.ends[row as usize];
+        (&self.columns[range.clone()], &self.cumulative[range])
+    }
+
+    fn knows(&self, row: u32) -> bool {
+        !self.row(row).0.is_empty()
+    }
+
+    fn pick(&self, row: u32, u: f32) -> Option<(u32, f32, f32)> {
+        let (columns, cumulative) = self.row(row);
+        let at = cumulative.partition_point(|&end| end <= u);
+        let column = *columns.get(at)?;
+        let start = if at == 0 { 0.0 } else { cumulative[at - 1] };
+        let probability = cumulative[at] - start;
+        (probability > 0.0)
+            .then(|| (column, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
+    }
+
+    fn probability(&self, row: u32, column: u32) -> f32 {
+        let (columns, cumulative) = self.row(row);
+        match columns.binary_search(&column) {
+            Ok(0) => cumulative[0],
+            Ok(at) => cumulative[at] - cumulative[at - 1],
+            Err(_) => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows() -> Rows {
+        let mut rows = Rows::default();
+        rows.push([(1, 2.0), (4, 6.0), (7, 0.0)].into_iter());
+        rows.push([(0, 0.0), (3, f64::NAN)].into_iter());
+        rows.push(std::iter::once((5, 1e-30)));
+        rows
+    }
+
+    #[test]
+    fn probabilities_are_in_proportion_to_the_weights() {
+        let rows = rows();
+        for (row, column, expected) in [(0, 1, 0.25), (0, 4, 0.75), (0, 7, 0.0), (0, 5, 0.0), (2, 5, 1.0)] {
+            assert_eq!(rows.probability(row, column), expected);
+        }
+        for (u, column, within, probability) in
+            [(0.125, 1, 0.5, 0.25), (0.25, 4, 0.0, 0.75), (0.625, 4, 0.5, 0.75)]
+        {
+            assert_eq!(rows.pick(0, u), Some((column, within, probability)));
+        }
+    }
+
+    #[test]
+    fn what_gets_no_light_is_not_guided() {
+        let rows = rows();
+        assert!(rows.knows(0) && !rows.knows(1));
+        assert_eq!(rows.pick(1, 0.5), None);
+    }
+}
