@@ -142,8 +142,10 @@ impl Outgoing<'_> {
     /// A point that a receiver's light by bounces comes from, with its weight: half of the samples, if the guide knows
     /// the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
     /// (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
-    fn sample(&self, receiver: &Receiver, guided: Option<u32>, u: f32, v: f32) -> Option<(Met, f32)> {
-        let Some(region) = guided else { return self.meet_about(receiver, u, v).map(|met| (met, 1.0)) };
+    fn sample(&self, receiver: &Receiver, region: Option<u32>, u: f32, v: f32) -> Option<(Met, f32)> {
+        let Some(region) = region.filter(|&region| self.guide.knows(region)) else {
+            return self.meet_about(receiver, u, v).map(|met| (met, 1.0));
+        };
         let (met, other, probability) = if u < GUIDED {
             let (other, u, probability) = self.guide.pick(region, u / GUIDED)?;
             (self.point_of(receiver, other, u, v)?, other, probability)
@@ -202,11 +204,11 @@ impl Outgoing<'_> {
         if distance < self.near {
             let [u, v, ..] = sequence.point(sample, 1);
             reading.rays += 1;
-            let Some(met) = self.bounce(&last, u, v) else {
+            let Some((met, chance)) = self.bounce(&last, u, v) else {
                 reading.light = light;
                 return reading;
             };
-            weight *= met.reflectance;
+            weight *= chance * met.reflectance;
             light += weight * met.direct;
             last = met;
         }
@@ -215,8 +217,8 @@ impl Outgoing<'_> {
         if checked {
             let [u, v, ..] = sequence.point(sample, 2);
             reading.rays += 1;
-            let real = self.bounce(&last, u, v).map_or(Vec3::ZERO, |met| {
-                met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
+            let real = self.bounce(&last, u, v).map_or(Vec3::ZERO, |(met, chance)| {
+                chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
             });
             reading.difference = weight * (indirect - real);
         }
@@ -237,12 +239,14 @@ impl Outgoing<'_> {
         (reflectance != Vec3::ZERO).then_some(met)
     }
 
-    /// What a surface's own light by bounces comes from: one sample.
-    fn bounce(&self, from: &Met, u: f32, v: f32) -> Option<Met> {
+    /// What a surface's own light by bounces comes from: one sample, with its weight.
+    fn bounce(&self, from: &Met, u: f32, v: f32) -> Option<(Met, f32)> {
         let surface = &self.scene.triangles[from.triangle as usize];
         let position = surface.position(from.at.0, from.at.1);
         let origin = self.scene.off_surface(from.triangle, from.side, position);
-        self.meet(origin, cosine_about(surface.side_normal(from.side), u, v))
+        let normal = surface.side_normal(from.side);
+        let receiver = Receiver { position, origin, geometric_normal: normal, normal };
+        self.sample(&receiver, self.guide.regions.at(from.triangle, from.side, from.at), u, v)
     }
 
     fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {

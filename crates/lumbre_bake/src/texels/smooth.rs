@@ -63,6 +63,7 @@ pub(crate) fn smooth(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -
     // Where smoothing brings more than it takes away, the texel keeps what it gathered.
     for (index, bias) in bias.iter_mut().enumerate() {
         let raw = noise[index] / 3.0;
+        *bias = (*bias - BIAS_NOISE * raw).max(0.0);
         if *bias + variance(&smoothed[index]).element_sum() / 3.0 > raw {
             (smoothed[index], *bias) = (estimates[index], 0.0);
         }
@@ -70,43 +71,61 @@ pub(crate) fn smooth(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -
     (smoothed, bias)
 }
 
-/// Texels around one over which the bias is averaged, and the part of their noise that is left in it by chance.
+/// Texels around one over which differences are averaged with their sign, and then without it.
+const BLOCK_RADIUS: i64 = 1;
 const BIAS_RADIUS: i64 = 3;
-const BIAS_NOISE: f32 = 0.2;
+/// Of the variance of what a texel gathered, the part that chance leaves in its squared bias: four times that variance for one scramble, a ninth
+/// of it in a block, of which the radius holds 49/9, twice for two halves: 4 / 9 / sqrt(2 * 49 / 9).
+const BIAS_NOISE: f32 = 0.135;
 
-/// The smoothed value of one half against the raw value of the other, which knows nothing of it: what their squared difference exceeds
-/// both variances by is the square of the bias.
+/// The smoothed value of one half against the raw values of the other, which know nothing of it: the product of its differences
+/// to two scrambles, each averaged over a block, has the square of the bias as its mean, and the smoothed value's own variance.
+/// (A single texel's squared difference says the same with ten times the noise.) May be negative, by chance.
 fn squared_bias(surroundings: &Surroundings<'_>, raw: &[Estimates], smoothed: &[Estimates]) -> Vec<f32> {
-    let grey_square = |v: Vec3| (v * v).element_sum() / 3.0;
-    // Mean of a half, and the variance of that mean.
-    let half_of = |estimates: &Estimates, half: usize| {
-        let [a, b] = [estimates[half * HALF], estimates[half * HALF + 1]];
-        (0.5 * (a + b), 0.25 * grey_square(a - b))
-    };
-    let own: Vec<(f32, f32)> = raw
+    let half = |estimates: &Estimates, half: usize| [estimates[half * HALF], estimates[half * HALF + 1]];
+    let differences: Vec<[[Vec3; HALF]; 2]> = raw
         .par_iter()
         .zip(smoothed)
         .map(|(raw, smoothed)| {
-            let excess = |half: usize| {
-                let (smoothed, smoothed_variance) = half_of(smoothed, half);
-                let (raw, raw_variance) = half_of(raw, 1 - half);
-                (grey_square(smoothed - raw) - smoothed_variance - raw_variance, raw_variance)
+            [0, 1].map(|side| {
+                let [a, b] = half(smoothed, side);
+                half(raw, 1 - side).map(|raw| 0.5 * (a + b) - raw)
+            })
+        })
+        .collect();
+    let of_blocks: Vec<f32> = surroundings
+        .texels
+        .par_iter()
+        .zip(smoothed)
+        .map(|(texel, smoothed)| {
+            let (mut sums, mut count) = ([[Vec3::ZERO; HALF]; 2], 0u32);
+            for (_, _, other) in surroundings.of(texel, BLOCK_RADIUS) {
+                for (sums, differences) in sums.iter_mut().zip(&differences[other]) {
+                    for (sum, difference) in sums.iter_mut().zip(differences) {
+                        *sum += *difference;
+                    }
+                }
+                count += 1;
+            }
+            let scale = 1.0 / (count.max(1) * count.max(1)) as f32;
+            let of_half = |side: usize| {
+                let [a, b] = half(smoothed, side);
+                let own = 0.25 * ((a - b) * (a - b)).element_sum();
+                (sums[side][0] * sums[side][1]).element_sum() * scale - own
             };
-            let [(a, noise_a), (b, noise_b)] = [excess(0), excess(1)];
-            (0.5 * (a + b), 0.5 * (noise_a + noise_b))
+            (of_half(0) + of_half(1)) / 6.0
         })
         .collect();
     surroundings
         .texels
         .par_iter()
         .map(|texel| {
-            let (mut excess, mut noise, mut count) = (0.0, 0.0, 0u32);
+            let (mut sum, mut count) = (0.0, 0u32);
             for (_, _, other) in surroundings.of(texel, BIAS_RADIUS) {
-                excess += own[other].0;
-                noise += own[other].1;
+                sum += of_blocks[other];
                 count += 1;
             }
-            ((excess - BIAS_NOISE * noise) / count.max(1) as f32).max(0.0)
+            sum / count.max(1) as f32
         })
         .collect()
 }
