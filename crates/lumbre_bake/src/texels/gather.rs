@@ -1,6 +1,6 @@
 //! The final gather: cosine rays from every texel read the light that leaves what they meet. Direct light there is that of
-//! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it, one
-//! real bounce more. Emission is not read: `direct` has counted it.
+//! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it,
+//! those of real bounces more. Emission is not read: `direct` has counted it.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -41,6 +41,9 @@ pub(crate) struct Outgoing<'a> {
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
 pub(crate) const CHECKED: u32 = 16;
+
+/// Most real bounces that one ray makes between surfaces too near for patches.
+const NEAR_BOUNCES: u32 = 6;
 
 /// What one ray of the gather found.
 #[derive(Default)]
@@ -89,6 +92,8 @@ pub(crate) struct Gathered {
     pub checks: u32,
     pub differences: Vec3,
     pub squared_differences: f32,
+    /// Sum over all samples of 1 / distance to what was met, canonical units.
+    pub inverse_distances: f32,
     /// Samples of each scramble.
     pub samples: u32,
     /// Rays cast.
@@ -99,6 +104,12 @@ impl Gathered {
     /// The estimate of each scramble.
     pub fn estimates(&self) -> [Vec3; SCRAMBLES] {
         self.sums.map(|sum| if self.samples > 0 { sum / self.samples as f32 } else { Vec3::ZERO })
+    }
+
+    /// Mean of 1 / distance to what light comes from: the irradiance changes over lengths of its inverse (Ward, Rubinstein and Clear,
+    /// "A Ray Tracing Solution for Diffuse Interreflection", 1988).
+    pub fn inverse_distance(&self) -> f32 {
+        self.inverse_distances / (self.samples.max(1) * SCRAMBLES as u32) as f32
     }
 
     /// What the patches' errors add to the mean of the scrambles.
@@ -127,6 +138,7 @@ impl Outgoing<'_> {
                 let turn =
                     (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
                 let checked = turn.is_multiple_of(CHECKED);
+                gathered.inverse_distances += met.1 / met.0.distance.max(f32::MIN_POSITIVE);
                 let found = self.read(met, sequence, sample, checked);
                 *sum += found.light;
                 gathered.rays += u64::from(found.rays);
@@ -198,11 +210,14 @@ impl Outgoing<'_> {
     /// The light that leaves a point that was met, emission apart, times a weight.
     fn read(&self, (met, weight): (Met, f32), sequence: TileSequence, sample: u32, checked: bool) -> Reading {
         let mut reading = Reading { checked, ..Reading::default() };
-        let distance = met.distance;
-        let reflectance = weight * met.reflectance;
-        let (mut light, mut weight, mut last) = (reflectance * met.direct, reflectance, met);
-        if distance < self.near {
-            let [u, v, ..] = sequence.point(sample, 1);
+        let mut weight = weight * met.reflectance;
+        let (mut light, mut last) = (weight * met.direct, met);
+        // In a gap narrower than patches there may be many.
+        for bounce in 0..NEAR_BOUNCES {
+            if last.distance >= self.near {
+                break;
+            }
+            let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
             let Some((met, chance)) = self.bounce(&last, u, v) else {
                 reading.light = light;
@@ -215,7 +230,7 @@ impl Outgoing<'_> {
         let indirect = self.patch_indirect[last.patch as usize];
         let grey = |color: Vec3| color.element_sum() / 3.0;
         if checked {
-            let [u, v, ..] = sequence.point(sample, 2);
+            let [u, v, ..] = sequence.point(sample, 1);
             reading.rays += 1;
             let real = self.bounce(&last, u, v).map_or(Vec3::ZERO, |(met, chance)| {
                 chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])

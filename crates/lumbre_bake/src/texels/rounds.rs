@@ -49,7 +49,10 @@ pub(crate) fn gather(
         }
         let raw: Vec<Estimates> = gathered.iter().map(Gathered::estimates).collect();
         let (estimates, smoothing_bias) = match options.denoise {
-            true => smooth(&surroundings, &raw),
+            true => {
+                let near: Vec<f32> = gathered.iter().map(Gathered::inverse_distance).collect();
+                smooth(&surroundings, &raw, &near)
+            }
             false => (raw.clone(), vec![0.0; texels.len()]),
         };
         let patch_bias = patch_bias(&surroundings, texels, &gathered, outgoing.patches.mean_reflectance());

@@ -13,23 +13,34 @@ pub(crate) type Estimates = [Vec3; SCRAMBLES];
 
 /// Reach of the smoothing in texels.
 const RADIUS: i64 = 4;
+/// Texels at which a neighbour weighs e⁻¹; and where things are near, the share of their harmonic mean distance, inverted.
+const WIDTH: f64 = 3.0;
+const NEAR: f64 = 2.0;
 
 /// The estimates of every covered texel, smoothed, and the squared bias that the smoothing may have brought, mean of the channels.
-pub(crate) fn smooth(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> (Vec<Estimates>, Vec<f32>) {
+/// `inverse_distances` tells how near to each texel the things are that it gathered from.
+pub(crate) fn smooth(
+    surroundings: &Surroundings<'_>,
+    estimates: &[Estimates],
+    inverse_distances: &[f32],
+) -> (Vec<Estimates>, Vec<f32>) {
     let texels = surroundings.texels;
     // A single texel's spread of four is itself noise: the neighbourhood's mean is not.
     let variances: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum()).collect();
-    let noise: Vec<f32> = texels
+    let (noise, nearness): (Vec<f32>, Vec<f64>) = texels
         .par_iter()
         .map(|texel| {
-            let (mut sum, mut count) = (0.0, 0u32);
+            let (mut sum, mut near, mut count) = (0.0, 0.0, 0u32);
             for (_, _, other) in surroundings.of(texel, NOISE_RADIUS) {
                 sum += variances[other];
+                near += inverse_distances[other];
                 count += 1;
             }
-            sum / count.max(1) as f32
+            let (noise, near) = (sum / count.max(1) as f32, near / count.max(1) as f32);
+            let steps = NEAR * f64::from(near * surroundings.texel_side(texel));
+            (noise, WIDTH.powi(-2) + if steps.is_finite() { steps * steps } else { 0.0 })
         })
-        .collect();
+        .unzip();
     // Each half's weights come from the other half: noise that shaped the weights would pull the mean towards what is
     // most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
     let guides: Vec<[Vec3; 2]> =
@@ -43,7 +54,7 @@ pub(crate) fn smooth(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -
             }
             let mut planes = [Plane::default(), Plane::default()];
             for (dx, dy, other) in surroundings.of(texel, RADIUS) {
-                let nearness = (dx * dx + dy * dy) / 9.0;
+                let nearness = (dx * dx + dy * dy) * nearness[index];
                 let expected =
                     (GUIDE_SIGMAS * GUIDE_NOISE * (noise[index] + noise[other])).max(f32::MIN_POSITIVE);
                 for (half, plane) in planes.iter_mut().enumerate() {
@@ -174,6 +185,13 @@ impl<'a> Surroundings<'a> {
             place[texel.index as usize] = index as u32;
         }
         Self { scene, layout, texels, charts, place }
+    }
+
+    /// Length of a texel's side on its surface, canonical units.
+    fn texel_side(&self, texel: &Texel) -> f32 {
+        let triangle = &self.scene.triangles[texel.triangle as usize];
+        let [a, b, c] = triangle.uv;
+        (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
     }
 
     /// Texels of the same chart and about the same normal, with their offsets.

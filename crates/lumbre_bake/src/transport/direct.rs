@@ -72,41 +72,54 @@ pub(crate) struct Sources<'a> {
 
 /// Interleaved groups of samples whose spread tells the error of their mean. Points of a low-discrepancy sequence are spread better
 /// together than apart, so that the true error is smaller.
-const GROUPS: usize = EXACT_POINTS;
+const GROUPS: usize = 4;
 
-/// Exact unoccluded light at some points of a receiver.
-#[derive(Default)]
+/// Exact unoccluded light at evenly spread points of a receiver, in pairs about its middle, so that what is left is of second order
+/// in its size.
 struct Unoccluded {
     sum: Vec3,
-    grey: [f32; EXACT_POINTS],
-    count: u32,
+    least: f32,
+    most: f32,
 }
 
+/// Points of a receiver at which it is, in the unit square: the first four where the light hardly changes, and sixteen more where it does.
+/// Each coordinate takes every value once, and neither has to do with the other: a list of points, too, is read evenly.
+const FEW: [u32; 4] = [1, 3, 0, 2];
+const MANY: [u32; 16] = [5, 3, 15, 11, 7, 1, 13, 9, 6, 2, 14, 8, 4, 0, 12, 10];
+
+/// Light that differs by this part of its mean over the first points calls for more: at a lamp's edge it changes within a texel.
+const UNEVEN: f32 = 0.05;
+
 impl Unoccluded {
-    fn wants_more(&self) -> bool {
-        if (self.count as usize) < EXACT_POINTS {
-            return true;
+    fn at<const N: usize>(points: [u32; N], light: impl Fn(f32, f32) -> Option<Vec3>) -> (Self, f32) {
+        let mut found = Self { sum: Vec3::ZERO, least: f32::INFINITY, most: 0.0 };
+        let mut count = 0.0;
+        for (x, y) in points.into_iter().enumerate() {
+            let middle = |place: u32| (place as f32 + 0.5) / N as f32;
+            let Some(light) = light(middle(x as u32), middle(y)) else { continue };
+            let grey = light.element_sum() / 3.0;
+            found = Self { sum: found.sum + light, least: found.least.min(grey), most: found.most.max(grey) };
+            count += 1.0;
         }
-        let mean = self.grey.iter().sum::<f32>() / self.count as f32;
-        // Sums of so many points: what one of them is apart from the mean.
-        let apart =
-            |sum: &f32| (sum / (self.count as f32 / EXACT_POINTS as f32) - mean).abs() > UNEVEN * mean;
-        self.grey.iter().any(apart)
+        (found, count)
     }
 
-    fn add(&mut self, light: Vec3) {
-        self.grey[self.count as usize % EXACT_POINTS] += light.element_sum() / 3.0;
-        self.sum += light;
-        self.count += 1;
-    }
-
-    /// The mean, and its variance.
-    fn mean(&self) -> (Vec3, f32) {
-        let count = self.count.max(1) as f32;
-        let per_point = EXACT_POINTS as f32 / count;
-        // Of n stratified points of a smooth function each stands for an nth of the spread.
-        let stratified = (STRATA_DOUBT / count).min(1.0);
-        (self.sum / count, stratified * variance_of_mean(self.grey.map(|sum| sum * per_point)))
+    /// The mean over a receiver, and its squared error: what differs by d of the mean within it leaves d² at second order, and a
+    /// sixteenth of that for points four times as dense.
+    fn mean(light: impl Fn(f32, f32) -> Option<Vec3>) -> (Vec3, f32) {
+        let (mut found, mut count) = Self::at(FEW, &light);
+        let mut dense = 1.0;
+        if found.most - found.least > UNEVEN * found.most {
+            (found, count) = Self::at(MANY, &light);
+            dense = 16.0;
+        }
+        if count == 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let mean = found.sum / count;
+        let grey = mean.element_sum() / 3.0;
+        let apart = if grey > 0.0 { (found.most - found.least) / grey } else { 0.0 };
+        (mean, (grey * 0.25 * apart.min(1.0).powi(2) / dense).powi(2))
     }
 }
 
@@ -118,13 +131,6 @@ fn variance_of_mean(groups: [f32; GROUPS]) -> f32 {
 
 /// Up to this many emitters, the unoccluded light of all is summed exactly at each point.
 const EXACT_EMITTERS: usize = 48;
-
-/// Points of a receiver at which it is: stratified, so that what is left is of second order in the receiver's size. More where they
-/// differ by this part of their mean: at a lamp's edge the light changes within a texel.
-const EXACT_POINTS: usize = 4;
-const UNEVEN: f32 = 0.05;
-/// How much more of the points' spread may be left than even strata would leave.
-const STRATA_DOUBT: f32 = 2.0;
 
 impl<'a> Sources<'a> {
     pub fn new(scene: &'a BakeScene, lights: Vec<PlacedLight>) -> Self {
@@ -172,16 +178,12 @@ impl<'a> Sources<'a> {
         let Some(choice) = Choice::new(&self.emitters, &anchor) else { return Vec3::ZERO };
         let exact = self.emitters.len() <= EXACT_EMITTERS;
         let (mut all, mut seen) = (Vec3::ZERO, Vec3::ZERO);
-        let mut unoccluded = Unoccluded::default();
         let (mut visible, mut hidden) = (0u32, 0u32);
         let (mut group_all, mut group_seen) = ([0.0f32; GROUPS], [0.0f32; GROUPS]);
         for sample in 0..samples {
             let group = sample as usize % GROUPS;
             let [x, y, u, v] = sequence.point(sample, 0);
             let Some(receiver) = point(x, y) else { continue };
-            if exact && unoccluded.wants_more() {
-                unoccluded.add(self.unoccluded(&receiver));
-            }
             let (chosen, u, probability) = choice.pick(u);
             let emitter = &self.emitters[chosen];
             let (a, b) = triangle_point(u, v);
@@ -212,10 +214,13 @@ impl<'a> Sources<'a> {
             }
         }
         direct.seen.add(visible, hidden);
-        if exact {
+        if exact && visible == 0 {
+            Vec3::ZERO
+        } else if exact {
             let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
             let share = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
-            let (unoccluded, uneven) = unoccluded.mean();
+            let (unoccluded, uneven) =
+                Unoccluded::mean(|x, y| point(x, y).map(|point| self.unoccluded(&point)));
             let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
                 true => group_seen[at] / group_all[at],
                 false => share.element_sum() / 3.0,
