@@ -39,7 +39,9 @@ pub(crate) fn direct_light(
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let grey = |direct: &Direct| f64::from(direct.baked.element_sum()) / 3.0;
     let mean = direct.iter().map(grey).sum::<f64>() / open;
-    let limit = (OWN_SHARE * options.error * mean).powi(2);
+    let asked = (options.error * mean).powi(2);
+    let share = direct.iter().filter(|direct| f64::from(direct.variance) > asked).count() as f64 / open;
+    let limit = asked * (OWN_SHARE / share.max(f64::MIN_POSITIVE)).clamp(1.0, MOST_OF_ONE);
     let mut samples = many;
     while samples < most {
         samples = (samples * 4).min(most);
@@ -54,8 +56,10 @@ pub(crate) fn direct_light(
     Ok(direct)
 }
 
-/// Of the error asked for, what direct light may have for itself at a texel.
-const OWN_SHARE: f64 = 1.0;
+/// Of the squared error asked for, what direct light may have for itself, over all texels; and a single one of those that a penumbra
+/// crosses, which are few.
+const OWN_SHARE: f64 = 0.2;
+const MOST_OF_ONE: f64 = 9.0;
 
 fn replace(direct: &mut [Direct], at: &[u32], better: Vec<Direct>) {
     for (&index, better) in at.iter().zip(better) {
