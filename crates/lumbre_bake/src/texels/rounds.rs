@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::error_estimate::{GatherErrors, PatchBias, patch_bias, variances};
+use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
 use super::in_chunks;
@@ -56,9 +56,11 @@ pub(crate) fn gather(
             false => (raw.clone(), vec![0.0; texels.len()]),
         };
         let patch_bias = patch_bias(&surroundings, texels, &gathered, outgoing.patches.mean_reflectance());
+        let spread = spread(&surroundings, texels, &estimates);
         let errors = GatherErrors {
             gathered: &gathered,
             estimates: &estimates,
+            spread: &spread,
             smoothing_bias: &smoothing_bias,
             patch_bias: &patch_bias,
             residual_bound: report.residual_bound,
@@ -82,7 +84,7 @@ pub(crate) fn gather(
                 wanted.len(),
                 report.estimated_error * 100.0,
                 share(&mut direct.iter().map(|d| d.variance)),
-                share(&mut estimates.iter().map(|e| super::smooth::variance(e).element_sum() / 3.0)),
+                share(&mut spread.iter().copied()),
                 share(&mut smoothing_bias.iter().copied()),
                 share(&mut gathered.iter().map(|g| g.patch_error().powi(2))),
                 share(&mut patch_bias.iter().map(|p| p.rest))
