@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use glam::Vec3;
 
 use crate::Ray;
+use crate::visit_order::octant;
 
 /// Units in the last place by which the box test is widened, times the ray's reach into the scene.
 ///
@@ -32,6 +33,8 @@ pub(crate) struct RaySetup {
     pub axis: [usize; 3],
     /// Shear of x and y, scale of z.
     pub shear: [f32; 3],
+    /// Bit per axis: the direction is negative.
+    pub octant: u32,
     /// Index (0 = minimum, 1 = maximum) of the plane entered first, per axis.
     pub near_side: [usize; 3],
     pub near_origin: [f32; 3],
@@ -44,6 +47,7 @@ pub(crate) struct RaySetup {
 
 impl RaySetup {
     /// `None` where the ray can hit nothing. `bounds` are the scene's, canonical.
+    #[inline(always)]
     pub fn new(ray: &Ray, to_canonical: f32, bounds: &[Vec3; 2]) -> Option<Self> {
         let origin = ray.origin * to_canonical;
         let direction = ray.direction.to_array();
@@ -79,31 +83,24 @@ impl RaySetup {
             (_, true) => (1, 0),
         };
         let shear = [direction[x] * reciprocal_z, direction[y] * reciprocal_z, reciprocal_z];
-        let reach = (origin - bounds[0]).abs().max((origin - bounds[1]).abs()).to_array();
-        let origin = origin.to_array();
-        let mut setup = Self {
-            origin,
+        let reach = (origin - bounds[0]).abs().max((origin - bounds[1]).abs());
+        let error = SHEAR_ERROR * (reach + reach[z]);
+        let towards = error.copysign(ray.direction);
+        let largest_reciprocal = reciprocal_z.abs() * LARGEST_RATIO;
+        let reciprocal = size.recip().min(Vec3::splat(largest_reciprocal)).copysign(ray.direction);
+        let octant = octant(ray.direction);
+        Some(Self {
+            origin: origin.to_array(),
             axis: [x, y, z],
             shear,
-            near_side: [0; 3],
-            near_origin: origin,
-            far_origin: origin,
-            near_reciprocal: [0.0; 3],
-            far_reciprocal: [0.0; 3],
+            octant,
+            near_side: [0, 1, 2].map(|axis| (octant >> axis & 1) as usize),
+            near_origin: (origin + towards).to_array(),
+            far_origin: (origin - towards).to_array(),
+            near_reciprocal: (reciprocal * (1.0 - SLAB_ERROR)).to_array(),
+            far_reciprocal: (reciprocal * (1.0 + SLAB_ERROR)).to_array(),
             t_min,
             t_max: t_max.min(f32::MAX),
-        };
-        let largest_reciprocal = reciprocal_z.abs() * LARGEST_RATIO;
-        for i in 0..3 {
-            let size = (1.0 / direction[i].abs()).min(largest_reciprocal);
-            let error = SHEAR_ERROR * (reach[i] + reach[z]);
-            let (sign, side) = if direction[i].is_sign_negative() { (-1.0, 1) } else { (1.0, 0) };
-            setup.near_side[i] = side;
-            setup.near_origin[i] = origin[i] + sign * error;
-            setup.far_origin[i] = origin[i] - sign * error;
-            setup.near_reciprocal[i] = sign * size * (1.0 - SLAB_ERROR);
-            setup.far_reciprocal[i] = sign * size * (1.0 + SLAB_ERROR);
-        }
-        Some(setup)
+        })
     }
 }
