@@ -12,7 +12,7 @@ use crate::triangle_block::TriangleBlock;
 use crate::wide_node::ChildRef;
 
 /// Cost of a visit to a node, in tests of a block; measured (`cargo bench -p lumbre_rays --bench ratios`).
-const NODE_COST: f32 = 1.0;
+const NODE_COST: f32 = 0.5;
 
 /// The cheapest ways to let a binary subtree become wide children.
 #[derive(Clone, Copy, Default)]

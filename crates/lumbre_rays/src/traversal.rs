@@ -84,8 +84,7 @@ impl WideTree {
             &mut long[..]
         };
         let ray = NodeRay::new(simd, setup);
-        // Any-hit rays take the lanes as they come.
-        let octant = if ANY { 0 } else { setup.octant };
+        let octant = setup.octant;
         let mut search = Search {
             ray: BlockRay::new(simd, setup),
             blocks: &self.blocks,
@@ -116,10 +115,10 @@ impl WideTree {
             }
             if ANY {
                 // Blocks before nodes: whichever stops the ray ends the search.
-                let mut blocks = lanes & node.blocks;
-                lanes &= !node.blocks;
+                let mut blocks = lanes & visits(node.blocks, octant);
+                lanes &= !blocks;
                 while blocks != 0 {
-                    let lane = blocks.trailing_zeros();
+                    let lane = blocks.trailing_zeros() ^ octant;
                     blocks &= blocks - 1;
                     if search.test(node.children[lane as usize & 7].as_block().unwrap_or(usize::MAX)) {
                         return search.best;
