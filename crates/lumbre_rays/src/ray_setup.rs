@@ -14,10 +14,6 @@ use crate::visit_order::octant;
 /// the rounding of the widening itself.
 const SHEAR_ERROR: f32 = 8.0 / (1 << 24) as f32;
 
-/// Relative widening of the reciprocals: two roundings in the reciprocal and the product, one in the difference
-/// (Ize 2013: 2 gamma(3)).
-const SLAB_ERROR: f32 = 4.0 / (1 << 23) as f32;
-
 /// The dominant axis and a component are this far apart at most; a smaller component moves the ray across the
 /// whole scene by less than `SHEAR_ERROR` and would make 1/0.
 const LARGEST_RATIO: f32 = (1u64 << 26) as f32;
@@ -39,8 +35,7 @@ pub(crate) struct RaySetup {
     pub near_side: [usize; 3],
     pub near_origin: [f32; 3],
     pub far_origin: [f32; 3],
-    pub near_reciprocal: [f32; 3],
-    pub far_reciprocal: [f32; 3],
+    pub reciprocal: [f32; 3],
     pub t_min: f32,
     pub t_max: f32,
 }
@@ -97,8 +92,7 @@ impl RaySetup {
             near_side: [0, 1, 2].map(|axis| (octant >> axis & 1) as usize),
             near_origin: (origin + towards).to_array(),
             far_origin: (origin - towards).to_array(),
-            near_reciprocal: (reciprocal * (1.0 - SLAB_ERROR)).to_array(),
-            far_reciprocal: (reciprocal * (1.0 + SLAB_ERROR)).to_array(),
+            reciprocal: reciprocal.to_array(),
             t_min,
             t_max: t_max.min(f32::MAX),
         })
