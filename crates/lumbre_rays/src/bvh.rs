@@ -1,5 +1,6 @@
 //! The bounding volume hierarchy and its questions: the closest hit, any hit. Not the tree's layout (`build`).
 
+use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec3;
 
 use crate::build::WideTree;
@@ -17,6 +18,8 @@ pub struct Bvh {
     /// Canonical corners of the box around all triangles.
     bounds: [Vec3; 2],
     skipped: Vec<u32>,
+    /// The instructions this machine has; every level computes the same bits.
+    level: Level,
 }
 
 impl Bvh {
@@ -49,7 +52,7 @@ impl Bvh {
         if kept.is_empty() {
             bounds = [Vec3::ZERO; 2];
         }
-        Self { tree: WideTree::build(&kept), scale, bounds, skipped }
+        Self { tree: WideTree::build(&kept), scale, bounds, skipped, level: Level::new() }
     }
 
     /// Indices of the triangles that were left out, ascending.
@@ -86,8 +89,25 @@ impl Bvh {
 
     #[inline]
     fn trace<const ANY: bool>(&self, ray: &Ray, accept: impl Fn(u32, f32, f32) -> bool) -> Option<Hit> {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        if let Some(simd) = self.level.as_avx2() {
+            return simd.vectorize(
+                #[inline(always)]
+                || self.trace_with::<ANY, _>(simd, ray, accept),
+            );
+        }
+        dispatch!(Level::baseline(), simd => self.trace_with::<ANY, _>(simd, ray, accept))
+    }
+
+    #[inline(always)]
+    fn trace_with<const ANY: bool, S: Simd>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        accept: impl Fn(u32, f32, f32) -> bool,
+    ) -> Option<Hit> {
         let setup = RaySetup::new(ray, self.scale.to_canonical, &self.bounds)?;
-        let hit = self.tree.trace::<ANY, _>(&setup, accept)?;
+        let hit = self.tree.trace::<ANY, _, _>(simd, &setup, accept)?;
         Some(Hit { distance: hit.distance * self.scale.to_world, ..hit })
     }
 }

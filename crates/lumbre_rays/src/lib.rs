@@ -30,12 +30,14 @@
 mod build;
 mod bvh;
 mod canonical_scale;
+mod collapse;
 mod median_split;
 mod ray;
 mod ray_offset;
 mod ray_setup;
 mod traversal;
 mod triangle_block;
+mod visit_order;
 mod wide_node;
 
 pub use bvh::Bvh;

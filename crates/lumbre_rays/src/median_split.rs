@@ -1,4 +1,4 @@
-//! Builds the four-wide hierarchy by splitting at the median: balanced whatever the triangles are, in n log^2 n.
+//! Builds the eight-wide hierarchy by splitting at the median: balanced whatever the triangles are, in n log^2 n.
 //! Not the usual builder: piles of equal boxes, on which PLOC takes quadratic time, come here (see `build`).
 
 use std::ops::Range;
@@ -7,49 +7,35 @@ use glam::Vec3;
 
 use crate::build::WideTree;
 use crate::triangle_block::TriangleBlock;
-use crate::wide_node::{ChildRef, WideNode};
+use crate::wide_node::ChildRef;
 
-/// Fills an empty tree from more than four (index, canonical triangle) pairs, or fewer.
+/// Fills an empty tree from (index, canonical triangle) pairs.
 pub(crate) fn build_balanced(tree: &mut WideTree, triangles: &[(u32, [Vec3; 3])]) {
     let mut sorted = triangles.to_vec();
-    if sorted.len() <= 4 {
-        tree.root = block(tree, &sorted);
-        return;
-    }
-    tree.root = ChildRef::node(0);
-    tree.nodes.push(WideNode::new(&[]));
-    let mut deepest = 0;
+    let root = tree.reserve_node();
     // (triangles, their wide node, depth)
-    let mut pending = vec![(0..sorted.len(), 0usize, 1usize)];
-    while let Some((range, wide_index, depth)) = pending.pop() {
-        deepest = deepest.max(depth);
-        let mut lanes = Vec::with_capacity(4);
-        for half in halves(&mut sorted, range) {
-            for quarter in halves(&mut sorted, half) {
-                let members = &sorted[quarter.clone()];
-                if members.is_empty() {
-                    continue;
-                }
-                let bounds = bounds(members.iter().flat_map(|(_, triangle)| triangle.iter().copied()));
-                let reference = if members.len() <= 4 {
-                    block(tree, members)
-                } else {
-                    tree.nodes.push(WideNode::new(&[]));
-                    let index = tree.nodes.len() - 1;
-                    pending.push((quarter, index, depth + 1));
-                    ChildRef::node(index)
-                };
-                lanes.push((bounds, reference));
-            }
+    let mut pending = vec![(0..sorted.len(), root, 1usize)];
+    while let Some((range, wide, depth)) = pending.pop() {
+        tree.depth = tree.depth.max(depth);
+        let mut parts = vec![range];
+        for _ in 0..3 {
+            parts = parts.into_iter().flat_map(|part| halves(&mut sorted, part)).collect();
         }
-        tree.nodes[wide_index] = WideNode::new(&lanes);
+        let mut children = Vec::with_capacity(8);
+        for part in parts.into_iter().filter(|part| !part.is_empty()) {
+            let members = &sorted[part.clone()];
+            let bounds = bounds(members.iter().flat_map(|(_, triangle)| triangle.iter().copied()));
+            let reference = if members.len() <= TriangleBlock::SIZE {
+                tree.add_block(members)
+            } else {
+                let wide = tree.reserve_node();
+                pending.push((part, wide, depth + 1));
+                ChildRef::node(wide)
+            };
+            children.push((bounds, reference));
+        }
+        tree.fill_node(wide, &children);
     }
-    tree.stack_size = 3 * deepest + 1;
-}
-
-fn block(tree: &mut WideTree, members: &[(u32, [Vec3; 3])]) -> ChildRef {
-    tree.blocks.push(TriangleBlock::new(members));
-    ChildRef::block(tree.blocks.len() - 1)
 }
 
 /// Sorts a range along the axis on which its centres lie farthest apart, and cuts it in the middle.

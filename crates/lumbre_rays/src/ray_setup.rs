@@ -6,16 +6,13 @@ use std::ops::RangeInclusive;
 use glam::Vec3;
 
 use crate::Ray;
+use crate::visit_order::octant;
 
 /// Units in the last place by which the box test is widened, times the ray's reach into the scene.
 ///
 /// Woop, Benthin, Wald 2013, section 4, bound the error of the sheared vertices by 5 * 2^-24; 8 leaves room for
 /// the rounding of the widening itself.
 const SHEAR_ERROR: f32 = 8.0 / (1 << 24) as f32;
-
-/// Relative widening of the reciprocals: two roundings in the reciprocal and the product, one in the difference
-/// (Ize 2013: 2 gamma(3)).
-const SLAB_ERROR: f32 = 4.0 / (1 << 23) as f32;
 
 /// The dominant axis and a component are this far apart at most; a smaller component moves the ray across the
 /// whole scene by less than `SHEAR_ERROR` and would make 1/0.
@@ -32,18 +29,20 @@ pub(crate) struct RaySetup {
     pub axis: [usize; 3],
     /// Shear of x and y, scale of z.
     pub shear: [f32; 3],
+    /// Bit per axis: the direction is negative.
+    pub octant: u32,
     /// Index (0 = minimum, 1 = maximum) of the plane entered first, per axis.
     pub near_side: [usize; 3],
     pub near_origin: [f32; 3],
     pub far_origin: [f32; 3],
-    pub near_reciprocal: [f32; 3],
-    pub far_reciprocal: [f32; 3],
+    pub reciprocal: [f32; 3],
     pub t_min: f32,
     pub t_max: f32,
 }
 
 impl RaySetup {
     /// `None` where the ray can hit nothing. `bounds` are the scene's, canonical.
+    #[inline(always)]
     pub fn new(ray: &Ray, to_canonical: f32, bounds: &[Vec3; 2]) -> Option<Self> {
         let origin = ray.origin * to_canonical;
         let direction = ray.direction.to_array();
@@ -79,31 +78,23 @@ impl RaySetup {
             (_, true) => (1, 0),
         };
         let shear = [direction[x] * reciprocal_z, direction[y] * reciprocal_z, reciprocal_z];
-        let reach = (origin - bounds[0]).abs().max((origin - bounds[1]).abs()).to_array();
-        let origin = origin.to_array();
-        let mut setup = Self {
-            origin,
+        let reach = (origin - bounds[0]).abs().max((origin - bounds[1]).abs());
+        let error = SHEAR_ERROR * (reach + reach[z]);
+        let towards = error.copysign(ray.direction);
+        let largest_reciprocal = reciprocal_z.abs() * LARGEST_RATIO;
+        let reciprocal = size.recip().min(Vec3::splat(largest_reciprocal)).copysign(ray.direction);
+        let octant = octant(ray.direction);
+        Some(Self {
+            origin: origin.to_array(),
             axis: [x, y, z],
             shear,
-            near_side: [0; 3],
-            near_origin: origin,
-            far_origin: origin,
-            near_reciprocal: [0.0; 3],
-            far_reciprocal: [0.0; 3],
+            octant,
+            near_side: [0, 1, 2].map(|axis| (octant >> axis & 1) as usize),
+            near_origin: (origin + towards).to_array(),
+            far_origin: (origin - towards).to_array(),
+            reciprocal: reciprocal.to_array(),
             t_min,
             t_max: t_max.min(f32::MAX),
-        };
-        let largest_reciprocal = reciprocal_z.abs() * LARGEST_RATIO;
-        for i in 0..3 {
-            let size = (1.0 / direction[i].abs()).min(largest_reciprocal);
-            let error = SHEAR_ERROR * (reach[i] + reach[z]);
-            let (sign, side) = if direction[i].is_sign_negative() { (-1.0, 1) } else { (1.0, 0) };
-            setup.near_side[i] = side;
-            setup.near_origin[i] = origin[i] + sign * error;
-            setup.far_origin[i] = origin[i] - sign * error;
-            setup.near_reciprocal[i] = sign * size * (1.0 - SLAB_ERROR);
-            setup.far_reciprocal[i] = sign * size * (1.0 + SLAB_ERROR);
-        }
-        Some(setup)
+        })
     }
 }

@@ -1,26 +1,46 @@
-//! Walks the four-wide tree with a ray, nearest children first. Not the geometry tests it calls.
+//! Walks the eight-wide tree with a ray. Not the geometry tests it calls, nor the order of a node's children.
+
+use fearless_simd::Simd;
 
 use crate::Hit;
 use crate::build::WideTree;
 use crate::ray_setup::RaySetup;
-use crate::triangle_block::{BlockHits, BlockRay, TriangleBlock};
-use crate::wide_node::{ChildRef, NodeRay, WideNode};
+use crate::triangle_block::{BlockRay, TriangleBlock};
+use crate::visit_order::visits;
+use crate::wide_node::NodeRay;
+
+/// Levels whose stack needs no allocation.
+const SHORT: usize = 16;
+
+/// Children of a node that wait for their visit.
+#[derive(Clone, Copy, Default)]
+struct Waiting {
+    node: u32,
+    /// In the order of `visits`.
+    lanes: u32,
+    /// Up to which distance they were found.
+    t_max: f32,
+}
 
 /// Where the traversal stands with its search.
-struct Search<F> {
+struct Search<'a, S: Simd, F> {
+    ray: BlockRay<S>,
+    blocks: &'a [TriangleBlock],
     any: bool,
     filter: F,
     t_max: f32,
     best: Option<Hit>,
 }
 
-impl<F: Fn(u32, f32, f32) -> bool> Search<F> {
-    /// Takes the hits of a block; true ends the traversal.
+impl<S: Simd, F: Fn(u32, f32, f32) -> bool> Search<'_, S, F> {
+    /// Tests a block and takes its hits; true ends the traversal.
     #[inline(always)]
-    fn take(&mut self, block: &TriangleBlock, hits: &BlockHits) -> bool {
+    fn test(&mut self, block: usize) -> bool {
+        let Some(block) = self.blocks.get(block) else { return false };
+        let Some(hits) = block.intersect(&self.ray, self.t_max) else { return false };
         let mut lanes = hits.lanes;
         while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & 3;
+            let lane = lanes.trailing_zeros() as usize & 7;
             lanes &= lanes - 1;
             let (triangle, distance) = (block.ids[lane], hits.distance[lane]);
             // Of two triangles at the same distance the first in the list wins, whatever the shape of the tree.
@@ -47,119 +67,90 @@ impl<F: Fn(u32, f32, f32) -> bool> Search<F> {
 
 impl WideTree {
     /// The closest hit, or with `ANY` one of them; distances in canonical units.
-    #[inline]
-    pub fn trace<const ANY: bool, F: Fn(u32, f32, f32) -> bool>(
-        &self,
-        setup: &RaySetup,
-        filter: F,
-    ) -> Option<Hit> {
-        match self.stack_size {
-            0..=40 => self.trace_with_stack::<ANY, F>(setup, filter, &mut [0; 40]),
-            41..=112 => self.trace_with_stack::<ANY, F>(setup, filter, &mut [0; 112]),
-            size => self.trace_with_stack::<ANY, F>(setup, filter, &mut vec![0; size]),
-        }
-    }
-
     #[inline(always)]
-    fn trace_with_stack<const ANY: bool, F: Fn(u32, f32, f32) -> bool>(
+    pub fn trace<const ANY: bool, S: Simd, F: Fn(u32, f32, f32) -> bool>(
         &self,
+        simd: S,
         setup: &RaySetup,
         filter: F,
-        stack: &mut [u64],
     ) -> Option<Hit> {
-        let node_ray = NodeRay::new(setup);
-        let block_ray = BlockRay::new(setup);
-        let mut search = Search { any: ANY, filter, t_max: setup.t_max, best: None };
-        let mut waiting = 0;
-        let mut current = self.root;
+        // Few trees are deeper than the array; a tree of a pile of slivers may be.
+        let (mut short, mut long);
+        let stack = if self.depth <= SHORT {
+            short = [Waiting::default(); SHORT];
+            &mut short[..]
+        } else {
+            long = vec![Waiting::default(); self.depth];
+            &mut long[..]
+        };
+        let ray = NodeRay::new(simd, setup);
+        let octant = setup.octant;
+        let mut search = Search {
+            ray: BlockRay::new(simd, setup),
+            blocks: &self.blocks,
+            any: ANY,
+            filter,
+            t_max: setup.t_max,
+            best: None,
+        };
+        let mut depth = 0;
+        let mut index = 0;
+        let mut node = self.nodes.first()?;
+        let mut lanes = visits(node.intersect(&ray, search.t_max).0, octant);
         loop {
-            if let Some(index) = current.as_block() {
-                // `ChildRef::NONE`, the root of an empty tree, is a block that does not exist.
-                let Some(block) = self.blocks.get(index) else { break };
-                let hits = block.intersect(&block_ray, search.t_max);
-                if hits.lanes != 0 && search.take(block, &hits) {
-                    break;
+            if lanes == 0 {
+                // Children that wait, but those behind what was hit since.
+                if depth == 0 {
+                    return search.best;
                 }
-            } else {
-                let Some(node) = self.nodes.get(current.0 as usize) else { break };
-                if let Some(next) = descend::<ANY>(node, &node_ray, search.t_max, stack, &mut waiting) {
-                    current = next;
+                depth -= 1;
+                let waiting = stack.get(depth).copied().unwrap_or_default();
+                index = waiting.node;
+                node = self.nodes.get(index as usize)?;
+                lanes = waiting.lanes;
+                if !ANY && waiting.t_max != search.t_max {
+                    lanes &= visits(node.intersect(&ray, search.t_max).0, octant);
+                }
+                continue;
+            }
+            if ANY {
+                // Blocks before nodes: whichever stops the ray ends the search.
+                let mut blocks = lanes & visits(node.blocks, octant);
+                lanes &= !blocks;
+                while blocks != 0 {
+                    let lane = blocks.trailing_zeros() ^ octant;
+                    blocks &= blocks - 1;
+                    if search.test(node.children[lane as usize & 7].as_block().unwrap_or(usize::MAX)) {
+                        return search.best;
+                    }
+                }
+                if lanes == 0 {
                     continue;
                 }
             }
-            // The next child that starts before the closest hit so far.
-            loop {
-                if waiting == 0 {
+            let lane = lanes.trailing_zeros() ^ octant;
+            lanes &= lanes - 1;
+            let child = node.children[lane as usize & 7];
+            if let Some(block) = child.as_block() {
+                let before = search.t_max;
+                if search.test(block) {
                     return search.best;
                 }
-                waiting -= 1;
-                let entry = stack.get(waiting).copied().unwrap_or_default();
-                if f32::from_bits((entry >> 32) as u32) <= search.t_max {
-                    current = ChildRef(entry as u32);
-                    break;
+                if !ANY && lanes != 0 && search.t_max != before {
+                    lanes &= visits(node.intersect(&ray, search.t_max).0, octant);
                 }
+            } else {
+                if lanes != 0 {
+                    // At most one entry per level waits, so there always is a slot.
+                    if let Some(slot) = stack.get_mut(depth) {
+                        *slot = Waiting { node: index, lanes, t_max: search.t_max };
+                        depth += 1;
+                    }
+                }
+                index = child.0;
+                node = self.nodes.get(index as usize)?;
+                lanes = visits(node.intersect(&ray, search.t_max).0, octant);
             }
         }
-        search.best
     }
-}
-
-/// Tests the children; returns the nearest and pushes the others, the farthest first.
-#[inline(always)]
-fn descend<const ANY: bool>(
-    node: &WideNode,
-    ray: &NodeRay,
-    t_max: f32,
-    stack: &mut [u64],
-    waiting: &mut usize,
-) -> Option<ChildRef> {
-    let (mut lanes, enter) = node.intersect(ray, t_max);
-    if lanes == 0 {
-        return None;
-    }
-    // Distances are not negative, so their bits sort like the numbers.
-    let mut next_entry = || {
-        let lane = lanes.trailing_zeros() as usize & 3;
-        lanes &= lanes - 1;
-        (u64::from(enter[lane].to_bits()) << 32 | u64::from(node.children[lane].0), lanes != 0)
-    };
-    let (mut nearest, more) = next_entry();
-    if !more {
-        return Some(ChildRef(nearest as u32));
-    }
-    let mut push = |entry: u64| {
-        // `stack_size` bounds what can wait, so there always is a slot.
-        if let Some(slot) = stack.get_mut(*waiting) {
-            *slot = entry;
-            *waiting += 1;
-        }
-    };
-    let (mut second, more) = next_entry();
-    if !ANY && second < nearest {
-        (nearest, second) = (second, nearest);
-    }
-    if !more {
-        push(second);
-        return Some(ChildRef(nearest as u32));
-    }
-    let (mut third, more) = next_entry();
-    let mut fourth = if more { next_entry().0 } else { u64::MAX };
-    if !ANY {
-        // nearest <= second holds; a sorting network for the rest.
-        sort_pair(&mut third, &mut fourth);
-        sort_pair(&mut nearest, &mut third);
-        sort_pair(&mut second, &mut fourth);
-        sort_pair(&mut second, &mut third);
-    }
-    if more {
-        push(fourth);
-    }
-    push(third);
-    push(second);
-    Some(ChildRef(nearest as u32))
-}
-
-#[inline(always)]
-fn sort_pair(a: &mut u64, b: &mut u64) {
-    (*a, *b) = ((*a).min(*b), (*a).max(*b));
 }

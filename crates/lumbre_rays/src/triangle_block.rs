@@ -1,113 +1,140 @@
-//! Four triangles side by side and the watertight ray/triangle test over them.
+//! Eight triangles side by side and the watertight ray/triangle test over them.
 //!
 //! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. Two triangles that share an edge
-//! compute the same edge function with opposite signs, so no ray passes between them. Not a shading lookup.
+//! compute the same edge function with opposite signs, so no ray passes between them. No product is fused with a
+//! sum, so every machine computes the same bits. Not a shading lookup.
 
-use glam::{Vec3, Vec4};
+use fearless_simd::{Simd, f32x8, prelude::*};
+use glam::Vec3;
 
 use crate::ray_setup::RaySetup;
+use crate::wide_node::spread;
 
-/// Up to four triangles, `vertices[vertex][axis]`, one per lane. Lanes without a triangle hold NaN, which no
+/// Up to eight triangles, `vertices[vertex][axis]`, one per lane. Lanes without a triangle hold NaN, which no
 /// comparison accepts.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct TriangleBlock {
-    vertices: [[Vec4; 3]; 3],
-    pub ids: [u32; 4],
+    vertices: [[[f32; 8]; 3]; 3],
+    pub ids: [u32; 8],
+}
+
+impl TriangleBlock {
+    /// Triangles that a block holds at most.
+    pub const SIZE: usize = 8;
 }
 
 /// What the test found in a block: the lanes that hit, and their values.
 pub(crate) struct BlockHits {
     pub lanes: u32,
-    pub distance: [f32; 4],
-    pub u: [f32; 4],
-    pub v: [f32; 4],
+    pub distance: [f32; 8],
+    pub u: [f32; 8],
+    pub v: [f32; 8],
     /// Bit per lane: seen from the back.
     pub back: u32,
 }
 
 /// The ray's constants, spread over lanes.
-pub(crate) struct BlockRay {
-    origin: [Vec4; 3],
-    shear: [Vec4; 3],
+#[derive(Clone, Copy)]
+pub(crate) struct BlockRay<S: Simd> {
+    origin: [f32x8<S>; 3],
+    shear: [f32x8<S>; 3],
     axis: [usize; 3],
-    t_min: Vec4,
+    t_min: f32x8<S>,
+    simd: S,
 }
 
-impl BlockRay {
-    pub fn new(setup: &RaySetup) -> Self {
+impl<S: Simd> BlockRay<S> {
+    #[inline(always)]
+    pub fn new(simd: S, setup: &RaySetup) -> Self {
+        let [x, y, z] = setup.axis;
         Self {
-            origin: setup.axis.map(|axis| Vec4::splat(setup.origin[axis])),
-            shear: setup.shear.map(Vec4::splat),
+            origin: spread(simd, [setup.origin[x], setup.origin[y], setup.origin[z]]),
+            shear: spread(simd, setup.shear),
             axis: setup.axis,
-            t_min: Vec4::splat(setup.t_min),
+            t_min: simd.splat_f32x8(setup.t_min),
+            simd,
         }
+    }
+
+    /// Vertices in the ray's space, where it runs along z from the origin.
+    #[inline(always)]
+    fn shear(&self, vertex: &[[f32; 8]; 3]) -> [f32x8<S>; 3] {
+        let [x, y, z] = self.axis;
+        let depth = f32x8::simd_from(self.simd, vertex[z.min(2)]) - self.origin[2];
+        [
+            f32x8::simd_from(self.simd, vertex[x.min(2)]) - self.origin[0] - self.shear[0] * depth,
+            f32x8::simd_from(self.simd, vertex[y.min(2)]) - self.origin[1] - self.shear[1] * depth,
+            depth,
+        ]
     }
 }
 
 impl TriangleBlock {
-    /// From up to four (index, canonical triangle) pairs.
+    /// From up to eight (index, canonical triangle) pairs.
     pub fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
-        let mut lanes = [[[f32::NAN; 4]; 3]; 3];
-        let mut ids = [u32::MAX; 4];
-        for (lane, (id, triangle)) in triangles.iter().take(4).enumerate() {
+        let mut vertices = [[[f32::NAN; 8]; 3]; 3];
+        let mut ids = [u32::MAX; 8];
+        for (lane, (id, triangle)) in triangles.iter().take(Self::SIZE).enumerate() {
             ids[lane] = *id;
             for (vertex, position) in triangle.iter().enumerate() {
                 for (axis, coordinate) in position.to_array().into_iter().enumerate() {
-                    lanes[vertex][axis][lane] = coordinate;
+                    vertices[vertex][axis][lane] = coordinate;
                 }
             }
         }
-        Self { vertices: lanes.map(|vertex| vertex.map(Vec4::from_array)), ids }
+        Self { vertices, ids }
     }
 
-    /// Tests the four lanes; distances in [t_min, `t_max`] count, both included.
+    /// Tests the eight lanes; distances in [t_min, `t_max`] count, both included.
     #[inline(always)]
-    pub fn intersect(&self, ray: &BlockRay, t_max: f32) -> BlockHits {
-        let [x, y, z] = ray.axis;
-        let sheared = |vertex: &[Vec4; 3]| {
-            let depth = vertex[z] - ray.origin[2];
-            (
-                vertex[x] - ray.origin[0] - ray.shear[0] * depth,
-                vertex[y] - ray.origin[1] - ray.shear[1] * depth,
-                depth,
-            )
-        };
-        let (ax, ay, az) = sheared(&self.vertices[0]);
-        let (bx, by, bz) = sheared(&self.vertices[1]);
-        let (cx, cy, cz) = sheared(&self.vertices[2]);
+    pub fn intersect<S: Simd>(&self, ray: &BlockRay<S>, t_max: f32) -> Option<BlockHits> {
+        let simd = ray.simd;
+        let [ax, ay, az] = ray.shear(&self.vertices[0]);
+        let [bx, by, bz] = ray.shear(&self.vertices[1]);
+        let [cx, cy, cz] = ray.shear(&self.vertices[2]);
         let mut u = cx * by - cy * bx;
         let mut v = ax * cy - ay * cx;
         let mut w = bx * ay - by * ax;
-        let zero = Vec4::ZERO;
-        if (u.cmpeq(zero) | v.cmpeq(zero) | w.cmpeq(zero)).any() {
-            u = edge_function(cx, by, cy, bx);
-            v = edge_function(ax, cy, ay, cx);
-            w = edge_function(bx, ay, by, ax);
+        let zero = simd.splat_f32x8(0.0);
+        let vanish = simd.simd_eq_f32x8(u, zero) | simd.simd_eq_f32x8(v, zero) | simd.simd_eq_f32x8(w, zero);
+        if simd.any_true_mask32x8(vanish) {
+            u = f32x8::simd_from(simd, edge_function(&cx, &by, &cy, &bx));
+            v = f32x8::simd_from(simd, edge_function(&ax, &cy, &ay, &cx));
+            w = f32x8::simd_from(simd, edge_function(&bx, &ay, &by, &ax));
         }
-        let smallest = u.min(v).min(w);
-        let largest = u.max(v).max(w);
+        let smallest = simd.min_f32x8(simd.min_f32x8(u, v), w);
+        let largest = simd.max_f32x8(simd.max_f32x8(u, v), w);
         let determinant = u + v + w;
-        let inside = smallest.cmpge(zero) | largest.cmple(zero);
-        let mut lanes = (inside & determinant.cmpne(zero)).bitmask();
-        if lanes == 0 {
-            return BlockHits { lanes, distance: [0.0; 4], u: [0.0; 4], v: [0.0; 4], back: 0 };
+        let inside = simd.simd_ge_f32x8(smallest, zero) | simd.simd_le_f32x8(largest, zero);
+        // NaN differs from zero and is no side of it.
+        let inside = inside & !simd.simd_eq_f32x8(determinant, zero);
+        if !simd.any_true_mask32x8(inside) {
+            return None;
         }
-        let reciprocal = Vec4::ONE / determinant;
+        let reciprocal = simd.splat_f32x8(1.0) / determinant;
         let distance = (u * az + v * bz + w * cz) * ray.shear[2] * reciprocal;
-        lanes &= (distance.cmpge(ray.t_min) & distance.cmple(Vec4::splat(t_max))).bitmask();
-        BlockHits {
-            lanes,
-            distance: distance.to_array(),
-            u: (v * reciprocal).to_array(),
-            v: (w * reciprocal).to_array(),
-            back: determinant.cmplt(zero).bitmask(),
+        let in_range =
+            simd.simd_ge_f32x8(distance, ray.t_min) & simd.simd_le_f32x8(distance, simd.splat_f32x8(t_max));
+        let lanes = simd.to_bitmask_mask32x8(inside & in_range) as u32;
+        if lanes == 0 {
+            return None;
         }
+        Some(BlockHits {
+            lanes,
+            distance: *distance,
+            u: *(v * reciprocal),
+            v: *(w * reciprocal),
+            back: simd.to_bitmask_mask32x8(simd.simd_lt_f32x8(determinant, zero)) as u32,
+        })
     }
 }
 
 /// a * b - c * d with the exact sign: products of two f32 are exact in f64.
 #[cold]
-fn edge_function(a: Vec4, b: Vec4, c: Vec4, d: Vec4) -> Vec4 {
-    (a.as_dvec4() * b.as_dvec4() - c.as_dvec4() * d.as_dvec4()).as_vec4()
+fn edge_function(a: &[f32; 8], b: &[f32; 8], c: &[f32; 8], d: &[f32; 8]) -> [f32; 8] {
+    std::array::from_fn(|i| {
+        let [a, b, c, d] = [a[i], b[i], c[i], d[i]].map(f64::from);
+        (a * b - c * d) as f32
+    })
 }

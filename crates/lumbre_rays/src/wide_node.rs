@@ -1,19 +1,19 @@
-//! Nodes of four children side by side and the conservative slab test over them.
+//! Nodes of eight children side by side and the conservative slab test over them.
 //!
 //! Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013. The widening comes with the ray (`ray_setup`).
-//! Not the order in which children are visited: that is `traversal`.
+//! Not the order in which children are visited: that is `visit_order`.
 
-use glam::{Vec3, Vec4};
+use fearless_simd::{Simd, f32x8, prelude::*};
+use glam::Vec3;
 
 use crate::ray_setup::RaySetup;
 
-/// What a lane of a node leads to: nothing, a node, or a block of triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a lane of a node leads to: a node or a block of triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ChildRef(pub u32);
 
 impl ChildRef {
     const LEAF: u32 = 1 << 31;
-    pub const NONE: Self = Self(u32::MAX);
 
     pub fn node(index: usize) -> Self {
         Self(index as u32)
@@ -30,66 +30,100 @@ impl ChildRef {
     }
 }
 
-/// Four boxes, `planes[axis][side]` with side 0 the minimum, one box per lane.
+/// Relative widening of the distance at which a box is left. Entering and leaving distances have each two roundings
+/// in the reciprocal and the product and one in the difference, 3 * 2^-24, and the widening rounds itself: 7 * 2^-24;
+/// 8 are taken (Ize 2013: 2 gamma(3)).
+const SLAB_ERROR: f32 = 8.0 / (1 << 24) as f32;
+
+/// Eight boxes, `planes[axis][side]` with side 0 the minimum, one box per lane.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct WideNode {
-    planes: [[Vec4; 2]; 3],
-    pub children: [ChildRef; 4],
+    planes: [[[f32; 8]; 2]; 3],
+    pub children: [ChildRef; 8],
+    /// Bit per lane: there is a child.
+    taken: u32,
+    /// Bit per lane: the child is a block.
+    pub blocks: u32,
 }
 
 /// The ray's constants, spread over lanes.
-pub(crate) struct NodeRay {
+#[derive(Clone, Copy)]
+pub(crate) struct NodeRay<S: Simd> {
     near_side: [usize; 3],
-    near_origin: [Vec4; 3],
-    far_origin: [Vec4; 3],
-    near_reciprocal: [Vec4; 3],
-    far_reciprocal: [Vec4; 3],
-    t_min: Vec4,
+    near_origin: [f32x8<S>; 3],
+    far_origin: [f32x8<S>; 3],
+    reciprocal: [f32x8<S>; 3],
+    t_min: f32x8<S>,
+    simd: S,
 }
 
-impl NodeRay {
-    pub fn new(setup: &RaySetup) -> Self {
+impl<S: Simd> NodeRay<S> {
+    #[inline(always)]
+    pub fn new(simd: S, setup: &RaySetup) -> Self {
         Self {
             near_side: setup.near_side,
-            near_origin: setup.near_origin.map(Vec4::splat),
-            far_origin: setup.far_origin.map(Vec4::splat),
-            near_reciprocal: setup.near_reciprocal.map(Vec4::splat),
-            far_reciprocal: setup.far_reciprocal.map(Vec4::splat),
-            t_min: Vec4::splat(setup.t_min),
+            near_origin: spread(simd, setup.near_origin),
+            far_origin: spread(simd, setup.far_origin),
+            reciprocal: spread(simd, setup.reciprocal),
+            t_min: simd.splat_f32x8(setup.t_min),
+            simd,
         }
+    }
+
+    /// Where the ray meets the planes of an axis that it enters first.
+    #[inline(always)]
+    fn near(&self, planes: &[[f32; 8]; 2], axis: usize) -> f32x8<S> {
+        let plane = f32x8::simd_from(self.simd, planes[self.near_side[axis] & 1]);
+        (plane - self.near_origin[axis]) * self.reciprocal[axis]
+    }
+
+    /// Where it meets those by which it leaves.
+    #[inline(always)]
+    fn far(&self, planes: &[[f32; 8]; 2], axis: usize) -> f32x8<S> {
+        let plane = f32x8::simd_from(self.simd, planes[(self.near_side[axis] & 1) ^ 1]);
+        (plane - self.far_origin[axis]) * self.reciprocal[axis]
     }
 }
 
+/// Each of three numbers in all lanes.
+#[inline(always)]
+pub(crate) fn spread<S: Simd>(simd: S, values: [f32; 3]) -> [f32x8<S>; 3] {
+    [simd.splat_f32x8(values[0]), simd.splat_f32x8(values[1]), simd.splat_f32x8(values[2])]
+}
+
 impl WideNode {
-    /// From up to four (box, child) pairs.
-    pub fn new(children: &[([Vec3; 2], ChildRef)]) -> Self {
+    /// From up to eight boxes with what they hold, by lane.
+    pub fn new(lanes: &[Option<([Vec3; 2], ChildRef)>; 8]) -> Self {
         // An empty lane's box is inside out: its near distance is +infinity, its far one -infinity.
-        let mut planes = [[[f32::INFINITY; 4], [f32::NEG_INFINITY; 4]]; 3];
-        let mut references = [ChildRef::NONE; 4];
-        for (lane, (bounds, child)) in children.iter().take(4).enumerate() {
-            references[lane] = *child;
+        let mut planes = [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3];
+        let (mut children, mut taken, mut blocks) = ([ChildRef::default(); 8], 0, 0);
+        for (lane, content) in lanes.iter().enumerate() {
+            let Some((bounds, child)) = content else { continue };
+            children[lane] = *child;
+            taken |= 1 << lane;
+            blocks |= u32::from(child.as_block().is_some()) << lane;
             for (side, corner) in bounds.iter().enumerate() {
                 for (axis, coordinate) in corner.to_array().into_iter().enumerate() {
                     planes[axis][side][lane] = coordinate;
                 }
             }
         }
-        Self { planes: planes.map(|axis| axis.map(Vec4::from_array)), children: references }
+        Self { planes, children, taken, blocks }
     }
 
     /// The lanes whose boxes the ray may enter in [t_min, `t_max`], and where it enters.
     #[inline(always)]
-    pub fn intersect(&self, ray: &NodeRay, t_max: f32) -> (u32, [f32; 4]) {
-        let near = |axis: usize| {
-            (self.planes[axis][ray.near_side[axis] & 1] - ray.near_origin[axis]) * ray.near_reciprocal[axis]
-        };
-        let far = |axis: usize| {
-            (self.planes[axis][(ray.near_side[axis] & 1) ^ 1] - ray.far_origin[axis])
-                * ray.far_reciprocal[axis]
-        };
-        let enter = near(0).max(near(1)).max(near(2)).max(ray.t_min);
-        let leave = far(0).min(far(1)).min(far(2)).min(Vec4::splat(t_max));
-        (enter.cmple(leave).bitmask(), enter.to_array())
+    pub fn intersect<S: Simd>(&self, ray: &NodeRay<S>, t_max: f32) -> (u32, f32x8<S>) {
+        let simd = ray.simd;
+        let [x, y, z] = &self.planes;
+        let near = simd.max_f32x8(ray.near(x, 0), ray.near(y, 1));
+        let enter = simd.max_f32x8(near, simd.max_f32x8(ray.near(z, 2), ray.t_min));
+        let far = simd.min_f32x8(ray.far(x, 0), ray.far(y, 1));
+        let leave = simd.min_f32x8(far, simd.min_f32x8(ray.far(z, 2), simd.splat_f32x8(t_max)));
+        // What is left behind the ray stays behind it: a negative distance grows more negative.
+        let leave = leave * simd.splat_f32x8(1.0 + SLAB_ERROR);
+        let lanes = simd.to_bitmask_mask32x8(simd.simd_le_f32x8(enter, leave)) as u32;
+        (lanes & self.taken, enter)
     }
 }

@@ -1,0 +1,81 @@
+//! Throughput against the other crates, chunk by chunk in turn, so that the machine's noise cancels in the ratios.
+//!
+//! `cargo bench -p lumbre_rays --bench ratios [-- PART_OF_A_SCENE_OR_BATCH]`
+//! Millions of rays per second on one thread by the median chunk, and how many times faster ours is: median and
+//! quartiles over all chunks. Above 1 ours is faster.
+
+mod contestants;
+
+use std::time::Instant;
+
+use contestants::batches::Batch;
+use contestants::tracers::Tracer;
+use contestants::{Case, cases};
+
+/// Rays per turn: short against the machine's interruptions, long against the clock's reading.
+const CHUNK: usize = 2048;
+const ROUNDS: usize = 5;
+
+#[expect(clippy::print_stdout, reason = "the figures are what this program is for")]
+fn main() {
+    let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+    for case in cases() {
+        for batch in &case.batches {
+            if case.scene.contains(&wanted) || batch.name.contains(&wanted) {
+                println!("{}", compare(&case, batch));
+            }
+        }
+    }
+}
+
+fn compare(case: &Case, batch: &Batch) -> String {
+    agree(case, batch);
+    let tracers = Tracer::ALL;
+    // Seconds of every chunk, by tracer.
+    let mut seconds = vec![Vec::new(); tracers.len()];
+    for round in 0..ROUNDS {
+        for (turn, chunk) in batch.rays.chunks(CHUNK).enumerate() {
+            for i in 0..tracers.len() {
+                // Everyone begins as often as everyone else.
+                let i = (i + turn + round) % tracers.len();
+                let start = Instant::now();
+                case.tracers.trace(tracers[i], batch.any, chunk);
+                seconds[i].push(start.elapsed().as_secs_f64());
+            }
+        }
+    }
+    let mut text = format!("{} ({} triangles), {}:", case.scene, case.triangles, batch.name);
+    for (i, tracer) in tracers.iter().enumerate() {
+        let rate = CHUNK as f64 / quantile(&seconds[i], 0.5) / 1e6;
+        text += &format!("\n  {:12} {rate:6.2} Mrays/s", tracer.name());
+        if i > 0 {
+            let ratios: Vec<f64> =
+                seconds[i].iter().zip(&seconds[0]).map(|(theirs, ours)| theirs / ours).collect();
+            let [low, middle, high] = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share));
+            text += &format!("   ours / theirs {middle:5.2} ({low:.2} to {high:.2})");
+        }
+    }
+    text
+}
+
+/// The others are not watertight: of ten thousand rays a few may slip through an edge, no more.
+fn agree(case: &Case, batch: &Batch) {
+    let (hits, distance) = case.tracers.trace(Tracer::Lumbre, batch.any, &batch.rays);
+    for tracer in &Tracer::ALL[1..] {
+        let (others, other_distance) = case.tracers.trace(*tracer, batch.any, &batch.rays);
+        let (name, limit) = (tracer.name(), batch.rays.len() / 1000);
+        assert!(
+            hits.abs_diff(others) <= limit,
+            "{}, {}: {name} hits {others} and we {hits}",
+            case.scene,
+            batch.name
+        );
+        assert!((distance - other_distance).abs() <= 1e-3 * distance, "{name}: {other_distance} {distance}");
+    }
+}
+
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[((sorted.len() - 1) as f64 * share) as usize]
+}

@@ -1,0 +1,152 @@
+//! Collapses a binary tree into eight-wide nodes and blocks of triangles, at the least expected cost by surface area.
+//!
+//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017,
+//! section 3.1: dynamic programming over the number of wide children that a binary subtree becomes.
+//! Not the binary tree's builder.
+
+use glam::Vec3;
+use obvhs::bvh2::{Bvh2, node::Bvh2Node};
+
+use crate::build::WideTree;
+use crate::triangle_block::TriangleBlock;
+use crate::wide_node::ChildRef;
+
+/// Cost of a visit to a node, in tests of a block; measured (`cargo bench -p lumbre_rays --bench ratios`).
+const NODE_COST: f32 = 0.5;
+
+/// The cheapest ways to let a binary subtree become wide children.
+#[derive(Clone, Copy, Default)]
+struct Plan {
+    /// Triangles below.
+    count: u32,
+    /// Becomes a block, where it becomes one child.
+    block: bool,
+    /// Of i + 1 children (the last: of a node of its own), how many are the left one's; 0 where one fewer is better.
+    left: [u8; 8],
+    /// Expected cost of at most i + 1 children.
+    cost: [f32; 7],
+}
+
+/// Fills an empty tree from a binary one over `triangles`.
+pub(crate) fn collapse(tree: &mut WideTree, binary: &Bvh2, triangles: &[(u32, [Vec3; 3])]) {
+    let plans = plans(binary);
+    let root = tree.reserve_node();
+    // (binary node, its wide node, depth)
+    let mut pending = vec![(0usize, root, 1usize)];
+    while let Some((index, wide, depth)) = pending.pop() {
+        tree.depth = tree.depth.max(depth);
+        let mut children = Vec::with_capacity(8);
+        for child in wide_children(binary, &plans, index) {
+            let bounds = binary.nodes[child].aabb();
+            let reference = if plans[child].block {
+                tree.add_block(&members(binary, triangles, child))
+            } else {
+                let wide = tree.reserve_node();
+                pending.push((child, wide, depth + 1));
+                ChildRef::node(wide)
+            };
+            children.push(([Vec3::from(bounds.min), Vec3::from(bounds.max)], reference));
+        }
+        tree.fill_node(wide, &children);
+    }
+}
+
+fn plans(binary: &Bvh2) -> Vec<Plan> {
+    let mut order = Vec::with_capacity(binary.nodes.len());
+    let mut pending = vec![0usize];
+    while let Some(index) = pending.pop() {
+        order.push(index);
+        let node = &binary.nodes[index];
+        if !node.is_leaf() {
+            pending.extend(below(node));
+        }
+    }
+    let mut plans = vec![Plan::default(); binary.nodes.len()];
+    for &index in order.iter().rev() {
+        let node = &binary.nodes[index];
+        let area = node.aabb().half_area();
+        plans[index] = if node.is_leaf() {
+            Plan { count: node.prim_count, block: true, left: [0; 8], cost: [area; 7] }
+        } else {
+            let [left, right] = below(node).map(|child| plans[child]);
+            combine(area, &left, &right)
+        };
+    }
+    plans
+}
+
+fn combine(area: f32, left: &Plan, right: &Plan) -> Plan {
+    let count = left.count + right.count;
+    let mut plan = Plan { count, block: false, left: [0; 8], cost: [f32::INFINITY; 7] };
+    // Shared out among i + 1 children, both sides having at least one.
+    let mut shared = [f32::INFINITY; 8];
+    for i in 1..8 {
+        for of_left in 1..=i {
+            let cost = left.cost[of_left - 1] + right.cost[i - of_left];
+            if cost < shared[i] {
+                shared[i] = cost;
+                plan.left[i] = of_left as u8;
+            }
+        }
+    }
+    let node = shared[7] + area * NODE_COST;
+    plan.block = count as usize <= TriangleBlock::SIZE && area <= node;
+    plan.cost[0] = if plan.block { area } else { node };
+    for i in 1..7 {
+        plan.cost[i] = plan.cost[i - 1];
+        if shared[i] < plan.cost[i] {
+            plan.cost[i] = shared[i];
+        } else {
+            plan.left[i] = 0;
+        }
+    }
+    plan
+}
+
+/// The binary nodes that become the children of a wide node.
+fn wide_children(binary: &Bvh2, plans: &[Plan], index: usize) -> Vec<usize> {
+    let mut children = Vec::with_capacity(8);
+    if plans[index].block {
+        // Only the root comes here as a block.
+        return vec![index];
+    }
+    // (binary node, children it may become, may it become one)
+    let mut pending = vec![(index, 8usize, false)];
+    while let Some((index, mut share, whole)) = pending.pop() {
+        let plan = &plans[index];
+        if whole {
+            while share > 1 && plan.left[share - 1] == 0 {
+                share -= 1;
+            }
+        }
+        if share == 1 || binary.nodes[index].is_leaf() {
+            children.push(index);
+            continue;
+        }
+        let of_left = usize::from(plan.left[share - 1]);
+        let [left, right] = below(&binary.nodes[index]);
+        pending.push((left, of_left, true));
+        pending.push((right, share - of_left, true));
+    }
+    children
+}
+
+fn members(binary: &Bvh2, triangles: &[(u32, [Vec3; 3])], index: usize) -> Vec<(u32, [Vec3; 3])> {
+    let mut found = Vec::with_capacity(TriangleBlock::SIZE);
+    let mut pending = vec![index];
+    while let Some(index) = pending.pop() {
+        let node = &binary.nodes[index];
+        if node.is_leaf() {
+            let first = node.first_index as usize;
+            let range = first..first + node.prim_count as usize;
+            found.extend(binary.primitive_indices[range].iter().map(|&i| triangles[i as usize]));
+        } else {
+            pending.extend(below(node));
+        }
+    }
+    found
+}
+
+fn below(node: &Bvh2Node) -> [usize; 2] {
+    [node.first_index as usize, node.first_index as usize + 1]
+}
