@@ -31,8 +31,8 @@ pub(crate) struct GatherErrors<'a> {
     pub residual_bound: f64,
 }
 
-/// Texels around one, and steps between them, over which the spread of the scrambles is put together.
-const SPREAD_RADIUS: i64 = 6;
+/// Steps each way, and texels of a step, over which the spread of the scrambles is put together.
+const SPREAD_STEPS: i64 = 2;
 const SPREAD_STEP: i64 = 3;
 
 /// Variance of every texel's mean, mean of the channels. Four scrambles alone tell it badly: in one case of seven the mean is further than
@@ -41,11 +41,9 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimate
     let own: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum() / 3.0).collect();
     let around = |texel: &Texel| {
         let (mut sum, mut count) = (0.0, 0u32);
-        for (x, y, other) in surroundings.of(texel, SPREAD_RADIUS) {
-            if x as i64 % SPREAD_STEP == 0 && y as i64 % SPREAD_STEP == 0 {
-                sum += own[other];
-                count += 1;
-            }
+        for (_, _, other) in surroundings.every(texel, SPREAD_STEPS, SPREAD_STEP) {
+            sum += own[other];
+            count += 1;
         }
         sum / count.max(1) as f32
     };

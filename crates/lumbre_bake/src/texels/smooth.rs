@@ -60,7 +60,7 @@ pub(crate) fn smooth(
                 for (half, plane) in planes.iter_mut().enumerate() {
                     let difference = guides[other][1 - half] - guides[index][1 - half];
                     let edge = f64::from(difference.length_squared() / expected);
-                    plane.add(dx, dy, (-nearness - edge).exp(), &estimates[other][half * HALF..][..HALF]);
+                    plane.add(dx, dy, falloff(nearness + edge), &estimates[other][half * HALF..][..HALF]);
                 }
             }
             let mut smoothed = estimates[index];
@@ -169,8 +169,8 @@ pub(crate) struct Surroundings<'a> {
     layout: &'a LightmapLayout,
     texels: &'a [Texel],
     charts: &'a [u32],
-    /// Covered texel of each texel of all maps.
-    place: Vec<u32>,
+    /// Covered texel of each texel of all maps, and its triangle.
+    place: Vec<(u32, u32)>,
 }
 
 impl<'a> Surroundings<'a> {
@@ -180,9 +180,9 @@ impl<'a> Surroundings<'a> {
         texels: &'a [Texel],
         charts: &'a [u32],
     ) -> Self {
-        let mut place = vec![u32::MAX; layout.texels];
+        let mut place = vec![(u32::MAX, u32::MAX); layout.texels];
         for (index, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
-            place[texel.index as usize] = index as u32;
+            place[texel.index as usize] = (index as u32, texel.triangle);
         }
         Self { scene, layout, texels, charts, place }
     }
@@ -196,22 +196,53 @@ impl<'a> Surroundings<'a> {
 
     /// Texels of the same chart and about the same normal, with their offsets.
     pub fn of(&'a self, texel: &'a Texel, radius: i64) -> impl Iterator<Item = (f64, f64, usize)> + 'a {
+        self.every(texel, radius, 1)
+    }
+
+    /// Those of them in every `step`th row and column from the texel's.
+    pub fn every(
+        &'a self,
+        texel: &'a Texel,
+        steps: i64,
+        step: i64,
+    ) -> impl Iterator<Item = (f64, f64, usize)> + 'a {
         let map = &self.layout.maps[texel.object as usize];
-        let chart = self.charts[texel.triangle as usize];
-        let normal = self.scene.triangles[texel.triangle as usize].normal;
-        let offsets = (-radius..=radius).flat_map(move |dy| (-radius..=radius).map(move |dx| (dx, dy)));
-        offsets.filter_map(move |(dx, dy)| {
-            let (x, y) = (i64::from(texel.x) + dx, i64::from(texel.y) + dy);
-            if x < 0 || y < 0 || x >= i64::from(map.width) || y >= i64::from(map.height) {
-                return None;
-            }
-            let other = self.place[map.first + (y * i64::from(map.width) + x) as usize];
-            let neighbour = self.texels.get(other as usize)?;
-            let same = self.charts[neighbour.triangle as usize] == chart
-                && self.scene.triangles[neighbour.triangle as usize].normal.dot(normal) > 0.9;
-            same.then_some((dx as f64, dy as f64, other as usize))
+        let (width, height) = (i64::from(map.width), i64::from(map.height));
+        let (x, y) = (i64::from(texel.x), i64::from(texel.y));
+        let within = |from: i64, size: i64| {
+            // As many steps each way as stay on the map.
+            -steps.min(from / step)..=steps.min((size - 1 - from) / step)
+        };
+        let columns = within(x, width);
+        within(y, height).flat_map(move |row| {
+            let first = map.first as i64 + (y + row * step) * width + x;
+            columns.clone().filter_map(move |column| {
+                let (other, triangle) = self.place[(first + column * step) as usize];
+                (triangle == texel.triangle || self.goes_on(texel.triangle, triangle)).then_some((
+                    (column * step) as f64,
+                    (row * step) as f64,
+                    other as usize,
+                ))
+            })
         })
     }
+
+    /// Whether light may be compared over two triangles.
+    fn goes_on(&self, triangle: u32, other: u32) -> bool {
+        other != u32::MAX
+            && self.charts[triangle as usize] == self.charts[other as usize]
+            && self.scene.triangles[triangle as usize].normal.dot(self.scene.triangles[other as usize].normal)
+                > 0.9
+    }
+}
+
+/// (1 - x/16)^16: e^-x within .013, and nothing beyond 16.
+fn falloff(x: f64) -> f64 {
+    let mut power = (1.0 - x * (1.0 / 16.0)).max(0.0);
+    for _ in 0..4 {
+        power *= power;
+    }
+    power
 }
 
 /// Mean of the scrambles.
