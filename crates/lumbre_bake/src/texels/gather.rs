@@ -40,7 +40,7 @@ pub(crate) struct Outgoing<'a> {
 }
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
-pub(crate) const CHECKED: u32 = 16;
+pub(crate) const CHECKED: u32 = 8;
 
 /// Most real bounces that one ray makes between surfaces too near for patches.
 const NEAR_BOUNCES: u32 = 6;
@@ -73,7 +73,7 @@ struct Met {
 }
 
 /// Share of the samples that the guide places.
-const GUIDED: f32 = 0.5;
+const GUIDED: f32 = 0.4;
 
 /// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
 fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
@@ -151,7 +151,7 @@ impl Outgoing<'_> {
         gathered.samples = gathered.samples.max(samples);
     }
 
-    /// A point that a receiver's light by bounces comes from, with its weight: half of the samples, if the guide knows
+    /// A point that a receiver's light by bounces comes from, with its weight: a share of the samples, if the guide knows
     /// the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
     /// (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
     fn sample(&self, receiver: &Receiver, region: Option<u32>, u: f32, v: f32) -> Option<(Met, f32)> {

@@ -15,7 +15,7 @@ pub(crate) type Estimates = [Vec3; SCRAMBLES];
 const RADIUS: i64 = 4;
 /// Texels at which a neighbour weighs e⁻¹; and where things are near, the share of their harmonic mean distance, inverted.
 const WIDTH: f64 = 3.0;
-const NEAR: f64 = 2.0;
+const NEAR: f64 = 1.0;
 
 /// The estimates of every covered texel, smoothed, and the squared bias that the smoothing may have brought, mean of the channels.
 /// `inverse_distances` tells how near to each texel the things are that it gathered from.
