@@ -1,6 +1,6 @@
 //! Writes the held-out scenes and, if asked, their reference: `held_out_scenes FOLDER [--points N [NAME …]]`.
 //! FOLDER gets NAME.glb, NAME_small.glb (2⁻⁷) and NAME_large.glb (2¹⁰); with `--points` NAME.csv in the columns of the
-//! conformance suite, by 24 batches of 1024 paths a point.
+//! conformance suite, by 48 batches of 1024 paths a point.
 
 use std::error::Error;
 use std::fmt::Write;
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             lumbre_scene::save(&mut world, &folder.join(format!("{name}{suffix}.glb")))?;
         }
         if let Some(count) = points {
-            let found = PathTracer::new(&mut scene(layout, 1.0)).points(count, 24, 32, 7 + layout);
+            let found = PathTracer::new(&mut scene(layout, 1.0)).points(count, 48, 32, 7 + layout);
             let mut text = String::from("x,y,z,nx,ny,nz,E_r,E_g,E_b,se_r,se_g,se_b\n");
             for p in &found {
                 let fields: Vec<String> = p
