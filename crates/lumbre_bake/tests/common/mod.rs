@@ -122,9 +122,9 @@ pub fn compare(world: &mut World, points: &[ReferencePoint]) -> Comparison {
 }
 
 /// World triangles with their lightmap coordinates.
-type Surface = (Vec<([DVec3; 3], [DVec2; 3])>, std::sync::Arc<LightmapImage>);
+pub type Surface = (Vec<([DVec3; 3], [DVec2; 3])>, std::sync::Arc<LightmapImage>);
 
-fn lightmapped(world: &mut World) -> Vec<Surface> {
+pub fn lightmapped(world: &mut World) -> Vec<Surface> {
     let mut query = world.query::<(&Mesh, &Lightmap, &GlobalTransform)>();
     let surfaces = query.iter(world).map(|(mesh, lightmap, transform)| {
         let triangles = mesh
@@ -141,7 +141,8 @@ fn lightmapped(world: &mut World) -> Vec<Surface> {
     surfaces.collect()
 }
 
-fn look_up(surfaces: &[Surface], point: &ReferencePoint) -> Option<DVec3> {
+/// Irradiance by the map at a point, bilinearly; `None` where no triangle passes through it.
+pub fn look_up(surfaces: &[Surface], point: &ReferencePoint) -> Option<DVec3> {
     let mut best: Option<(f64, DVec3)> = None;
     for (triangles, image) in surfaces {
         for ([a, b, c], [ta, tb, tc]) in triangles {
