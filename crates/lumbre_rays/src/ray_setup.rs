@@ -21,10 +21,6 @@ const LARGEST_RATIO: f32 = (1u64 << 26) as f32;
 /// Sizes of the direction for which no reciprocal leaves the normal numbers; what is shorter counts as zero.
 const DIRECTION_RANGE: RangeInclusive<f32> = 1e-30..=1e30;
 
-/// The axes x, y, z of the sheared space by the dominant axis, and whether the ray runs down it: x and y change places
-/// where z is mirrored, which keeps the winding. A table, because a branch on a random direction is mispredicted.
-const AXES: [[[usize; 3]; 2]; 3] = [[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[0, 1, 2], [1, 0, 2]]];
-
 /// A ray in canonical units, prepared for traversal.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RaySetup {
@@ -72,10 +68,18 @@ impl RaySetup {
         if !accepted {
             return None;
         }
-        let [x, y, z] = AXES[z][usize::from(dominant < 0.0)];
+        // The winding is kept by swapping x and y where z is mirrored.
+        let (x, y) = match (z, dominant < 0.0) {
+            (0, false) => (1, 2),
+            (0, true) => (2, 1),
+            (1, false) => (2, 0),
+            (1, true) => (0, 2),
+            (_, false) => (0, 1),
+            (_, true) => (1, 0),
+        };
         let shear = [direction[x] * reciprocal_z, direction[y] * reciprocal_z, reciprocal_z];
         let reach = (origin - bounds[0]).abs().max((origin - bounds[1]).abs());
-        let error = SHEAR_ERROR * (reach + reach.to_array()[z]);
+        let error = SHEAR_ERROR * (reach + reach[z]);
         let towards = error.copysign(ray.direction);
         let largest_reciprocal = reciprocal_z.abs() * LARGEST_RATIO;
         let reciprocal = size.recip().min(Vec3::splat(largest_reciprocal)).copysign(ray.direction);
