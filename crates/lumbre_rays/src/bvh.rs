@@ -119,3 +119,72 @@ fn has_area(triangle: &[Vec3; 3]) -> bool {
     let normal = (b - a).cross(c - a);
     triangle.iter().all(|vertex| vertex.is_finite()) && normal.length_squared() > 0.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// SplitMix64, in [-1, 1).
+    fn random(state: &mut u64) -> f32 {
+        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = *state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn point(state: &mut u64) -> Vec3 {
+        Vec3::new(random(state), random(state), random(state))
+    }
+
+    #[test]
+    fn every_set_of_instructions_computes_the_same_bits() {
+        let mut state = 3;
+        let triangles: Vec<[Vec3; 3]> = (0..500)
+            .map(|_| {
+                let centre = point(&mut state);
+                [(); 3].map(|()| centre + 0.2 * point(&mut state))
+            })
+            .collect();
+        let best = Bvh::build(&triangles);
+        let baseline = Bvh { level: Level::baseline(), ..best.clone() };
+        let mut hits = 0;
+        for i in 0..20_000 {
+            let origin = point(&mut state);
+            // Every other ray at a vertex or along an axis, where the exact edge functions decide.
+            let direction = match i % 4 {
+                0 => triangles[i % 500][i % 3] - origin,
+                1 => Vec3::AXES[i % 3],
+                _ => point(&mut state),
+            };
+            let ray = Ray::new(origin, direction);
+            let (hit, same) = (best.closest_hit(&ray), baseline.closest_hit(&ray));
+            assert_eq!(hit, same);
+            assert_eq!(best.any_hit(&ray), baseline.any_hit(&ray));
+            hits += usize::from(hit.is_some());
+        }
+        assert!(hits > 5_000, "only {hits} of 20,000 rays hit");
+    }
+
+    #[test]
+    fn a_tree_deeper_than_the_usual_stack_is_walked_to_its_end() {
+        // Each triangle doubles the box of those before, so the tree is a chain.
+        let triangles: Vec<[Vec3; 3]> = (-60..60)
+            .flat_map(|i| {
+                let size = 2f32.powi(i);
+                [0.0, 0.1].map(|z| {
+                    [Vec3::new(1.0, 0.0, z), Vec3::new(1.5, 0.0, z), Vec3::new(1.0, 0.5, z)].map(|v| v * size)
+                })
+            })
+            .collect();
+        let bvh = Bvh::build(&triangles);
+        assert!(bvh.tree.depth > 16, "only {} deep", bvh.tree.depth);
+        for (i, triangle) in triangles.iter().enumerate() {
+            let target = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+            let size = (triangle[1] - triangle[0]).length();
+            let ray = Ray::new(target + Vec3::Z * size * 0.01, Vec3::NEG_Z);
+            assert_eq!(bvh.closest_hit(&ray).map(|hit| hit.triangle), Some(i as u32));
+            assert!(bvh.any_hit(&ray));
+        }
+    }
+}
