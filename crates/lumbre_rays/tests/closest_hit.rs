@@ -183,6 +183,6 @@ fn the_tree_changes_no_bit_of_an_answer() {
         ties += alone.iter().filter(|hit| first.is_some_and(|first| hit.distance == first.distance)).count()
             - usize::from(first.is_some());
     }
-    // Otherwise the order of equal distances was not tried.
-    assert!(ties > 500, "{ties}");
+    // The two smaller boxes share a face; otherwise the order of equal distances was not tried.
+    assert!(ties > 100, "{ties}");
 }
