@@ -20,6 +20,7 @@ const ROUNDS: usize = 5;
 fn main() {
     let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
     for case in cases() {
+        println!("{}: ours built in {:.2} ms", case.scene, case.tracers.build_seconds * 1e3);
         for batch in &case.batches {
             if case.scene.contains(&wanted) || batch.name.contains(&wanted) {
                 println!("{}", compare(&case, batch));
@@ -29,7 +30,7 @@ fn main() {
 }
 
 fn compare(case: &Case, batch: &Batch) -> String {
-    agree(case, batch);
+    case.tracers.agree(case.scene, batch);
     let tracers = Tracer::ALL;
     // Seconds of every chunk, by tracer.
     let mut seconds = vec![Vec::new(); tracers.len()];
@@ -56,22 +57,6 @@ fn compare(case: &Case, batch: &Batch) -> String {
         }
     }
     text
-}
-
-/// The others are not watertight: of ten thousand rays a few may slip through an edge, no more.
-fn agree(case: &Case, batch: &Batch) {
-    let (hits, distance) = case.tracers.trace(Tracer::Lumbre, batch.any, &batch.rays);
-    for tracer in &Tracer::ALL[1..] {
-        let (others, other_distance) = case.tracers.trace(*tracer, batch.any, &batch.rays);
-        let (name, limit) = (tracer.name(), batch.rays.len() / 1000);
-        assert!(
-            hits.abs_diff(others) <= limit,
-            "{}, {}: {name} hits {others} and we {hits}",
-            case.scene,
-            batch.name
-        );
-        assert!((distance - other_distance).abs() <= 1e-3 * distance, "{name}: {other_distance} {distance}");
-    }
 }
 
 fn quantile(values: &[f64], share: f64) -> f64 {

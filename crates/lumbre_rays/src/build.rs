@@ -14,8 +14,13 @@ use crate::triangle_block::TriangleBlock;
 use crate::visit_order;
 use crate::wide_node::{ChildRef, WideNode};
 
-/// Share of the nodes that reinsertion tries to place better; more costs build time and gains little.
-const REINSERTION_RATIO: f32 = 0.15;
+/// Nodes that reinsertion tries to place better, as far as the shares below allow: about half a second's work.
+/// Measured on 69,000 triangles in a room, half of the nodes instead of a seventh made closest hits 1.15 and any hits
+/// 1.2 times as fast and the build 3 times as long.
+const REINSERTED_NODES: f32 = 80_000.0;
+
+/// The least and the largest share of the nodes that it tries.
+const REINSERTED_SHARE: [f32; 2] = [0.15, 0.6];
 
 /// PLOC and reinsertion choose by surface area, so among n equal boxes both take quadratic time. A mesh with a pile
 /// of more than this many is split at the median instead.
@@ -50,7 +55,9 @@ impl WideTree {
             SortPrecision::U64,
             3,
         );
-        ReinsertionOptimizer::default().run(&mut binary, REINSERTION_RATIO, None);
+        let [least, largest] = REINSERTED_SHARE;
+        let share = (REINSERTED_NODES / binary.nodes.len() as f32).clamp(least, largest);
+        ReinsertionOptimizer::default().run(&mut binary, share, None);
         collapse(&mut tree, &binary, triangles);
         tree
     }

@@ -119,3 +119,68 @@ fn has_area(triangle: &[Vec3; 3]) -> bool {
     let normal = (b - a).cross(c - a);
     triangle.iter().all(|vertex| vertex.is_finite()) && normal.length_squared() > 0.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// SplitMix64, in [-1, 1).
+    fn random(state: &mut u64) -> f32 {
+        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = *state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn point(state: &mut u64) -> Vec3 {
+        Vec3::new(random(state), random(state), random(state))
+    }
+
+    fn soup(state: &mut u64) -> Vec<[Vec3; 3]> {
+        (0..500)
+            .map(|_| {
+                let centre = point(state);
+                [(); 3].map(|()| centre + 0.2 * point(state))
+            })
+            .collect()
+    }
+
+    /// Both must give the same answers to the last bit, and not only misses.
+    fn assert_same(a: &Bvh, b: &Bvh, triangles: &[[Vec3; 3]]) {
+        let (mut state, mut hits) = (7, 0);
+        for i in 0..20_000 {
+            let origin = point(&mut state);
+            // Every other ray at a vertex or along an axis, where the exact edge functions decide.
+            let direction = match i % 4 {
+                0 => triangles[i % 500][i % 3] - origin,
+                1 => Vec3::AXES[i % 3],
+                _ => point(&mut state),
+            };
+            let ray = Ray::new(origin, direction);
+            let hit = a.closest_hit(&ray);
+            assert_eq!(hit, b.closest_hit(&ray));
+            assert_eq!(a.any_hit(&ray), b.any_hit(&ray));
+            hits += usize::from(hit.is_some());
+        }
+        assert!(hits > 5_000, "only {hits} of 20,000 rays hit");
+    }
+
+    #[test]
+    fn every_set_of_instructions_computes_the_same_bits() {
+        let triangles = soup(&mut 3);
+        let best = Bvh::build(&triangles);
+        let baseline = Bvh { level: Level::baseline(), ..best.clone() };
+        assert_same(&best, &baseline, &triangles);
+    }
+
+    #[test]
+    fn the_stack_of_a_deep_tree_answers_as_the_usual_one() {
+        let triangles = soup(&mut 5);
+        let usual = Bvh::build(&triangles);
+        assert!(usual.tree.depth > 2);
+        let mut deep = usual.clone();
+        deep.tree.depth = 100;
+        assert_same(&usual, &deep, &triangles);
+    }
+}

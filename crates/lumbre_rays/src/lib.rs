@@ -3,17 +3,33 @@
 //! Rays against triangles and nothing else: no lights, no materials, no ECS, no GPU.
 //!
 //! ```text
-//!   triangles ──► Bvh::build ──► canonical scale (2^k) ──► obvhs binary tree ──► four-wide nodes + blocks
-//!                                                                                      │
-//!   Ray ──► ray setup (shear, widened slabs) ──► traversal ──► slab test ──► watertight test ──► Hit
-//!    ▲                                                                                      │
-//!    └──────────────────────────── offset_ray_origin ◄──────────────────────────────────────┘
+//!   triangles ──► Bvh::build ──► canonical scale (2^k) ──► obvhs binary tree ──► collapse to eight-wide nodes
+//!                                                                                and blocks of eight triangles
+//!                                                                                           │
+//!   Ray ──► ray setup (shear, widened slabs) ──► traversal ──► box test ──► watertight test ──► Hit
+//!    ▲                                          front to back    × 8            × 8              │
+//!    └──────────────────────────── offset_ray_origin ◄─────────────────────────────────────────┘
+//!
+//!        a node                                    a block
+//!   lane 0   1   2   3   4   5   6   7       lane 0   1   2   3   4   5   6   7
+//!      ┌───┬───┬───┬───┬───┬───┬───┬───┐        ┌───┬───┬───┬───┬───┬───┬───┬───┐
+//!      │box│box│box│box│box│box│   │   │        │ △ │ △ │ △ │ △ │ △ │ △ │ △ │   │
+//!      └─┬─┴─┬─┴───┴─┬─┴───┴───┴───┴───┘        └───┴───┴───┴───┴───┴───┴───┴───┘
+//!        ▼   ▼       ▼                           one test for all, empty lanes are NaN
+//!      node block   node     a ray of octant o visits the lanes i ^ o, i = 0 .. 7
 //! ```
 //!
 //! - Watertight: a ray that meets the shared edge or vertex of a closed surface hits it
 //!   (Woop, Benthin, Wald 2013; Ize 2013).
 //! - Free of scale: no absolute epsilon. Multiplying a scene by 2^k changes no hit.
-//! - Deterministic: the same triangles give the same tree; ties go to the lower index.
+//! - Deterministic: the same triangles give the same tree; ties go to the lower index. AVX2 is used where the machine
+//!   has it, SSE2 or NEON elsewhere, and no product is fused with a sum: every machine computes the same bits.
+//! - Fast. One thread of a Xeon (Sapphire Rapids), millions of rays per second; "times" is our rate over that of
+//!   obvhs 0.4's `CwBvh` at its slowest and best build, the fastest other hierarchy found, which is not watertight.
+//!   `cargo bench -p lumbre_rays --bench ratios` prints it, with quartiles and further crates; `--bench throughput`
+//!   prints divan's table.
+//!
+//! FIGURES
 //!
 //! ```
 //! use glam::Vec3;

@@ -18,8 +18,6 @@ struct Waiting {
     node: u32,
     /// In the order of `visits`.
     lanes: u32,
-    /// Up to which distance they were found.
-    t_max: f32,
 }
 
 /// Where the traversal stands with its search.
@@ -96,7 +94,8 @@ impl WideTree {
         let mut depth = 0;
         let mut index = 0;
         let mut node = self.nodes.first()?;
-        let mut lanes = visits(node.intersect(&ray, search.t_max).0, octant);
+        let (entered, mut enter) = node.intersect(&ray, search.t_max);
+        let mut lanes = visits(entered, octant);
         loop {
             if lanes == 0 {
                 // Children that wait, but those behind what was hit since.
@@ -108,8 +107,10 @@ impl WideTree {
                 index = waiting.node;
                 node = self.nodes.get(index as usize)?;
                 lanes = waiting.lanes;
-                if !ANY && waiting.t_max != search.t_max {
-                    lanes &= visits(node.intersect(&ray, search.t_max).0, octant);
+                if !ANY {
+                    let entered;
+                    (entered, enter) = node.intersect(&ray, search.t_max);
+                    lanes &= visits(entered, octant);
                 }
                 continue;
             }
@@ -137,19 +138,21 @@ impl WideTree {
                     return search.best;
                 }
                 if !ANY && lanes != 0 && search.t_max != before {
-                    lanes &= visits(node.intersect(&ray, search.t_max).0, octant);
+                    lanes &= visits(ray.reached(enter, search.t_max), octant);
                 }
             } else {
                 if lanes != 0 {
                     // At most one entry per level waits, so there always is a slot.
                     if let Some(slot) = stack.get_mut(depth) {
-                        *slot = Waiting { node: index, lanes, t_max: search.t_max };
+                        *slot = Waiting { node: index, lanes };
                         depth += 1;
                     }
                 }
                 index = child.0;
                 node = self.nodes.get(index as usize)?;
-                lanes = visits(node.intersect(&ray, search.t_max).0, octant);
+                let entered;
+                (entered, enter) = node.intersect(&ray, search.t_max);
+                lanes = visits(entered, octant);
             }
         }
     }

@@ -86,6 +86,15 @@ impl<S: Simd> NodeRay<S> {
     }
 }
 
+impl<S: Simd> NodeRay<S> {
+    /// Of the lanes that were entered at `enter`, those up to `t_max`.
+    #[inline(always)]
+    pub fn reached(&self, enter: f32x8<S>, t_max: f32) -> u32 {
+        let limit = self.simd.splat_f32x8(t_max * (1.0 + SLAB_ERROR));
+        self.simd.to_bitmask_mask32x8(self.simd.simd_le_f32x8(enter, limit)) as u32
+    }
+}
+
 /// Each of three numbers in all lanes.
 #[inline(always)]
 pub(crate) fn spread<S: Simd>(simd: S, values: [f32; 3]) -> [f32x8<S>; 3] {

@@ -151,3 +151,38 @@ fn piles_of_triangles_build_in_time() {
         assert!((f64::from(hit.distance) - highest).abs() < 1e-6);
     }
 }
+
+#[test]
+fn the_tree_changes_no_bit_of_an_answer() {
+    let mut random = Random(21);
+    let mut triangles = soup(&mut random, 80, 0.5);
+    // Faces in the planes of boxes, and twice in one place: what a box test that is not wide enough would miss.
+    triangles.extend(cuboid(Vec3::splat(-0.5), Vec3::splat(0.5)));
+    triangles.extend(cuboid(Vec3::splat(-0.5), Vec3::new(0.5, 0.25, 0.75)));
+    triangles.extend(cuboid(Vec3::NEG_ONE, Vec3::ONE));
+    let bvh = Bvh::build(&triangles);
+    let mut ties = 0;
+    for i in 0..4000 {
+        let origin = if i % 3 == 0 { random.cube() * 0.5 } else { random.cube() * 1.5 };
+        let triangle = &triangles[random.bits() as usize % triangles.len()];
+        let direction = match i % 5 {
+            0 => triangle[i % 3] - origin,
+            1 => triangle[i % 3].lerp(triangle[(i + 1) % 3], random.unit()) - origin,
+            2 => [Vec3::X, Vec3::NEG_Y, Vec3::new(0.0, 1.0, -1.0), Vec3::new(1e-20, -1.0, 0.0)][i % 4],
+            _ => random.direction(),
+        };
+        let ray = Ray::new(origin, direction);
+        // Each triangle for itself, so that no hit hides another: the same arithmetic without the culling.
+        let alone: Vec<_> = (0..triangles.len() as u32)
+            .filter_map(|index| bvh.closest_hit_filtered(&ray, |triangle, _, _| triangle == index))
+            .collect();
+        let first =
+            alone.iter().min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle)));
+        assert_eq!(bvh.closest_hit(&ray).as_ref(), first);
+        assert_eq!(bvh.any_hit(&ray), first.is_some());
+        ties += alone.iter().filter(|hit| first.is_some_and(|first| hit.distance == first.distance)).count()
+            - usize::from(first.is_some());
+    }
+    // The two smaller boxes share a face; otherwise the order of equal distances was not tried.
+    assert!(ties > 100, "{ties}");
+}

@@ -7,6 +7,7 @@ pub mod scenes;
 pub mod tracers;
 
 use batches::{Batch, camera, cosine, shadow};
+use scenes::Scene;
 use tracers::Tracers;
 
 /// A scene in every crate's hierarchy, and the rays it is asked.
@@ -19,7 +20,11 @@ pub struct Case {
 
 /// All scenes; those whose file is not there are named on standard error.
 pub fn cases() -> Vec<Case> {
-    scenes::all()
+    cases_of(scenes::all())
+}
+
+pub fn cases_of(scenes: Vec<Scene>) -> Vec<Case> {
+    scenes
         .into_iter()
         .map(|scene| Case {
             scene: scene.name,

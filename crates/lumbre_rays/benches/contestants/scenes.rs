@@ -15,12 +15,17 @@ pub struct Scene {
 }
 
 pub fn all() -> Vec<Scene> {
-    let mut scenes = vec![cornell(), study(), bedroom()];
+    let mut scenes = rooms();
     match models::shared("stanford-bunny.glb") {
         Ok(bunny) => scenes.push(bunny_room(bunny)),
         Err(reason) => eprintln!("SKIPPED: the bunny's room, {reason}"),
     }
     scenes
+}
+
+/// Those that need no file.
+pub fn rooms() -> Vec<Scene> {
+    vec![cornell(), study(), bedroom()]
 }
 
 /// A room of `size` over the origin's corner, a lamp of a fifth of that, and furniture.

@@ -1,0 +1,18 @@
+//! Other crates' hierarchies and triangle tests find what ours does, on every batch of the benchmark's rooms.
+
+#[path = "../benches/contestants/mod.rs"]
+mod contestants;
+
+use contestants::scenes::rooms;
+use contestants::{Case, cases_of};
+
+#[test]
+fn obvhs_and_bvh_agree_with_us() {
+    for Case { scene, tracers, batches, .. } in cases_of(rooms()) {
+        for batch in &batches {
+            let hits = tracers.agree(scene, batch);
+            // In a closed room nearly every ray hits; to the lamp many do not.
+            assert!(hits > batch.rays.len() / 10, "{scene}, {}: {hits} hits", batch.name);
+        }
+    }
+}
