@@ -61,10 +61,16 @@ fn scene(name: &str) -> World {
         "sphere of 2,000" => lamp(&mut world, shapes::uv_sphere(0.15, 44, 24), 10.0, middle),
         "sphere of 10,000" => lamp(&mut world, shapes::uv_sphere(0.15, 100, 51), 10.0, middle),
         "100 balls of 100" => {
-            for i in 0..100 {
-                let at = DVec3::new(0.36 * f64::from(i % 10) - 1.6, 1.2, 0.36 * f64::from(i / 10) - 1.6);
-                lamp(&mut world, shapes::uv_sphere(0.03, 10, 6), 0.1, at);
+            let mut balls = TriangleMesh::default();
+            for i in 0..100u8 {
+                let at = Vec3::new(0.36 * f32::from(i % 10) - 1.6, 1.2, 0.36 * f32::from(i / 10) - 1.6);
+                let ball = shapes::uv_sphere(0.03, 10, 6);
+                let first = balls.positions.len() as u32;
+                balls.positions.extend(ball.positions.iter().map(|position| *position + at));
+                balls.normals.extend(ball.normals);
+                balls.indices.extend(ball.indices.iter().map(|index| first + index));
             }
+            lamp(&mut world, balls, 10.0, DVec3::ZERO);
         }
         "1 point light" => {
             let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };

@@ -126,7 +126,8 @@ fn patch_direct(
     sequence: Sequence,
 ) -> (Vec3, u32) {
     let patch = &patches.list[index];
-    if open <= 0.0 {
+    // What reflects nothing, a lamp mostly, hands nothing on.
+    if open <= 0.0 || patch.reflectance == Vec3::ZERO {
         return (Vec3::ZERO, 0);
     }
     let triangle = &scene.triangles[patch.triangle as usize];
