@@ -6,7 +6,7 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, world_points};
+use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, sky, world_points};
 use crate::texels::charts::charts;
 use crate::texels::error_estimate::variances;
 use crate::texels::fill::fill;
@@ -56,7 +56,7 @@ fn run(
     let mut watch = Watch::new(progress);
     watch.stage("layout", &mut report)?;
     let objects = collect(world)?;
-    let placed = lights(world);
+    let (placed, sky) = (lights(world), sky(world));
     if objects.is_empty() {
         report.skipped.push("everything: the scene has no static mesh".into());
         apply::forget_lightmaps(world, &[]);
@@ -70,10 +70,12 @@ fn run(
 
     watch.stage("hierarchy", &mut report)?;
     let scene = BakeScene::new(&objects, &layout, space, &mut report.warnings)?;
-    let sources = Sources::new(&scene, placed);
+    let sources = Sources::new(&scene, placed, sky);
     report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
     if sources.is_empty() {
-        report.skipped.push("everything: no surface emits, and no light is static or mixed".into());
+        report
+            .skipped
+            .push("everything: no surface emits, no light is static or mixed, and there is no sky".into());
         apply::forget_lightmaps(world, &[]);
         report.error_reached = true;
         return Ok(finish(report, &mut watch));
@@ -104,6 +106,7 @@ fn run(
                 layout: &layout,
                 patches: &exchange.patches,
                 direct: &total,
+                sky: sources.sky,
                 patch_direct: &exchange.direct,
                 patch_indirect: &exchange.indirect,
                 patch_error: &exchange.indirect_error,
@@ -154,6 +157,9 @@ fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
 fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {
     if sources.emitters.is_empty() {
         report.skipped.push("area light: no surface emits".into());
+    }
+    if !sources.has_sky() {
+        report.skipped.push("sky light: the scene has no sky".into());
     }
     if sources.lights.is_empty() {
         report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());

@@ -57,6 +57,12 @@ pub struct Light {
     pub shadow: bool,
     /// Who evaluates it.
     pub bake: BakeMode,
+    /// Radius in metres of the sphere that a point light or spotlight is, at least 0: how soft its baked shadows are. The equations
+    /// of the frame, and its light where nothing hides it, are those of its centre; other kinds of light do not read it.
+    pub radius: f32,
+    /// Angular diameter in radians of the disc that a directional light is, in [0, π/2] (the sun: 0.0093): how soft its baked
+    /// shadows are. The equations of the frame do not read it, nor do other kinds of light.
+    pub angle: f32,
 }
 
 impl Light {
@@ -72,6 +78,8 @@ impl Light {
             enabled: true,
             shadow: false,
             bake: BakeMode::Dynamic,
+            radius: 0.0,
+            angle: 0.0,
         }
     }
 

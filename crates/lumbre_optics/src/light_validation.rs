@@ -49,12 +49,12 @@ pub enum LightError {
         /// Its value in metres.
         value: f32,
     },
-    /// A half angle of the cone is out of range.
+    /// A half angle of the cone, or the angle that a directional light subtends, is out of range.
     #[error("light \"{light}\": {field} is {value} rad; give {allowed}")]
     Cone {
         /// The light's name.
         light: String,
-        /// The field, as in `SpotCone`.
+        /// The field, as in `SpotCone` or `Light`.
         field: &'static str,
         /// Its value in radians.
         value: f32,
@@ -103,8 +103,22 @@ impl Light {
                 return Err(LightError::TooStrong { light: name.to_owned(), field, value });
             }
         }
+        validate_size(self, name)?;
         self.spot.map_or(Ok(()), |cone| validate_cone(&cone, name))
     }
+}
+
+fn validate_size(light: &Light, name: &str) -> Result<(), LightError> {
+    for (field, value) in [("radius", light.radius), ("angle", light.angle)] {
+        if let Some(reason) = fault(value) {
+            return Err(LightError::Number { light: name.to_owned(), field, value, reason });
+        }
+    }
+    if light.angle > std::f32::consts::FRAC_PI_2 + ANGLE_ROUNDING {
+        let (field, allowed) = ("angle", "an angular diameter from 0 to π/2");
+        return Err(LightError::Cone { light: name.to_owned(), field, value: light.angle, allowed });
+    }
+    Ok(())
 }
 
 fn validate_attenuation(attenuation: &Attenuation, name: &str) -> Result<(), LightError> {
@@ -228,6 +242,17 @@ mod tests {
             assert!(message(&Light { diffuse: color, ..Light::point(Vec3::ONE) }).contains("diffuse"));
             assert!(message(&Light { specular: color, ..Light::point(Vec3::ONE) }).contains("\"lamp\""));
         }
+    }
+
+    #[test]
+    fn sizes() {
+        for value in [-1.0, f32::NAN, f32::INFINITY] {
+            assert!(message(&Light { radius: value, ..Light::point(Vec3::ONE) }).contains("radius is"));
+            assert!(message(&Light { angle: value, ..Light::directional(Vec3::ONE) }).contains("angle is"));
+        }
+        assert!(message(&Light { angle: 1.6, ..Light::directional(Vec3::ONE) }).contains("from 0 to π/2"));
+        let sun = Light { angle: FRAC_PI_2, radius: 1e6, ..Light::directional(Vec3::ONE) };
+        assert_eq!(sun.validate("sun"), Ok(()));
     }
 
     #[test]

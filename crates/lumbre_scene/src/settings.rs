@@ -11,6 +11,9 @@ pub struct SceneSettings {
     pub ambient: Vec3,
     /// Background, linear RGB.
     pub background: Vec3,
+    /// Radiance of the sky, W/(m² sr), linear RGB, the same in every direction: what rays of the bake see that meet nothing. The
+    /// frame draws `background` and knows the sky's light by its lightmaps only.
+    pub sky: Vec3,
     /// The viewer is at the eye (true) or infinitely far along +Z of the camera (false).
     pub local_viewer: bool,
     /// Double-sided surfaces seen from behind are lit with the reversed normal and the back material (glTF's rule, and
@@ -35,6 +38,7 @@ impl Default for SceneSettings {
         Self {
             ambient: Vec3::ZERO,
             background: Vec3::ZERO,
+            sky: Vec3::ZERO,
             local_viewer: true,
             two_sided: true,
             reflection: ReflectionModel::Phong,

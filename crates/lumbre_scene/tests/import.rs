@@ -203,7 +203,8 @@ fn lights_in_the_documents_units() {
     assert_eq!(defaults.spot, Some(SpotCone::Smooth { inner: 0.1, outer: 0.4 }));
     let all = with(
         json!({"ambient": [0.1, 0, 0], "diffuse": [1, 2, 3], "specular": [4, 5, 6], "attenuation": [0.5, 0.25, 2],
-        "attenuationClamp": true, "spot": {"cutoff": 0.7, "exponent": 12}, "enabled": false, "shadow": true, "bake": "mixed"}),
+        "attenuationClamp": true, "spot": {"cutoff": 0.7, "exponent": 12}, "enabled": false, "shadow": true, "bake": "mixed",
+        "radius": 0.5, "angle": 0.25}),
     );
     let expected = Light {
         kind: LightKind::Point,
@@ -221,6 +222,8 @@ fn lights_in_the_documents_units() {
         enabled: false,
         shadow: true,
         bake: BakeMode::Mixed,
+        radius: 0.5,
+        angle: 0.25,
     };
     assert_eq!(all, expected);
     assert_eq!(with(json!({"kind": "ambient", "ambient": [1, 1, 1]})).kind, LightKind::Ambient);
@@ -460,7 +463,7 @@ fn who_lights_others() {
 fn scene_settings_and_cameras() {
     let mut file = File::new();
     file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"ambient": [1, 2, 3], "localViewer": false,
-        "twoSided": true, "reflection": "blinn-4n", "shading": "flat",
+        "sky": [0.25, 0.5, 1], "twoSided": true, "reflection": "blinn-4n", "shading": "flat",
         "fog": {"mode": "exp2", "density": 0.5, "color": [0, 1, 0]}}});
     let lens = json!({"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.25, "aspectRatio": 2}});
     file.push("cameras", lens);
@@ -469,6 +472,7 @@ fn scene_settings_and_cameras() {
     let expected = SceneSettings {
         ambient: Vec3::new(1.0, 2.0, 3.0),
         background: Vec3::ZERO,
+        sky: Vec3::new(0.25, 0.5, 1.0),
         local_viewer: false,
         two_sided: true,
         reflection: ReflectionModel::Blinn4n,

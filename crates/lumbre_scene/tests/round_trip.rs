@@ -56,6 +56,7 @@ fn everything() -> World {
     world.insert_resource(SceneSettings {
         ambient: Vec3::new(0.1, 0.2, 0.3),
         background: Vec3::new(0.4, 0.5, 7.0),
+        sky: Vec3::new(0.3, 0.6, 1.1),
         local_viewer: false,
         two_sided: true,
         reflection: ReflectionModel::BlinnMatched,
@@ -160,7 +161,8 @@ fn everything() -> World {
         spot(SpotCone::Smooth { inner: 0.1, outer: 0.7 }),
         spot(SpotCone::Exponent { cutoff: 0.4, exponent: 8.5 }),
         spot(SpotCone::Exponent { cutoff: std::f32::consts::PI, exponent: 0.0 }),
-        Light { shadow: true, bake: BakeMode::Mixed, ..Light::directional(Vec3::ONE) },
+        Light { shadow: true, bake: BakeMode::Mixed, angle: 0.0093, ..Light::directional(Vec3::ONE) },
+        Light { radius: 0.25, bake: BakeMode::Static, ..Light::point(Vec3::ONE) },
         Light { spot: Some(SpotCone::Smooth { inner: 0.2, outer: 0.3 }), ..Light::directional(Vec3::ONE) },
         Light { enabled: false, ..Light::ambient(Vec3::new(0.1, 0.0, 0.3)) },
     ];

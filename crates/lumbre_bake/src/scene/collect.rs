@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
-    ChildOf, DynamicObject, GlobalTransform, Hidden, MaterialTextures, Mesh, Name, Primitive, StaticObject,
-    propagate_transforms,
+    ChildOf, DynamicObject, GlobalTransform, Hidden, MaterialTextures, Mesh, Name, Primitive, SceneSettings,
+    StaticObject, propagate_transforms,
 };
 
 use crate::BakeError;
@@ -97,6 +97,12 @@ fn under_a_dynamic_object(world: &World, parent: Option<&ChildOf>) -> bool {
         above = world.get::<ChildOf>(entity).map(ChildOf::parent);
     }
     false
+}
+
+/// The sky's radiance, W/(m² sr); black where the scene says nothing, or nothing that could be light.
+pub(crate) fn sky(world: &World) -> Vec3 {
+    let sky = world.get_resource::<SceneSettings>().map_or(Vec3::ZERO, |settings| settings.sky);
+    if sky.is_finite() { sky.max(Vec3::ZERO) } else { Vec3::ZERO }
 }
 
 /// The enabled lights that are baked whole or for their bounces, in the order of their entities.

@@ -38,6 +38,21 @@ impl SurfaceMaterial {
         self.textures.as_ref().is_some_and(|textures| textures.emissive.is_some())
     }
 
+    /// Texels of the emissive texture along the longest edge of a triangle; 0 without one.
+    pub fn emission_texels(&self, vertices: [u32; 3]) -> f32 {
+        let Some(texture) = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref()) else {
+            return 0.0;
+        };
+        let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
+        let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
+        let at = |vertex: u32| {
+            coordinates.get(vertex as usize).copied().unwrap_or_default() * texture.scale * size
+        };
+        let [a, b, c] = vertices.map(at);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        if longest.is_finite() { longest } else { 0.0 }
+    }
+
     /// Whether light may pass through some of it.
     pub fn is_masked(&self) -> bool {
         match self.material.alpha_mode {

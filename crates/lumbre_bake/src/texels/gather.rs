@@ -25,9 +25,11 @@ pub(crate) struct Outgoing<'a> {
     pub patches: &'a Patches,
     /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none.
     pub direct: &'a [Vec3],
+    /// Irradiance that a surface gets of an unhidden sky.
+    pub sky: Vec3,
     /// Per patch, direct irradiance.
     pub patch_direct: &'a [Vec3],
-    /// Per patch, irradiance by bounces.
+    /// Per patch, irradiance by bounces and by the sky.
     pub patch_indirect: &'a [Vec3],
     /// Per patch, the standard error of that.
     pub patch_error: &'a [f32],
@@ -72,8 +74,8 @@ struct Met {
     distance: f32,
 }
 
-/// Share of the samples that the guide places.
-const GUIDED: f32 = 0.4;
+/// What a ray meets: a surface that reflects, or else what arrives all the same, times π as all light is here: the sky's, or none.
+type Meeting<T> = Result<T, Vec3>;
 
 /// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
 fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
@@ -129,10 +131,12 @@ impl Outgoing<'_> {
                 let receiver = receiver(self.scene, &point);
                 gathered.rays += 1;
                 let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
-                let Some(met) =
-                    self.sample(&receiver, region.filter(|&region| self.guide.knows(region)), u, v)
-                else {
-                    continue;
+                let met = match self.sample(&receiver, region, u, v) {
+                    Ok(met) => met,
+                    Err(light) => {
+                        *sum += light;
+                        continue;
+                    }
                 };
                 // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
                 let turn =
@@ -151,19 +155,22 @@ impl Outgoing<'_> {
         gathered.samples = gathered.samples.max(samples);
     }
 
-    /// A point that a receiver's light by bounces comes from, with its weight: a share of the samples, if the guide knows
-    /// the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
+    /// A point that a receiver's light by bounces comes from, with its weight: some of the samples, if the guide
+    /// knows the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
     /// (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
-    fn sample(&self, receiver: &Receiver, region: Option<u32>, u: f32, v: f32) -> Option<(Met, f32)> {
+    fn sample(&self, receiver: &Receiver, region: Option<u32>, u: f32, v: f32) -> Meeting<(Met, f32)> {
         let Some(region) = region.filter(|&region| self.guide.knows(region)) else {
             return self.meet_about(receiver, u, v).map(|met| (met, 1.0));
         };
-        let (met, other, probability) = if u < GUIDED {
-            let (other, u, probability) = self.guide.pick(region, u / GUIDED)?;
-            (self.point_of(receiver, other, u, v)?, other, probability)
+        let share = self.guide.share(region);
+        let (met, other, probability) = if u < share {
+            let (other, u, probability) = self.guide.pick(region, u / share).ok_or(Vec3::ZERO)?;
+            (self.point_of(receiver, other, u, v).ok_or(Vec3::ZERO)?, other, probability)
         } else {
-            let met = self.meet_about(receiver, (u - GUIDED) / (1.0 - GUIDED), v)?;
-            let other = self.guide.regions.at(met.triangle, met.side, met.at)?;
+            // The sky is found by these alone.
+            let met = self.meet_about(receiver, (u - share) / (1.0 - share), v);
+            let met = met.map_err(|light| light / (1.0 - share))?;
+            let other = self.guide.regions.at(met.triangle, met.side, met.at).ok_or(Vec3::ZERO)?;
             (met, other, self.guide.probability(region, other))
         };
         // Densities over the surfaces' area.
@@ -171,12 +178,12 @@ impl Outgoing<'_> {
         let normal = self.scene.triangles[met.triangle as usize].side_normal(met.side);
         let cosine = -met.direction.dot(normal);
         let by_cosine = kernel(receiver, met.direction) * cosine / (met.distance * met.distance);
-        let weight = by_cosine / ((1.0 - GUIDED) * by_cosine + GUIDED * by_guide);
-        (cosine > 0.0 && weight.is_finite()).then_some((met, weight))
+        let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
+        if cosine > 0.0 && weight.is_finite() { Ok((met, weight)) } else { Err(Vec3::ZERO) }
     }
 
     /// What a ray about a receiver's normal meets.
-    fn meet_about(&self, receiver: &Receiver, u: f32, v: f32) -> Option<Met> {
+    fn meet_about(&self, receiver: &Receiver, u: f32, v: f32) -> Meeting<Met> {
         let mut direction = cosine_about(receiver.normal, u, v);
         let below = direction.dot(receiver.geometric_normal);
         if below <= 0.0 {
@@ -219,9 +226,12 @@ impl Outgoing<'_> {
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
-            let Some((met, chance)) = self.bounce(&last, u, v) else {
-                reading.light = light;
-                return reading;
+            let (met, chance) = match self.bounce(&last, u, v) {
+                Ok(met) => met,
+                Err(arriving) => {
+                    reading.light = light + weight * arriving;
+                    return reading;
+                }
             };
             weight *= chance * met.reflectance;
             light += weight * met.direct;
@@ -232,9 +242,12 @@ impl Outgoing<'_> {
         if checked {
             let [u, v, ..] = sequence.point(sample, 1);
             reading.rays += 1;
-            let real = self.bounce(&last, u, v).map_or(Vec3::ZERO, |(met, chance)| {
-                chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
-            });
+            let real = self.bounce(&last, u, v).map_or_else(
+                |light| light,
+                |(met, chance)| {
+                    chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
+                },
+            );
             reading.difference = weight * (indirect - real);
         }
         reading.light = light + weight * indirect;
@@ -242,20 +255,22 @@ impl Outgoing<'_> {
         reading
     }
 
-    /// The surface that a ray meets, if it reflects at all, and how far it is.
-    fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Met> {
-        let SurfaceHit::Lit { triangle, side, at, distance } = self.scene.first_hit(origin, direction) else {
-            return None;
+    /// What a ray meets.
+    fn meet(&self, origin: Vec3, direction: Vec3) -> Meeting<Met> {
+        let (triangle, side, at, distance) = match self.scene.first_hit(origin, direction) {
+            SurfaceHit::Lit { triangle, side, at, distance } => (triangle, side, at, distance),
+            SurfaceHit::None => return Err(self.sky),
+            SurfaceHit::Back | SurfaceHit::Inside => return Err(Vec3::ZERO),
         };
-        let patch = self.patches.at(triangle, side, at)?;
+        let patch = self.patches.at(triangle, side, at).ok_or(Vec3::ZERO)?;
         let reflectance = self.reflectance(triangle, side, at, patch);
         let direct = self.direct_at(triangle, side, at, patch);
         let met = Met { triangle, side, at, patch, reflectance, direct, direction, distance };
-        (reflectance != Vec3::ZERO).then_some(met)
+        if reflectance == Vec3::ZERO { Err(Vec3::ZERO) } else { Ok(met) }
     }
 
     /// What a surface's own light by bounces comes from: one sample, with its weight.
-    fn bounce(&self, from: &Met, u: f32, v: f32) -> Option<(Met, f32)> {
+    fn bounce(&self, from: &Met, u: f32, v: f32) -> Meeting<(Met, f32)> {
         let surface = &self.scene.triangles[from.triangle as usize];
         let position = surface.position(from.at.0, from.at.1);
         let origin = self.scene.off_surface(from.triangle, from.side, position);

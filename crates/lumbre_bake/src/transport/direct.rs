@@ -1,14 +1,12 @@
 //! Direct light at a small piece of surface (a texel, a patch): emissive triangles by Lambert's formula times the seen
-//! share of their light, punctual lights by shadow rays. Not bounces.
+//! share of their light; with it what `punctual` lights send. Not bounces.
 
 use std::f32::consts::PI;
-use std::f64::consts::PI as PI_F64;
 
-use glam::{DVec3, Vec3};
-use lumbre_optics::{BakeMode, LightKind, evaluate_light};
+use glam::Vec3;
 
-use super::emitters::{Emitter, emitters};
-use super::polygon::point_to_triangle;
+use super::emitter_tree::EmitterTree;
+use super::emitters::{Emitter, emitters, lamps};
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -45,14 +43,18 @@ pub(crate) struct Direct {
 pub(crate) struct Seen {
     /// Some source was seen by one sample and not by another: a penumbra, or a shadow's edge.
     pub partly: bool,
-    /// One number for each combination of seen and hidden sources.
+    /// One number for each combination of hidden sources.
     pub signature: u32,
 }
 
 impl Seen {
-    fn add(&mut self, visible: u32, hidden: u32) {
+    /// What the samples to source `id` found. Sources that are wholly seen, or that do not shine here, leave no mark: which of them
+    /// are asked together differs from receiver to receiver.
+    pub(super) fn add(&mut self, id: u32, visible: u32, hidden: u32) {
         self.partly |= visible > 0 && hidden > 0;
-        self.signature = hash(self.signature ^ (u32::from(visible > 0) + 2 * u32::from(hidden > 0)));
+        if hidden > 0 && visible == 0 {
+            self.signature ^= hash(id.wrapping_add(1));
+        }
     }
 }
 
@@ -65,16 +67,21 @@ impl Direct {
 
 /// The sources of a scene.
 pub(crate) struct Sources<'a> {
-    scene: &'a BakeScene,
+    pub scene: &'a BakeScene,
     pub emitters: Vec<Emitter>,
+    tree: EmitterTree,
     pub lights: Vec<PlacedLight>,
+    /// Irradiance that a surface gets of an unhidden sky: π times its radiance, W/m². Not direct light here: the rays of the
+    /// form factors and of the final gather find it where they meet nothing.
+    pub sky: Vec3,
 }
 
 /// Runs of samples whose spread tells the error of their mean: each is a low-discrepancy sequence of its own. (One in every four samples
 /// is not: their spread is several times larger than the error.) All together are spread better than apart, so that the true error is smaller.
-const GROUPS: usize = 4;
+pub(super) const GROUPS: usize = 4;
 
-fn group_of(sample: u32, samples: u32) -> usize {
+/// The run of one of so many samples.
+pub(super) fn group_of(sample: u32, samples: u32) -> usize {
     (sample as usize * GROUPS / samples.max(1) as usize).min(GROUPS - 1)
 }
 
@@ -128,22 +135,27 @@ impl Unoccluded {
 }
 
 /// Variance of the mean of all groups, from each group's mean.
-fn variance_of_mean(groups: [f32; GROUPS]) -> f32 {
+pub(super) fn variance_of_mean(groups: [f32; GROUPS]) -> f32 {
     let mean = groups.iter().sum::<f32>() / GROUPS as f32;
     groups.iter().map(|group| (group - mean).powi(2)).sum::<f32>() / (GROUPS * (GROUPS - 1)) as f32
 }
 
-/// Up to this many emitters, the unoccluded light of all is summed exactly at each point.
-const EXACT_EMITTERS: usize = 48;
-
 impl<'a> Sources<'a> {
-    pub fn new(scene: &'a BakeScene, lights: Vec<PlacedLight>) -> Self {
-        Self { scene, emitters: emitters(scene), lights }
+    /// Of a scene, its punctual lights and its sky's radiance.
+    pub fn new(scene: &'a BakeScene, lights: Vec<PlacedLight>, sky: Vec3) -> Self {
+        let emitters = emitters(scene);
+        let tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
+        Self { scene, emitters, tree, lights, sky: sky * PI }
     }
 
     /// Whether nothing shines.
     pub fn is_empty(&self) -> bool {
-        self.emitters.is_empty() && self.lights.is_empty()
+        self.emitters.is_empty() && self.lights.is_empty() && !self.has_sky()
+    }
+
+    /// Whether the sky shines.
+    pub fn has_sky(&self) -> bool {
+        self.sky != Vec3::ZERO
     }
 
     /// Mean irradiance of a receiver by `samples` shadow rays to the emitters and to each light; `point` maps the unit
@@ -159,18 +171,12 @@ impl<'a> Sources<'a> {
             let light = self.emitted(sequence, samples, point, &mut direct);
             direct.baked += light;
         }
-        for (index, light) in self.lights.iter().enumerate() {
-            let irradiance = self.lit_by(light, index as u32, sequence, samples, point, &mut direct);
-            match light.light.bake {
-                BakeMode::Static => direct.baked += irradiance,
-                BakeMode::Mixed | BakeMode::Dynamic => direct.mixed += irradiance,
-            }
-        }
+        self.punctual(sequence, samples, point, &mut direct);
         direct
     }
 
-    /// E = (mean of the exact unoccluded light) x (seen light / all light, by the same samples): exact in full light and
-    /// in full shadow, and in between its error is that of the share alone.
+    /// E = Σ (mean of the exact unoccluded light) x (seen light / all light, by the same samples) over groups of lamps: exact in
+    /// full light and in full shadow of each, and in between its error is that of the share alone.
     fn emitted(
         &self,
         sequence: Sequence,
@@ -179,16 +185,46 @@ impl<'a> Sources<'a> {
         direct: &mut Direct,
     ) -> Vec3 {
         let Some(anchor) = point(0.5, 0.5) else { return Vec3::ZERO };
-        let Some(choice) = Choice::new(&self.emitters, &anchor) else { return Vec3::ZERO };
-        let exact = self.emitters.len() <= EXACT_EMITTERS;
+        let groups = self.tree.groups(&anchor);
+        let weights: Vec<f32> = groups.iter().map(|&group| self.tree.weight(group, &anchor)).collect();
+        let brightest = weights.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let grey = |light: Vec3| light.element_sum() / 3.0;
+        let mut irradiance = Vec3::ZERO;
+        for (place, (&group, weight)) in groups.iter().zip(weights).enumerate() {
+            let own = allotted(samples, weight / brightest);
+            let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
+            let share = self.seen_share(group, &anchor, sequence, (own, set), point, direct);
+            if share.mean == Vec3::ZERO {
+                continue;
+            }
+            let (light, uneven) = Unoccluded::mean(|x, y| {
+                point(x, y).map(|receiver| self.tree.unoccluded(&self.emitters, group, &receiver))
+            });
+            irradiance += light * share.mean;
+            direct.variance += grey(light).powi(2) * share.variance + uneven * grey(share.mean).powi(2);
+            direct.variance += (self.tree.error() * grey(light * share.mean)).powi(2);
+        }
+        irradiance
+    }
+
+    /// The part of a group's light that is seen, by so many samples of dimension set `set`.
+    fn seen_share(
+        &self,
+        group: u32,
+        anchor: &Receiver,
+        sequence: Sequence,
+        (samples, set): (u32, u32),
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) -> Share {
         let (mut all, mut seen) = (Vec3::ZERO, Vec3::ZERO);
         let (mut visible, mut hidden) = (0u32, 0u32);
         let (mut group_all, mut group_seen) = ([0.0f32; GROUPS], [0.0f32; GROUPS]);
         for sample in 0..samples {
-            let group = group_of(sample, samples);
-            let [x, y, u, v] = sequence.point(sample, 0);
+            let at = group_of(sample, samples);
+            let [x, y, u, v] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
-            let (chosen, u, probability) = choice.pick(u);
+            let (chosen, u, probability) = self.tree.pick(group, anchor, u);
             let emitter = &self.emitters[chosen];
             let (a, b) = triangle_point(u, v);
             let [p, q, r] = emitter.corners;
@@ -206,129 +242,39 @@ impl<'a> Sources<'a> {
                 continue;
             }
             all += light;
-            group_all[group] += light.element_sum() / 3.0;
-            direct.rays += 1;
+            group_all[at] += light.element_sum() / 3.0;
             let target = self.scene.off_surface(emitter.triangle, emitter.side, target);
             if self.scene.blocked(receiver.origin, target) {
                 hidden += 1;
             } else {
                 visible += 1;
                 seen += light;
-                group_seen[group] += light.element_sum() / 3.0;
+                group_seen[at] += light.element_sum() / 3.0;
             }
         }
-        direct.seen.add(visible, hidden);
-        if exact && visible == 0 {
-            Vec3::ZERO
-        } else if exact {
-            let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
-            let share = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
-            let (unoccluded, uneven) =
-                Unoccluded::mean(|x, y| point(x, y).map(|point| self.unoccluded(&point)));
-            let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
-                true => group_seen[at] / group_all[at],
-                false => share.element_sum() / 3.0,
-            });
-            direct.variance += (unoccluded.element_sum() / 3.0).powi(2) * variance_of_mean(shares);
-            direct.variance += uneven * (share.element_sum() / 3.0).powi(2);
-            unoccluded * share
-        } else {
-            let per_group = GROUPS as f32 / samples.max(1) as f32;
-            direct.variance += variance_of_mean(group_seen.map(|seen| seen * per_group));
-            seen / samples.max(1) as f32
-        }
-    }
-
-    /// Light of all emitters as if nothing were between.
-    fn unoccluded(&self, receiver: &Receiver) -> Vec3 {
-        let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
-        let light = |emitter: &Emitter| {
-            emitter.radiance.as_dvec3() * (PI_F64 * point_to_triangle(position, normal, &emitter.corners_f64))
-        };
-        self.emitters.iter().map(light).sum::<DVec3>().as_vec3()
-    }
-
-    fn lit_by(
-        &self,
-        light: &PlacedLight,
-        index: u32,
-        sequence: Sequence,
-        samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
-        direct: &mut Direct,
-    ) -> Vec3 {
-        let space = self.scene.space;
-        let mut sum = Vec3::ZERO;
-        let mut group_sums = [0.0f32; GROUPS];
-        let (mut visible, mut hidden) = (0u32, 0u32);
-        for sample in 0..samples {
-            let [x, y, ..] = sequence.point(sample, 1 + index % 32);
-            let Some(receiver) = point(x, y) else { continue };
-            let arriving =
-                evaluate_light(&light.light, light.position, light.axis, space.world(receiver.position));
-            let direction = arriving.direction.as_vec3();
-            let cosine = direction.dot(receiver.normal);
-            let strength = arriving.attenuation * arriving.spot;
-            if cosine <= 0.0 || strength <= 0.0 || direction.dot(receiver.geometric_normal) <= 0.0 {
-                continue;
-            }
-            direct.rays += 1;
-            let blocked = if light.light.kind == LightKind::Directional {
-                self.scene.blocked_towards(receiver.origin, direction)
-            } else {
-                self.scene.blocked(receiver.origin, space.position(light.position))
-            };
-            if blocked {
-                hidden += 1;
-            } else {
-                visible += 1;
-                let light = (arriving.diffuse * strength).as_vec3() * (PI * cosine);
-                sum += light;
-                group_sums[group_of(sample, samples)] += light.element_sum() / 3.0;
-            }
-        }
-        direct.seen.add(visible, hidden);
-        if light.light.bake == BakeMode::Static {
-            let per_group = GROUPS as f32 / samples.max(1) as f32;
-            direct.variance += variance_of_mean(group_sums.map(|sum| sum * per_group));
-        }
-        sum / samples.max(1) as f32
+        direct.rays += visible + hidden;
+        direct.seen.add(group, visible, hidden);
+        let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
+        let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
+        let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
+            true => group_seen[at] / group_all[at],
+            false => mean.element_sum() / 3.0,
+        });
+        Share { mean, variance: variance_of_mean(shares) }
     }
 }
 
-/// Emitters by their likely share of the light at a receiver.
-struct Choice {
-    /// Running sums, the last 1.
-    cumulative: Vec<f32>,
+/// The part of a source that is seen, per channel, and its variance.
+struct Share {
+    mean: Vec3,
+    variance: f32,
 }
 
-impl Choice {
-    /// `None` if the receiver is behind them all.
-    fn new(emitters: &[Emitter], anchor: &Receiver) -> Option<Self> {
-        let mut cumulative = Vec::with_capacity(emitters.len());
-        let mut sum = 0.0f64;
-        for emitter in emitters {
-            let [a, b, c] = emitter.corners;
-            let to_center = (a + b + c) / 3.0 - anchor.position;
-            let distance_squared = to_center.length_squared();
-            // Cosines at the centre, raised by the angle that the emitter subtends: never 0 where light may arrive.
-            let spread = (emitter.area / (distance_squared + emitter.area)).sqrt();
-            let direction = to_center.normalize_or_zero();
-            let receives = (direction.dot(anchor.normal) + spread).clamp(0.05, 1.0);
-            let emits = (spread - direction.dot(emitter.normal)).clamp(0.05, 1.0);
-            let power = emitter.radiance.element_sum() * emitter.area;
-            sum += f64::from(power * receives * emits / (distance_squared + emitter.area));
-            cumulative.push(sum);
-        }
-        (sum > 0.0 && sum.is_finite())
-            .then(|| Self { cumulative: cumulative.into_iter().map(|value| (value / sum) as f32).collect() })
-    }
+/// The dimension sets of groups begin here: before it are the punctual lights'.
+const FIRST_SET: u32 = 34;
 
-    /// The emitter at `u`, the position within its interval stretched to [0, 1), and its probability.
-    fn pick(&self, u: f32) -> (usize, f32, f32) {
-        let index = self.cumulative.partition_point(|&end| end <= u).min(self.cumulative.len() - 1);
-        let start = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
-        let probability = (self.cumulative[index] - start).max(f32::MIN_POSITIVE);
-        (index, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability)
-    }
+/// Of `samples` for the brightest source, those of one that brings `part` of it: a power of two, as runs are best spread.
+pub(super) fn allotted(samples: u32, part: f32) -> u32 {
+    let least = (samples / 4).max(GROUPS as u32).min(samples);
+    ((samples as f32 * part) as u32).next_power_of_two().clamp(least, samples)
 }

@@ -1,10 +1,12 @@
 //! Emissive triangles as sources: each a polygon of one radiance. A triangle whose emission varies is cut into pieces.
 //! Not what they light: that is `direct`.
 
+use std::collections::HashMap;
+
 use glam::{DVec3, Vec3};
 
-use crate::scene::BakeScene;
 use crate::scene::material::Side;
+use crate::scene::{BakeScene, SceneTriangle, SurfaceMaterial};
 
 /// A triangle of one radiance.
 #[derive(Clone, Debug)]
@@ -23,23 +25,99 @@ pub(crate) struct Emitter {
     pub side: Side,
 }
 
-/// Pieces along an edge of a triangle whose emission varies.
-const PIECES: u32 = 8;
+impl Emitter {
+    /// Its centroid.
+    pub fn middle(&self) -> Vec3 {
+        let [a, b, c] = self.corners;
+        (a + b + c) / 3.0
+    }
+}
+
+/// For each emitter the number of its lamp: triangles that share a corner, bit by bit, hang together.
+pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
+    let mut corners: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut parent: Vec<u32> = Vec::new();
+    let mut of_triangle: HashMap<u32, u32> = HashMap::new();
+    for emitter in emitters {
+        of_triangle.entry(emitter.triangle).or_insert_with(|| {
+            let own = scene.triangles[emitter.triangle as usize].corners.map(|corner| {
+                // -0 and 0 are one place.
+                let key = (corner + Vec3::ZERO).to_array().map(f32::to_bits);
+                *corners.entry(key).or_insert_with(|| {
+                    parent.push(parent.len() as u32);
+                    parent.len() as u32 - 1
+                })
+            });
+            let roots = own.map(|corner| find(&mut parent, corner));
+            let least = roots[0].min(roots[1]).min(roots[2]);
+            for root in roots {
+                parent[root as usize] = least;
+            }
+            least
+        });
+    }
+    emitters.iter().map(|emitter| find(&mut parent, of_triangle[&emitter.triangle])).collect()
+}
+
+fn find(parent: &mut [u32], mut at: u32) -> u32 {
+    while parent[at as usize] != at {
+        parent[at as usize] = parent[parent[at as usize] as usize];
+        at = parent[at as usize];
+    }
+    at
+}
+
+/// Texels of a texture along an edge of a piece, if that is not more than so many pieces along the edge of a triangle: what is finer
+/// is averaged.
+const TEXELS: f32 = 2.0;
+const MOST_PIECES: u32 = 48;
+/// Pieces of all triangles together, beside one each.
+const MOST_OF_ALL: f64 = 200_000.0;
+/// Points along an edge of a piece over which its radiance is averaged, at most.
+const MOST_POINTS: u32 = 16;
+
+/// Pieces along an edge of a triangle, and points along the edge of a piece. `coarser` than its texture asks for by so much.
+fn pieces(surface: &SurfaceMaterial, vertices: [u32; 3], coarser: f32) -> (u32, u32) {
+    if !surface.emission_varies() {
+        return (1, 1);
+    }
+    let texels = surface.emission_texels(vertices);
+    let pieces = ((texels / (TEXELS * coarser)).ceil() as u32).clamp(1, MOST_PIECES);
+    // Two points for each texel, so that none is left out.
+    let points = ((2.0 * texels / pieces as f32).ceil() as u32).clamp(2, MOST_POINTS);
+    (pieces, points)
+}
+
+/// By how much all have to be coarser than their textures ask for, so that they are not too many.
+fn coarseness(scene: &BakeScene) -> f32 {
+    let lit = scene.triangles.iter().filter(|triangle| !triangle.superseded);
+    let of = |triangle: &SceneTriangle| {
+        let surface = &scene.surfaces[triangle.surface as usize];
+        match surface.material.front.emission == Vec3::ZERO && surface.material.back.is_none() {
+            true => 0.0,
+            false => f64::from(pieces(surface, triangle.vertices, 1.0).0).powi(2) - 1.0,
+        }
+    };
+    (lit.map(of).sum::<f64>() / MOST_OF_ALL).sqrt().max(1.0) as f32
+}
 
 /// All emissive triangles.
 pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
     let mut found = Vec::new();
+    let coarser = coarseness(scene);
     for (index, triangle) in scene.triangles.iter().enumerate().filter(|(_, t)| !t.superseded) {
         let surface = &scene.surfaces[triangle.surface as usize];
         for side in [Side::Front, Side::Back] {
             if side == Side::Back && !triangle.two_sided {
                 continue;
             }
-            let pieces = if surface.emission_varies() { PIECES } else { 1 };
+            let (pieces, points) = pieces(surface, triangle.vertices, coarser);
             for [p, q, r] in cut(pieces) {
-                let middle = [(p.0 + q.0 + r.0) / 3.0, (p.1 + q.1 + r.1) / 3.0];
-                let weights = [1.0 - middle[0] - middle[1], middle[0], middle[1]];
-                let radiance = surface.emission(side, triangle.vertices, weights);
+                let radiance = mean_of_points(points, |(a, b)| {
+                    let u = p.0 + (q.0 - p.0) * a + (r.0 - p.0) * b;
+                    let v = p.1 + (q.1 - p.1) * a + (r.1 - p.1) * b;
+                    surface.emission(side, triangle.vertices, [1.0 - u - v, u, v])
+                });
                 if radiance == Vec3::ZERO {
                     continue;
                 }
@@ -60,6 +138,15 @@ pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
         }
     }
     found
+}
+
+/// Mean over the middles of n² pieces of a triangle, by weights of its second and third corner.
+fn mean_of_points(n: u32, value: impl Fn((f32, f32)) -> Vec3) -> Vec3 {
+    if n == 1 {
+        return value((1.0 / 3.0, 1.0 / 3.0));
+    }
+    let middles = cut(n).into_iter().map(|[p, q, r]| ((p.0 + q.0 + r.0) / 3.0, (p.1 + q.1 + r.1) / 3.0));
+    middles.map(value).sum::<Vec3>() / (n * n) as f32
 }
 
 /// Barycentric corners of the pieces.

@@ -20,7 +20,7 @@ pub(crate) struct Exchange {
     pub patches: Patches,
     /// Direct irradiance of each patch's open part.
     pub direct: Vec<Vec3>,
-    /// Irradiance by bounces of each patch.
+    /// Irradiance by bounces, and by the sky, of each patch.
     pub indirect: Vec<Vec3>,
     /// Standard error of that, with its sign: one sample of how the form factors' noise spreads. Mean of the channels.
     pub indirect_error: Vec<f32>,
@@ -53,10 +53,14 @@ impl Exchange {
         let patches = Patches::new(scene, side);
         report.patches = patches.list.len();
         if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
-            report
-                .skipped
-                .push("form factors, radiosity and final gather: no surface reflects (rho = 0)".into());
-            return Ok(None);
+            let skipped = match sources.has_sky() {
+                true => {
+                    "form factors and radiosity: no surface reflects (rho = 0); the final gather finds the sky"
+                }
+                false => "form factors, radiosity and final gather: no surface reflects (rho = 0)",
+            };
+            report.skipped.push(skipped.into());
+            return Ok(sources.has_sky().then(|| Self::black(scene, patches, side)));
         }
         let (factors, halves) = FormFactors::sample(scene, &patches, effort.form_factor_rays, options.seed);
         report.rays += factors.rays;
@@ -77,21 +81,38 @@ impl Exchange {
         });
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();
-        if direct.iter().zip(&patches.list).all(|(direct, patch)| *direct * patch.reflectance == Vec3::ZERO) {
+        let dark = |(direct, patch): (&Vec3, &Patch)| *direct * patch.reflectance == Vec3::ZERO;
+        if !sources.has_sky() && direct.iter().zip(&patches.list).all(dark) {
             report
                 .skipped
                 .push("radiosity and final gather: no light reaches a surface that reflects".into());
             return Ok(None);
         }
         watch.advance(0.5)?;
-        let indirect = solve(options.solver, &factors, &patches.list, &direct, report);
-        let indirect_error = solution_error(options.solver, &halves, &direct_halves, &patches.list);
+        let sky = |factors: &FormFactors| -> Vec<Vec3> {
+            factors.sky.iter().map(|&share| share * sources.sky).collect()
+        };
+        let sky_halves = halves.each_ref().map(&sky);
+        let sky = sky(&factors);
+        let indirect = solve(options.solver, &factors, &patches.list, &direct, &sky, report);
+        let indirect_error =
+            solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list);
         let leaves = |(index, patch): (usize, &Patch)| {
             (patch.reflectance * (direct[index] + indirect[index])).element_sum()
         };
         let radiosity: Vec<f32> = patches.list.iter().enumerate().map(leaves).collect();
-        let guide = Guide::new(scene, &patches, side, &factors, &radiosity);
+        let guide = Guide::new(scene, &patches, side, &factors, &radiosity, &sky);
         Ok(Some(Self { patches, direct, indirect, indirect_error, near: 2.0 * side, guide }))
+    }
+}
+
+impl Exchange {
+    /// Of surfaces that reflect nothing.
+    fn black(scene: &BakeScene, patches: Patches, side: f32) -> Self {
+        let none = vec![Vec3::ZERO; patches.list.len()];
+        let zeros = vec![0.0; patches.list.len()];
+        let guide = Guide::new(scene, &patches, side, &FormFactors::none(&patches), &zeros, &none);
+        Self { direct: none.clone(), indirect: none, indirect_error: zeros, near: 2.0 * side, patches, guide }
     }
 }
 
@@ -105,7 +126,8 @@ fn patch_direct(
     sequence: Sequence,
 ) -> (Vec3, u32) {
     let patch = &patches.list[index];
-    if open <= 0.0 {
+    // What reflects nothing, a lamp mostly, hands nothing on.
+    if open <= 0.0 || patch.reflectance == Vec3::ZERO {
         return (Vec3::ZERO, 0);
     }
     let triangle = &scene.triangles[patch.triangle as usize];
@@ -127,33 +149,39 @@ fn solution_error(
     solver: Solver,
     halves: &[FormFactors; 2],
     direct: &[Vec<Vec3>; 2],
+    sky: &[Vec<Vec3>; 2],
     patches: &[Patch],
 ) -> Vec<f32> {
     let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
     let reflectance: Vec<f64> = patches.iter().map(|patch| grey(patch.reflectance)).collect();
     let [a, b] = [0, 1].map(|half| {
         let factors = &halves[half];
-        let lit = direct[half].iter().zip(patches);
-        let emission: Vec<f64> = lit.map(|(light, patch)| grey(*light * patch.reflectance)).collect();
-        solver::gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
+        let lit = direct[half].iter().zip(&sky[half]).zip(patches);
+        let emission: Vec<f64> =
+            lit.map(|((light, sky), patch)| grey((*light + *sky) * patch.reflectance)).collect();
+        let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
+        let gathered = solver::gather(factors, &solution.radiosity);
+        gathered.iter().zip(&sky[half]).map(|(light, sky)| light + grey(*sky)).collect::<Vec<f64>>()
     });
     a.iter().zip(&b).map(|(a, b)| (0.5 * (a - b)) as f32).collect()
 }
 
-/// Irradiance by bounces: Σ_j F_ij B_j, with B the solution for the light that direct light has left on the patches.
+/// Irradiance by the sky and by bounces: Σ_j F_ij B_j, with B the solution for what direct light and the sky have left on the patches.
 fn solve(
     solver: Solver,
     factors: &FormFactors,
     patches: &[Patch],
     direct: &[Vec3],
+    sky: &[Vec3],
     report: &mut BakeReport,
 ) -> Vec<Vec3> {
+    let first: Vec<Vec3> = direct.iter().zip(sky).map(|(direct, sky)| *direct + *sky).collect();
     let channels: Vec<(Vec<f64>, u32, f64)> = (0..3)
         .into_par_iter()
         .map(|channel| {
             let reflectance: Vec<f64> = patches.iter().map(|p| f64::from(p.reflectance[channel])).collect();
             let emission: Vec<f64> =
-                direct.iter().zip(&reflectance).map(|(e, &rho)| f64::from(e[channel]) * rho).collect();
+                first.iter().zip(&reflectance).map(|(e, &rho)| f64::from(e[channel]) * rho).collect();
             let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
             let gathered = solver::gather(factors, &solution.radiosity);
             (gathered, solution.iterations, solution.residual)
@@ -166,5 +194,5 @@ fn solve(
     }
     report.residual_bound = report.residual / (1.0 - largest);
     let [red, green, blue] = [0, 1, 2].map(|channel| &channels[channel].0);
-    (0..patches.len()).map(|i| DVec3::new(red[i], green[i], blue[i]).as_vec3()).collect()
+    (0..patches.len()).map(|i| sky[i] + DVec3::new(red[i], green[i], blue[i]).as_vec3()).collect()
 }

@@ -21,6 +21,8 @@ pub(crate) struct FormFactors {
     pub areas: Vec<f32>,
     /// Share of each patch that is in the open, in [0, 1].
     pub open: Vec<f32>,
+    /// Share of the rays from the open that meet nothing, in [0, 1]: the sky's form factor.
+    pub sky: Vec<f32>,
     /// Rays cast.
     pub rays: u64,
     /// Share of all exchange that was cut so that no row exceeds 1.
@@ -44,14 +46,25 @@ impl FormFactors {
             .into_par_iter()
             .map(|index| cast(scene, patches, index as u32, counts[index], seed))
             .collect();
-        let whole =
-            Self::pooled(&cast, patches, &counts, |cast| (cast.whole(), cast.inside[0] + cast.inside[1]));
+        let whole = Self::pooled(&cast, patches, &counts, |cast| {
+            (cast.whole(), [cast.inside[0] + cast.inside[1], cast.missed[0] + cast.missed[1]])
+        });
         let halves = [0, 1].map(|half| {
             // Of an odd number of rays the even ones are one more.
             let counts: Vec<u32> = counts.iter().map(|&count| (count + 1 - half as u32) / 2).collect();
-            Self::pooled(&cast, patches, &counts, |cast| (cast.met[half].clone(), cast.inside[half]))
+            Self::pooled(&cast, patches, &counts, |cast| {
+                (cast.met[half].clone(), [cast.inside[half], cast.missed[half]])
+            })
         });
         (whole, halves)
+    }
+
+    /// Of patches that exchange nothing.
+    pub fn none(patches: &Patches) -> Self {
+        let count = patches.list.len();
+        let areas = patches.list.iter().map(|patch| patch.area).collect();
+        let (open, sky) = (vec![1.0; count], vec![0.0; count]);
+        Self { starts: vec![0; count + 1], areas, open, sky, ..Self::default() }
     }
 
     /// The matrix of some of the rays: of each patch those that `of` picks, `counts` altogether.
@@ -59,13 +72,17 @@ impl FormFactors {
         cast: &[Cast],
         patches: &Patches,
         counts: &[u32],
-        of: impl Fn(&Cast) -> (Vec<(u32, u32)>, u32),
+        of: impl Fn(&Cast) -> (Vec<(u32, u32)>, [u32; 2]),
     ) -> Self {
-        let (hits, inside): (Vec<_>, Vec<u32>) = cast.iter().map(of).unzip();
+        let (hits, others): (Vec<_>, Vec<[u32; 2]>) = cast.iter().map(of).unzip();
+        let (inside, missed): (Vec<u32>, Vec<u32>) = others.into_iter().map(<(u32, u32)>::from).unzip();
         let areas: Vec<f32> = patches.list.iter().map(|patch| patch.area).collect();
         let mut factors = pool(&hits, counts, areas);
         factors.open =
             counts.iter().zip(&inside).map(|(&n, &inside)| (n - inside) as f32 / n.max(1) as f32).collect();
+        let open_rays = counts.iter().zip(&inside).map(|(&n, &inside)| (n - inside).max(1));
+        factors.sky =
+            missed.iter().zip(open_rays).map(|(&missed, open)| missed as f32 / open as f32).collect();
         for (area, open) in factors.areas.iter_mut().zip(&factors.open) {
             // A patch wholly inside exchanges nothing; its area only divides that nothing.
             *area *= open.max(1e-3);
@@ -140,10 +157,11 @@ impl FormFactors {
     }
 }
 
-/// Rays of one patch, the even and the odd ones: how many met each other patch, by index, and how many began inside other geometry.
+/// Rays of one patch, the even and the odd ones: how many met each other patch, by index, began inside other geometry, met nothing.
 struct Cast {
     met: [Vec<(u32, u32)>; 2],
     inside: [u32; 2],
+    missed: [u32; 2],
 }
 
 impl Cast {
@@ -168,7 +186,7 @@ fn cast(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32)
     let [p, q, r] = patches.corners(scene, patch);
     let sequence = Sequence::new(seed, 1, index);
     let mut met = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
-    let mut inside = [0; 2];
+    let (mut inside, mut missed) = ([0; 2], [0; 2]);
     for ray in 0..count {
         let half = ray as usize % 2;
         let [a, b, c, d] = sequence.point(ray, 0);
@@ -180,10 +198,11 @@ fn cast(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32)
                 met[half].extend(patches.at(triangle, side, at).filter(|&other| other != index));
             }
             SurfaceHit::Inside => inside[half] += 1,
-            SurfaceHit::Back | SurfaceHit::None => {}
+            SurfaceHit::None => missed[half] += 1,
+            SurfaceHit::Back => {}
         }
     }
-    Cast { met: met.map(counted), inside }
+    Cast { met: met.map(counted), inside, missed }
 }
 
 /// How often each number occurs, in order.

@@ -2,6 +2,8 @@
 //! (Ureña and Torres, "Improved Irradiance Computation by Importance Sampling", 1997). By regions of several patches: few rays
 //! tell each patch's part of the light badly, and many a patch that gives light is met by none. Not the gather.
 
+use glam::Vec3;
+
 use super::form_factors::FormFactors;
 use super::patches::Patches;
 use crate::scene::BakeScene;
@@ -12,19 +14,27 @@ pub(crate) struct Guide {
     /// Cut as patches are, but larger.
     pub regions: Patches,
     rows: Rows,
+    /// For each region, the share of the samples that it places.
+    shares: Vec<f32>,
 }
+
+/// Share of the samples that the guide places, at most; where the sky shines, which it does not know, fewer, in steps of one in
+/// so many: so that the others are as many as their weight says.
+const GUIDED: f32 = 0.4;
+const STEPS: f32 = 8.0;
 
 /// Patches along a region's side.
 const REGION: f32 = 4.0;
 
 impl Guide {
-    /// From the patches (of `side` canonical units), their exchange and what leaves each of them (any unit).
+    /// From the patches (of `side` canonical units), their exchange, what leaves each of them and what the sky brings it (W/m²).
     pub fn new(
         scene: &BakeScene,
         patches: &Patches,
         side: f32,
         factors: &FormFactors,
         radiosity: &[f32],
+        sky: &[Vec3],
     ) -> Self {
         let regions = Patches::new(scene, REGION * side);
         let region_of: Vec<u32> = patches
@@ -44,6 +54,7 @@ impl Guide {
         }
         let mut rows = Rows::default();
         let mut exchange = vec![0.0f64; regions.list.len()];
+        let mut shares = Vec::with_capacity(regions.list.len());
         for members in members {
             let mut touched: Vec<u32> = Vec::new();
             for (other, g) in members.iter().flat_map(|&member| factors.row(member as usize)) {
@@ -54,17 +65,34 @@ impl Guide {
                 exchange[region] += g;
             }
             touched.sort_unstable();
-            rows.push(touched.iter().map(|&region| {
-                let g = std::mem::take(&mut exchange[region as usize]);
-                (region, g * bright[region as usize])
-            }));
+            let flux: Vec<(u32, f64)> = touched
+                .iter()
+                .map(|&region| {
+                    let g = std::mem::take(&mut exchange[region as usize]);
+                    (region, g * bright[region as usize])
+                })
+                .collect();
+            let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
+            let of_sky = |&member: &u32| {
+                f64::from(factors.areas[member as usize] * sky[member as usize].element_sum())
+            };
+            let by_sky: f64 = members.iter().map(of_sky).sum();
+            let share = by_bounces / (by_bounces + by_sky);
+            let share = if share.is_finite() { (GUIDED * STEPS * share as f32).round() / STEPS } else { 0.0 };
+            rows.push(flux.into_iter().filter(|_| share > 0.0));
+            shares.push(share);
         }
-        Self { regions, rows }
+        Self { regions, rows, shares }
     }
 
     /// Whether the solution knows of light by bounces that arrives at a region.
     pub fn knows(&self, region: u32) -> bool {
         self.rows.knows(region)
+    }
+
+    /// The share of the samples at a region that it places, in [0, 1).
+    pub fn share(&self, region: u32) -> f32 {
+        self.shares[region as usize]
     }
 
     /// Of those that light `region`, the one at `u` in [0, 1); the place within its interval, stretched to [0, 1); its probability.

@@ -4,6 +4,7 @@
 #[cfg(test)]
 mod contour;
 pub(crate) mod direct;
+pub(crate) mod emitter_tree;
 pub(crate) mod emitters;
 pub(crate) mod exchange;
 #[cfg(test)]
@@ -12,4 +13,5 @@ pub(crate) mod form_factors;
 pub(crate) mod guide;
 pub(crate) mod patches;
 pub(crate) mod polygon;
+pub(crate) mod punctual;
 pub(crate) mod solver;

@@ -84,6 +84,8 @@ fn phong(light: &Light, khr_spot: Option<SpotCone>) -> PhongLight {
             }
             .to_owned(),
         ),
+        radius: (light.radius != 0.0).then_some(f64::from(light.radius)),
+        angle: (light.angle != 0.0).then_some(f64::from(light.angle)),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Scene settings and cameras into JSON.
 
 use bevy_ecs::prelude::*;
+use glam::Vec3;
 use lumbre_optics::{FlatRule, FogMode};
 use serde_json::{Value, json};
 
@@ -16,8 +17,8 @@ pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
     else {
         return Ok(None);
     };
-    if !(settings.ambient.is_finite() && settings.background.is_finite()) {
-        let (place, field) = ("scene".to_owned(), "ambient or background".to_owned());
+    if ![settings.ambient, settings.background, settings.sky].iter().all(|color| color.is_finite()) {
+        let (place, field) = ("scene".to_owned(), "ambient, background or sky".to_owned());
         return Err(SaveError::NotFinite { place, field });
     }
     let fog = match &settings.fog {
@@ -52,6 +53,7 @@ pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
     let written = SceneExtension {
         ambient: Some(color(settings.ambient)),
         background: Some(color(settings.background)),
+        sky: (settings.sky != Vec3::ZERO).then(|| color(settings.sky)),
         local_viewer: Some(settings.local_viewer),
         two_sided: Some(settings.two_sided),
         reflection: Some(settings.reflection.name().to_owned()),

@@ -71,6 +71,12 @@ pub(crate) struct PhongLight {
     pub shadow: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bake: Option<String>,
+    /// Metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+    /// Radians.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
 }
 
 /// OpenGL's cone, or with `inner` and `outer` the one of KHR_lights_punctual (for a directional light, which has no cone there).
@@ -94,6 +100,8 @@ pub(crate) struct SceneExtension {
     pub ambient: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub background: Option<Color>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub local_viewer: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -49,6 +49,7 @@ pub(crate) fn light(source: &PunctualLight, place: &str) -> Result<Light, LoadPr
         if let Some(spot) = &phong.spot {
             light.spot = Some(cone(spot, source.spot.as_ref()));
         }
+        (light.radius, light.angle) = (number(phong.radius, 0.0), number(phong.angle, 0.0));
         light.enabled = phong.enabled.unwrap_or(true);
         light.shadow = phong.shadow.unwrap_or(false);
         light.bake = match phong.bake.as_deref() {

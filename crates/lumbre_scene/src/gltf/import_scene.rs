@@ -22,6 +22,7 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     for (field, source, target) in [
         ("ambient", found.ambient, &mut settings.ambient),
         ("background", found.background, &mut settings.background),
+        ("sky", found.sky, &mut settings.sky),
     ] {
         let value = source.map_or(*target, color);
         if !value.is_finite() || value.min_element() < 0.0 {

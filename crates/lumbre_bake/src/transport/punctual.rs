@@ -1,0 +1,281 @@
+//! Direct light of point, spot and directional lights by shadow rays. A light with a size is a sphere, or a disc on the sky,
+//! of one radiance; its law of distance and its cone are those of its centre. Not emissive surfaces: those are `direct`.
+
+use std::f64::consts::PI;
+
+use lumbre_optics::{BakeMode, LightKind, evaluate_light};
+
+use super::direct::{Direct, GROUPS, Receiver, Sources, allotted, group_of, variance_of_mean};
+use crate::sampling::{Sequence, cosine_direction, frame};
+use crate::scene::{BakeScene, PlacedLight};
+
+/// Up to this many lights at a receiver have samples of their own: the brightest. The others share.
+const OWN: usize = 16;
+
+/// Numbers of the lights as sources begin here: before it are parts of emissive surfaces.
+const FIRST_ID: u32 = 1 << 31;
+
+/// Inside the sphere, or near it, its disc is at most this large: a sine. It bounds what one sample weighs to 1/√(1 - this²) = 7.
+const LARGEST_SINE: f64 = 0.99;
+
+/// One light as one sample meets it, per unit of its colour: irradiance.
+struct Part {
+    /// Of the light's centre, where the receiver faces it.
+    center: f32,
+    /// Of a point of its disc; not above 0 where that is under the receiver's horizon.
+    disc: f32,
+    visible: bool,
+}
+
+/// A light at a receiver, by all its samples.
+#[derive(Default)]
+struct Sum {
+    center: [f32; GROUPS],
+    disc: [f32; GROUPS],
+    seen: [f32; GROUPS],
+    visible: u32,
+    hidden: u32,
+    /// Some of the disc is under the horizon.
+    sets: bool,
+}
+
+impl Sum {
+    fn add(&mut self, part: &Part, group: usize) {
+        self.center[group] += part.center;
+        self.disc[group] += part.disc;
+        self.sets |= part.disc <= 0.0;
+        if part.visible {
+            self.visible += 1;
+            self.seen[group] += part.disc;
+        } else {
+            self.hidden += 1;
+        }
+    }
+
+    /// Mean irradiance per unit of colour, and its variance: the light of the centre times the seen share of the disc, which is
+    /// exact in full light and in full shadow; the seen disc's own mean where the horizon cuts it.
+    fn mean(&self, samples: u32) -> (f32, f32) {
+        let samples = samples.max(1) as f32;
+        let per_group = GROUPS as f32 / samples;
+        let total = |sums: &[f32; GROUPS]| sums.iter().sum::<f32>();
+        let all = total(&self.disc);
+        if self.sets || all <= 0.0 {
+            return (total(&self.seen) / samples, variance_of_mean(self.seen.map(|sum| sum * per_group)));
+        }
+        let (center, share) = (total(&self.center) / samples, total(&self.seen) / all);
+        let of_group = |group: usize| match self.disc[group] > 0.0 {
+            true => self.seen[group] / self.disc[group],
+            false => share,
+        };
+        let shares = std::array::from_fn(of_group);
+        let uneven = variance_of_mean(self.center.map(|sum| sum * per_group));
+        (center * share, center * center * variance_of_mean(shares) + share * share * uneven)
+    }
+}
+
+impl Sources<'_> {
+    /// Adds the light of all punctual lights to `direct`: mean over a receiver, by about `samples` shadow rays to each of the
+    /// brightest and as many to the others together.
+    pub(super) fn punctual(
+        &self,
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) {
+        if self.lights.len() <= OWN {
+            for index in 0..self.lights.len() {
+                self.one(index, sequence, samples, point, direct);
+            }
+            return;
+        }
+        let Some(mut lights) = self.brightness(point) else { return };
+        if lights.len() > OWN {
+            lights.select_nth_unstable_by(OWN, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        }
+        let others = lights.split_off(OWN.min(lights.len()));
+        let most = lights.iter().map(|(_, weight)| *weight).fold(f32::MIN_POSITIVE, f32::max);
+        lights.sort_unstable_by_key(|(index, _)| *index);
+        for (index, weight) in lights {
+            self.one(index as usize, sequence, allotted(samples, weight / most), point, direct);
+        }
+        self.others(others, sequence, samples, point, direct);
+    }
+
+    fn one(
+        &self,
+        index: usize,
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) {
+        let light = &self.lights[index];
+        let mut sum = Sum::default();
+        for sample in 0..samples {
+            let [x, y, u, v] = sequence.point(sample, 1 + index as u32 % 32);
+            let Some(receiver) = point(x, y) else { continue };
+            if let Some(part) = part(self.scene, light, &receiver, u, v) {
+                sum.add(&part, group_of(sample, samples));
+            }
+        }
+        direct.rays += sum.visible + sum.hidden;
+        direct.seen.add(FIRST_ID + index as u32, sum.visible, sum.hidden);
+        let (mean, variance) = sum.mean(samples);
+        let color = light.light.diffuse;
+        match light.light.bake {
+            BakeMode::Static => {
+                direct.baked += color * mean;
+                direct.variance += (color.element_sum() / 3.0).powi(2) * variance;
+            }
+            BakeMode::Mixed | BakeMode::Dynamic => direct.mixed += color * mean,
+        }
+    }
+
+    /// Lights with their weights, each sample to one of them.
+    fn others(
+        &self,
+        mut lights: Vec<(u32, f32)>,
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) {
+        if lights.is_empty() {
+            return;
+        }
+        lights.sort_unstable_by_key(|(index, _)| *index);
+        let sum: f64 = lights.iter().map(|(_, weight)| f64::from(*weight)).sum();
+        let mut running = 0.0;
+        let ends: Vec<f32> = lights
+            .iter()
+            .map(|(_, weight)| {
+                running += f64::from(*weight);
+                (running / sum) as f32
+            })
+            .collect();
+        let (mut visible, mut hidden) = (0, 0);
+        let mut groups = [0.0f32; GROUPS];
+        let per_sample = 1.0 / samples.max(1) as f32;
+        for sample in 0..samples {
+            let [x, y, u, v] = sequence.point(sample, 33);
+            let Some(receiver) = point(x, y) else { continue };
+            let at = ends.partition_point(|&end| end <= u).min(ends.len() - 1);
+            let start = if at == 0 { 0.0 } else { ends[at - 1] };
+            let probability = (ends[at] - start).max(f32::MIN_POSITIVE);
+            let u = ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON);
+            let light = &self.lights[lights[at].0 as usize];
+            let Some(part) = part(self.scene, light, &receiver, u, v) else { continue };
+            if !part.visible {
+                hidden += 1;
+                continue;
+            }
+            visible += 1;
+            let seen = light.light.diffuse * (part.disc / probability);
+            match light.light.bake {
+                BakeMode::Static => {
+                    direct.baked += seen * per_sample;
+                    groups[group_of(sample, samples)] += seen.element_sum() / 3.0;
+                }
+                BakeMode::Mixed | BakeMode::Dynamic => direct.mixed += seen * per_sample,
+            }
+        }
+        direct.rays += visible + hidden;
+        // Which lights these are differs from receiver to receiver: only a part tells of a shadow.
+        direct.seen.add(FIRST_ID - 1, visible, hidden);
+        direct.variance += variance_of_mean(groups.map(|sum| sum * per_sample * GROUPS as f32));
+    }
+
+    /// The lights that may reach a receiver, by number, each with about what it brings: never 0 where any of its points gets light.
+    fn brightness(&self, point: &impl Fn(f32, f32) -> Option<Receiver>) -> Option<Vec<(u32, f32)>> {
+        let anchor = point(0.5, 0.5)?;
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let reach = corners.iter().filter_map(|&(x, y)| point(x, y));
+        // Twice, since a footprint of points may not have its farthest in the corners.
+        let size = 2.0 * reach.map(|p| p.position.distance(anchor.position)).fold(0.0, f32::max);
+        let space = self.scene.space;
+        let (position, size) = (space.world(anchor.position), f64::from(size) / space.scale);
+        let normal = anchor.normal.as_dvec3();
+        let weight = |(index, placed): (usize, &PlacedLight)| {
+            let light = &placed.light;
+            let away = if light.kind == LightKind::Directional {
+                0.0
+            } else {
+                let away = placed.position.distance(position);
+                if away - size > f64::from(light.attenuation.range) {
+                    return None;
+                }
+                away
+            };
+            let arriving = evaluate_light(light, placed.position, placed.axis, position);
+            let attenuation = match light.kind {
+                LightKind::Directional => 1.0,
+                _ => light.attenuation.factor((away - size).max(0.25 * away)),
+            };
+            // Raised by what the receiver and the light subtend, and above 0 everywhere.
+            let spread = if away > 0.0 { (size + f64::from(light.radius)) / away } else { 0.0 };
+            let cosine = (arriving.direction.dot(normal) + spread).clamp(0.02, 1.0);
+            let strength = attenuation * arriving.spot.max(0.02) * cosine;
+            let weight = f64::from(light.diffuse.element_sum()) * strength;
+            (weight > 0.0 && weight.is_finite()).then_some((index as u32, weight as f32))
+        };
+        Some(self.lights.iter().enumerate().filter_map(weight).collect())
+    }
+}
+
+/// What a point of a receiver gets of a light whose disc is sampled at (u, v) of the unit square; `None` where it gets nothing
+/// whatever lies between.
+///
+/// The disc is that of directions within the sphere's silhouette, sin θ = radius / distance, sampled evenly in its projection onto
+/// the plane across the axis to its centre. With ω the direction, E = strength · ⟨V n·ω / a·ω⟩: a sphere of one radiance gives
+/// exactly n·a where it is whole above the horizon, as a point does.
+fn part(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver, u: f32, v: f32) -> Option<Part> {
+    let light = &placed.light;
+    let position = scene.space.world(receiver.position);
+    let arriving = evaluate_light(light, placed.position, placed.axis, position);
+    let strength = PI * arriving.attenuation * arriving.spot;
+    if strength <= 0.0 {
+        return None;
+    }
+    let axis = arriving.direction;
+    let directional = light.kind == LightKind::Directional;
+    let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
+    let sine =
+        if directional { (0.5 * f64::from(light.angle)).sin() } else { f64::from(light.radius) / distance };
+    let sine = if sine > 0.0 { sine.min(LARGEST_SINE) } else { 0.0 };
+    let (normal, facet) = (receiver.normal.as_dvec3(), receiver.geometric_normal.as_dvec3());
+    let cosine = axis.dot(normal);
+    if cosine <= -sine || axis.dot(facet) <= -sine {
+        return None;
+    }
+    let mut direction = axis;
+    let mut along = 1.0;
+    if sine > 0.0 {
+        let [x, y] = frame(axis.as_vec3()).map(|side| side.as_dvec3());
+        let disc = cosine_direction(u, v).as_dvec3() * sine;
+        along = (1.0 - disc.x * disc.x - disc.y * disc.y).max(0.0).sqrt();
+        // `frame` is orthonormal to f32: what is left of the axis in it is taken out.
+        let across = x * disc.x + y * disc.y;
+        direction = (axis * along + (across - axis * across.dot(axis))).normalize_or(axis);
+    }
+    let weight = direction.dot(normal) / along;
+    let center = (strength * cosine.max(0.0)) as f32;
+    let disc = (strength * weight) as f32;
+    if !disc.is_finite() || !center.is_finite() {
+        return None;
+    }
+    if weight <= 0.0 || direction.dot(facet) <= 0.0 {
+        return Some(Part { center, disc: disc.min(0.0), visible: false });
+    }
+    let blocked = if directional {
+        scene.blocked_towards(receiver.origin, direction.as_vec3())
+    } else {
+        // Up to where the sphere begins: what is inside it, its bulb, hides nothing.
+        let across = direction.cross(axis).length() * distance;
+        let depth = (f64::from(light.radius).powi(2) - across * across).max(0.0).sqrt();
+        let reach = (distance * direction.dot(axis) - depth).max(0.0);
+        let target = if sine > 0.0 { position + direction * reach } else { placed.position };
+        scene.blocked(receiver.origin, scene.space.position(target))
+    };
+    Some(Part { center, disc, visible: !blocked })
+}

@@ -1,0 +1,235 @@
+//! Emissive surfaces that are hard to sample: tiny, far brighter than others, of many triangles, textured. Each against a closed
+//! form or a sum of its own.
+
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec2, Vec3};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_mesh::{TriangleMesh, shapes};
+use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_scene::{Image, MaterialTextures, Mesh, Sampler, StaticObject, TextureReference, Transform, Wrap};
+
+mod common;
+
+fn run(world: &mut World, side: u32) -> BakeReport {
+    let options =
+        BakeOptions { density: Density::MapSize(side), quality: Quality::Final, ..BakeOptions::default() };
+    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+}
+
+fn matt(reflectance: f32, emission: f32) -> Material {
+    let front =
+        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
+    Material { front, ..Material::default() }
+}
+
+/// A horizontal square of a side about a place, looking up or down.
+fn square(middle: Vec3, side: f32, up: bool) -> TriangleMesh {
+    let h = 0.5 * side;
+    let corners = [[-h, -h], [-h, h], [h, h], [h, -h]];
+    TriangleMesh {
+        positions: corners.map(|[x, z]| middle + Vec3::new(x, 0.0, z)).to_vec(),
+        uv0: [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]].map(Vec2::from).to_vec(),
+        indices: if up { vec![0, 1, 2, 0, 2, 3] } else { vec![0, 2, 1, 0, 3, 2] },
+        ..TriangleMesh::default()
+    }
+}
+
+fn spawn(world: &mut World, mesh: TriangleMesh, material: Material) {
+    world.spawn((Mesh(Arc::new(mesh)), material, StaticObject));
+}
+
+/// Points of the floor y = 0 about x = `middle`, with what they should receive.
+fn points(middle: f64, value: impl Fn(DVec3) -> f64) -> Vec<common::ReferencePoint> {
+    let point = |i: i32| {
+        let position = DVec3::new(
+            middle + 0.1 * f64::from(i % 13 - 6) + 0.013,
+            0.0,
+            0.1 * f64::from(i / 13 - 6) + 0.021,
+        );
+        common::ReferencePoint { position, normal: DVec3::Y, irradiance: DVec3::splat(value(position)) }
+    };
+    (0..169).map(point).collect()
+}
+
+/// Form factor from an element below to a square of a side in a parallel plane at a height, by its four corners
+/// (the element lies under the point (x, z) measured from the square's middle).
+fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
+    let corner = |a: f64, b: f64| {
+        let (a, b) = (a / height, b / height);
+        let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * PI)
+    };
+    let h = 0.5 * side;
+    corner(h - x, h - z) + corner(h + x, h - z) + corner(h - x, h + z) + corner(h + x, h + z)
+}
+
+#[test]
+fn a_tiny_bright_emitter() {
+    // A millimetre across, a million times as bright as a lamp of a metre: E = L A cos⁴ θ / h², the rest of its size being 10⁻⁶.
+    let (side, radiance, height) = (1e-3f32, 1e6f32, 1.0f32);
+    let mut world = World::new();
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.5, 0.0));
+    spawn(&mut world, square(Vec3::new(0.0, height, 0.0), side, false), matt(0.0, radiance));
+    run(&mut world, 64);
+    let power = f64::from(radiance) * f64::from(side).powi(2);
+    let found = common::compare(&mut world, &points(0.0, |p| power / (1.0 + p.x * p.x + p.z * p.z).powi(2)));
+    println!("{found}");
+    // Interpolated between texels of 1/40 m: h²/8 |E''| is 0.03 %.
+    assert!(found.missed == 0 && found.rmse < 0.002, "{found}");
+}
+
+#[test]
+fn no_fireflies_of_a_tiny_emitter() {
+    // The same power from a millimetre and from two centimetres, in a room with bounces: all texels agree as far as both bakes state.
+    let [mut tiny, mut small] = [1e-3f32, 2e-2].map(|side| {
+        let mut world = World::new();
+        let mut room = shapes::cuboid(Vec3::new(3.0, 2.0, 2.0), 1);
+        room.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
+        room.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        spawn(&mut world, room, matt(0.7, 0.0));
+        spawn(&mut world, square(Vec3::new(0.4, 0.5, 0.1), side, false), matt(0.0, 1.0 / (side * side)));
+        world
+    });
+    let [a, b] = [&mut tiny, &mut small].map(|world| run(world, 48));
+    let texels = |world: &mut World| -> Vec<f64> {
+        let maps = common::maps(world);
+        let room = maps.iter().max_by_key(|(_, map)| map.texels.len()).map(|(_, map)| map.clone()).unwrap();
+        room.texels.iter().map(|texel| f64::from(texel.x) * PI).collect()
+    };
+    let (tiny, small) = (texels(&mut tiny), texels(&mut small));
+    let lit = small.iter().filter(|e| **e > 0.0).count() as f64;
+    let mean = small.iter().sum::<f64>() / lit;
+    let squares = tiny.iter().zip(&small).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let rmse = (squares / lit).sqrt() / mean;
+    let worst = tiny.iter().zip(&small).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / mean;
+    println!("RMSE {rmse:.4}, worst {worst:.4}, stated {:.4} {:.4}", a.estimated_error, b.estimated_error);
+    assert!(rmse < 2.0 * a.estimated_error.hypot(b.estimated_error), "{rmse}");
+    // Six standard deviations of the whole: no texel stands out.
+    assert!(worst < 12.0 * a.estimated_error.hypot(b.estimated_error), "{worst}");
+}
+
+#[test]
+fn light_ratios_of_a_hundred_million() {
+    // Two lamps, one 10⁸ times as bright as the other, on two sides of a wall that hides each from the other's floor: beside the dim
+    // one the irradiance is its own, as Lambert has it; beside the bright one 10⁸ times that.
+    let floor = |x: f32| square(Vec3::new(x, 0.0, 0.0), 1.6, true);
+    let mut world = World::new();
+    for (x, radiance) in [(-1.0, 1.0f32), (1.0, 1e8)] {
+        spawn(&mut world, floor(x), matt(0.0, 0.0));
+        spawn(&mut world, square(Vec3::new(x, 0.8, 0.0), 0.5, false), matt(0.0, radiance));
+    }
+    let mut wall = square(Vec3::ZERO, 4.0, true);
+    wall.positions.iter_mut().for_each(|p| *p = Vec3::new(0.0, p.x, p.z));
+    spawn(&mut world, wall, Material { double_sided: true, ..matt(0.0, 0.0) });
+    run(&mut world, 64);
+    for (x, radiance) in [(-1.0, 1.0), (1.0, 1e8)] {
+        let value = |p: DVec3| PI * radiance * to_square(p.x - x, p.z, 0.5, 0.8);
+        let found = common::compare(&mut world, &points(x, value));
+        println!("{radiance:e}: {found}");
+        assert!(found.missed == 0 && found.rmse < 0.002, "{found}");
+    }
+}
+
+#[test]
+fn bright_and_dim_lights_side_by_side() {
+    // 20 point lights, each a tenth of the one before, under a plate that hides all but the dimmest and the sum of the others:
+    // more than have samples of their own.
+    let mut world = World::new();
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    let strengths: Vec<f32> = (0..20).map(|i| 0.4f32.powi(i)).collect();
+    for (i, &strength) in strengths.iter().enumerate() {
+        let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(strength)) };
+        world.spawn((light, Transform::from_xyz(0.05 * i as f64 - 0.5, 1.0, 0.0)));
+    }
+    run(&mut world, 64);
+    let value = |p: DVec3| {
+        let light = |(i, &strength): (usize, &f32)| {
+            let x = 0.05 * i as f64 - 0.5 - p.x;
+            PI * f64::from(strength) / (1.0 + x * x + p.z * p.z).powf(1.5)
+        };
+        strengths.iter().enumerate().map(light).sum()
+    };
+    let found = common::compare(&mut world, &points(0.0, value));
+    println!("{found}");
+    assert!(found.missed == 0 && found.rmse < 0.002, "{found}");
+}
+
+#[test]
+fn a_lamp_of_ten_thousand_triangles() {
+    // A sphere of one radiance sends E = π L (r/d)² cos θ wherever it is whole above the horizon.
+    let (radius, height, radiance) = (0.15f32, 1.0f32, 10.0f32);
+    let mut world = World::new();
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    let mut ball = shapes::uv_sphere(radius, 100, 51);
+    ball.positions.iter_mut().for_each(|p| p.y += height);
+    spawn(&mut world, ball, matt(0.0, radiance));
+    let report = run(&mut world, 64);
+    let value = |p: DVec3| {
+        let d = p.x.hypot(p.z).hypot(f64::from(height));
+        PI * f64::from(radiance) * f64::from(radius / height).powi(2) * (f64::from(height) / d).powi(3)
+    };
+    let found = common::compare(&mut world, &points(0.0, value));
+    println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
+    // The half per cent of far parts in one term, and of the polyhedron's silhouette 0.2 %.
+    assert!(found.missed == 0 && found.rmse < 0.007, "{found}");
+}
+
+#[test]
+fn emission_that_varies_by_texture() {
+    // A picture of 24 x 24 texels, black and white in stripes and spots, a fifth of its width above the floor, against a sum over
+    // a fine grid with a bilinear look-up of its own.
+    const N: usize = 24;
+    let bright =
+        |x: usize, y: usize| x.is_multiple_of(5) || (x * 7 + y * 3).is_multiple_of(11) || x > 17 && y > 11;
+    let rgba =
+        (0..N * N).flat_map(|i| [[0, 0, 0, 255u8], [255; 4]][usize::from(bright(i % N, i / N))]).collect();
+    let image = Arc::new(Image { name: "stripes".into(), width: N as u32, height: N as u32, rgba });
+    let sampler = Sampler { wrap_u: Wrap::ClampToEdge, wrap_v: Wrap::ClampToEdge, ..Sampler::default() };
+    let texture = TextureReference {
+        image,
+        sampler,
+        tex_coord: 0,
+        offset: Vec2::ZERO,
+        rotation: 0.0,
+        scale: Vec2::ONE,
+    };
+    let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
+    let (side, height) = (1.0f64, 0.2f64);
+    let mut world = World::new();
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    let lamp = Mesh(Arc::new(square(Vec3::new(0.0, height as f32, 0.0), side as f32, false)));
+    world.spawn((lamp, matt(0.0, 1.0), textures, StaticObject));
+    let report = run(&mut world, 96);
+    let look_up = |u: f64, v: f64| {
+        let (x, y) = (u * N as f64 - 0.5, v * N as f64 - 0.5);
+        let read = |x: f64, y: f64| {
+            let index = |c: f64| c.clamp(0.0, N as f64 - 1.0) as usize;
+            f64::from(u8::from(bright(index(x), index(y))))
+        };
+        let (i, j, f, g) = (x.floor(), y.floor(), x - x.floor(), y - y.floor());
+        (read(i, j) * (1.0 - f) + read(i + 1.0, j) * f) * (1.0 - g)
+            + (read(i, j + 1.0) * (1.0 - f) + read(i + 1.0, j + 1.0) * f) * g
+    };
+    let fine = 240;
+    let value = |p: DVec3| {
+        let mut sum = 0.0;
+        for i in 0..fine * fine {
+            let (u, v) = (
+                (f64::from(i % fine) + 0.5) / f64::from(fine),
+                (f64::from(i / fine) + 0.5) / f64::from(fine),
+            );
+            let (x, z) = ((u - 0.5) * side - p.x, (v - 0.5) * side - p.z);
+            let squared = x * x + z * z + height * height;
+            sum += look_up(u, v) * height * height / (squared * squared);
+        }
+        sum * side * side / f64::from(fine * fine)
+    };
+    let found = common::compare(&mut world, &points(0.0, value));
+    println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
+    // Pieces of two texels of one radiance each, a fifth of the picture away, and far pieces in one term.
+    assert!(found.missed == 0 && found.rmse < 0.006, "{found}");
+}

@@ -1,0 +1,179 @@
+//! Light of the sky: scenes whose irradiance is known in closed form.
+
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_mesh::{TriangleMesh, shapes};
+use lumbre_optics::{Material, Surface};
+use lumbre_scene::{Mesh, SceneSettings, StaticObject};
+
+mod common;
+
+const SKY: Vec3 = Vec3::new(0.5, 1.0, 2.0);
+
+fn options(side: u32, quality: Quality) -> BakeOptions {
+    BakeOptions { density: Density::MapSize(side), quality, ..BakeOptions::default() }
+}
+
+fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
+    world.insert_resource(SceneSettings { sky: SKY, ..SceneSettings::default() });
+    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+}
+
+fn matt(reflectance: f32, emission: Vec3) -> Material {
+    Material {
+        front: Surface { diffuse: Vec3::splat(reflectance), emission, ..Surface::default() },
+        ..Material::default()
+    }
+}
+
+/// A flat quadrilateral, seen from where its corners run counter-clockwise.
+fn quad(corners: [[f32; 3]; 4]) -> Mesh {
+    Mesh(Arc::new(TriangleMesh {
+        positions: corners.map(Vec3::from).to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..TriangleMesh::default()
+    }))
+}
+
+fn floor(half: f32) -> Mesh {
+    quad([[-half, 0.0, -half], [-half, 0.0, half], [half, 0.0, half], [half, 0.0, -half]])
+}
+
+/// Irradiance of every covered texel.
+fn irradiances(world: &mut World) -> Vec<DVec3> {
+    let maps = common::maps(world);
+    let all = maps.iter().flat_map(|(_, map)| map.texels.iter().map(|texel| texel.as_dvec3() * PI));
+    all.filter(|e| e.element_sum() > 0.0).collect()
+}
+
+#[test]
+fn what_sees_only_the_sky_has_pi_times_its_radiance() {
+    for reflectance in [0.0, 0.8] {
+        for mesh in [floor(1.0), Mesh(Arc::new(shapes::cuboid(Vec3::new(1.0, 2.0, 3.0), 1)))] {
+            let mut world = World::new();
+            world.spawn((mesh, matt(reflectance, Vec3::ZERO), StaticObject));
+            let report = run(&mut world, &options(24, Quality::Draft));
+            assert!(report.error_reached && report.estimated_error < 1e-6, "{report}");
+            assert_eq!(report.skipped.iter().any(|line| line.contains("finds the sky")), reflectance == 0.0);
+            let found = irradiances(&mut world);
+            assert!(found.len() > 100);
+            for e in found {
+                // Nothing is sampled that varies: what is left is the rounding of sums in f32.
+                assert!((e / (PI * SKY.as_dvec3()) - 1.0).abs().max_element() < 1e-5, "{e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_floor_before_a_wall() {
+    // A black wall of height h and half length a, at distance c from an element of the floor, hides of the sky what
+    // F = 1/π (atan(a/c) - c/√(c²+h²) atan(a/√(c²+h²))) is (two perpendicular rectangles as an element sees them).
+    let (height, half) = (1.5, 2.0);
+    let wall = quad([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [0.0, 1.5, -2.0], [0.0, 1.5, 2.0]]);
+    let mut world = World::new();
+    world.spawn((
+        quad([[0.0, 0.0, -2.0], [0.0, 0.0, 2.0], [2.0, 0.0, 2.0], [2.0, 0.0, -2.0]]),
+        matt(0.5, Vec3::ZERO),
+        StaticObject,
+    ));
+    let mut back = matt(0.0, Vec3::ZERO);
+    back.double_sided = true;
+    world.spawn((wall, back, StaticObject));
+    let report = run(&mut world, &options(64, Quality::Final));
+    let points: Vec<_> = (1..18)
+        .map(|i| {
+            let c = 0.1 * f64::from(i);
+            let far = c.hypot(height);
+            let hidden = ((half / c).atan() - c / far * (half / far).atan()) / PI;
+            let irradiance = PI * SKY.as_dvec3() * (1.0 - hidden);
+            common::ReferencePoint { position: DVec3::new(c, 0.0, 0.0), normal: DVec3::Y, irradiance }
+        })
+        .collect();
+    let found = common::compare(&mut world, &points);
+    println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
+    // The error asked for.
+    assert!(found.missed == 0 && found.rmse < 0.01 && found.rmse < 2.0 * report.estimated_error, "{found}");
+    assert!(found.bias.abs() < 0.005, "{found}");
+}
+
+#[test]
+fn the_floor_of_a_trench() {
+    // Between two walls without end, of height h and width w apart, black: at x from the middle the floor sees the sky between two
+    // angles from the vertical, E = π L (sin β + sin γ)/2 with tan β = (w/2 - x)/h and tan γ = (w/2 + x)/h.
+    // Walls of 100 h on either side leave out of the hidden part less than (h/100h)² of it.
+    let (h, w, long) = (1.0, 2.0, 100.0);
+    let mut world = World::new();
+    // Only the middle of the floor: the rest would take the map.
+    world.spawn((floor(1.0), matt(0.9, Vec3::ZERO), StaticObject));
+    for x in [-1.0, 1.0f32] {
+        let z = 100.0 * x;
+        let wall = quad([[x, 0.0, z], [x, 0.0, -z], [x, 1.0, -z], [x, 1.0, z]]);
+        let mut black = matt(0.0, Vec3::ZERO);
+        black.double_sided = true;
+        world.spawn((wall, black, StaticObject));
+    }
+    let report = run(&mut world, &options(64, Quality::Final));
+    let points: Vec<_> = (0..9)
+        .map(|i| {
+            let x = 0.2 * f64::from(i) - 0.8;
+            let sine = |opposite: f64| opposite / opposite.hypot(h);
+            let seen = 0.5 * (sine(w / 2.0 - x) + sine(w / 2.0 + x));
+            let irradiance = PI * SKY.as_dvec3() * seen;
+            common::ReferencePoint { position: DVec3::new(x, 0.0, 0.0), normal: DVec3::Y, irradiance }
+        })
+        .collect();
+    let found = common::compare(&mut world, &points);
+    println!("{found}; stated {:.3} %; walls reach {long}", 100.0 * report.estimated_error);
+    assert!(found.missed == 0 && found.rmse < 0.01 && found.rmse < 2.0 * report.estimated_error, "{found}");
+    assert!(found.bias.abs() < 0.005, "{found}");
+}
+
+#[test]
+fn furnace_under_the_sky() {
+    // Surfaces of reflectance ρ that emit (1 - ρ) L under a sky of radiance L: whatever their form, every ray meets radiance L, so
+    // E = π L everywhere. Bounces, sky, emission and the texels' edges all have to agree.
+    for reflectance in [0.3f32, 0.8] {
+        let mut world = World::new();
+        let material = matt(reflectance, (1.0 - reflectance) * SKY);
+        world.spawn((floor(1.5), material.clone(), StaticObject));
+        let walls = [
+            [[-1.5, 0.0, -1.5], [1.5, 0.0, -1.5], [1.5, 2.0, -1.5], [-1.5, 2.0, -1.5]],
+            [[-1.5, 0.0, 1.5], [-1.5, 0.0, -1.5], [-1.5, 2.0, -1.5], [-1.5, 2.0, 1.5]],
+        ];
+        for wall in walls {
+            let material = Material { double_sided: true, back: Some(material.front), ..material.clone() };
+            world.spawn((quad(wall), material, StaticObject));
+        }
+        let report = run(&mut world, &options(32, Quality::Final));
+        let expected = PI * SKY.as_dvec3();
+        let found = irradiances(&mut world);
+        let mean = found.iter().sum::<DVec3>() / found.len() as f64;
+        println!(
+            "{reflectance}: mean {} of {expected}; stated {:.3} %",
+            mean,
+            100.0 * report.estimated_error
+        );
+        assert!((mean / expected - 1.0).abs().max_element() < 5e-3, "{reflectance}: {mean} {expected}");
+        let square = |e: &DVec3| ((*e - expected).element_sum() / expected.element_sum()).powi(2);
+        let rmse = (found.iter().map(square).sum::<f64>() / found.len() as f64).sqrt();
+        assert!(rmse < 2.0 * report.estimated_error.max(1e-3), "{reflectance}: {rmse} {report}");
+    }
+}
+
+#[test]
+fn no_sky_is_no_work_and_says_so() {
+    let mut world = World::new();
+    world.spawn((floor(1.0), matt(0.5, Vec3::ONE), StaticObject));
+    let report = bake(&mut world, &options(16, Quality::Draft), &mut |_| ControlFlow::Continue(())).unwrap();
+    assert!(report.skipped.iter().any(|line| line == "sky light: the scene has no sky"), "{report}");
+    let mut dark = World::new();
+    dark.spawn((floor(1.0), matt(0.5, Vec3::ZERO), StaticObject));
+    let report = bake(&mut dark, &options(16, Quality::Draft), &mut |_| ControlFlow::Continue(())).unwrap();
+    assert!(report.rays == 0 && report.skipped[0].contains("there is no sky"), "{report}");
+}
