@@ -116,6 +116,9 @@ pub struct Bake {
     /// Worker threads; as many as there are cores without this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Leaves the seams between charts as they are.
+    #[arg(long)]
+    pub no_seams: bool,
     /// Prints the report as JSON.
     #[arg(long)]
     pub json: bool,

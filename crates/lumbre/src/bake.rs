@@ -36,6 +36,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             BakeQuality::Final => Quality::Final,
         },
         threads: asked.threads.map(usize::from),
+        seams: !asked.no_seams,
         ..BakeOptions::default()
     };
     let bar = progress_bar();

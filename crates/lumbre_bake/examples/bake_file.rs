@@ -25,6 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--threads" => options.threads = Some(value()?.parse()?),
             "--draft" => options.quality = Quality::Draft,
             "--no-denoise" => options.denoise = false,
+            "--no-seams" => options.seams = false,
             "--csv" => csv = Some(PathBuf::from(value()?)),
             "--maps" => maps = Some(PathBuf::from(value()?)),
             _ => paths.push(PathBuf::from(&argument)),

@@ -13,6 +13,7 @@ use crate::texels::fill::fill;
 use crate::texels::footprint::{Texel, footprints};
 use crate::texels::gather::{Outgoing, SCRAMBLES};
 use crate::texels::hidden::remove_hidden;
+use crate::texels::seams::{Maps, close_seams};
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::{Direct, Sources};
 use crate::transport::exchange::Exchange;
@@ -130,12 +131,18 @@ fn run(
     if exchange.is_none() {
         note_direct_error(&texels, &variances, options, &mut report);
     }
-    let filled = fill(&layout, &texels, &charts, &values, options.gap);
+    let mut filled = fill(&layout, &texels, &charts, &values, options.gap);
     watch.advance(1.0)?;
     let mut errors = vec![f32::NAN; layout.texels];
     for (texel, variance) in texels.iter().zip(&variances).filter(|(texel, _)| !texel.is_hidden()) {
         errors[texel.index as usize] = *variance;
     }
+    watch.stage("seams", &mut report)?;
+    let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
+    let maps =
+        Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
+    note_seams(&maps, &mut filled, options, &mut report);
+    watch.advance(1.0)?;
     apply::apply(world, &objects, &layout, &filled, &errors);
     report.maps = layout.maps.len();
     Ok(finish(report, &mut watch))
@@ -163,6 +170,18 @@ fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {
     }
     if sources.lights.is_empty() {
         report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());
+    }
+}
+
+fn note_seams(maps: &Maps<'_>, filled: &mut [Vec3], options: &BakeOptions, report: &mut BakeReport) {
+    let (closed, rays) = match options.seams {
+        true => close_seams(maps, filled),
+        false => (Err("switched off"), 0),
+    };
+    report.rays += rays;
+    match closed {
+        Ok(closed) => report.seams = closed,
+        Err(reason) => report.skipped.push(format!("seams: {reason}")),
     }
 }
 

@@ -50,4 +50,5 @@ pub use error::BakeError;
 pub use options::{BakeOptions, Density, Quality};
 pub use progress::Progress;
 pub use report::{BakeReport, StageTime};
+pub use texels::seams::SeamReport;
 pub use transport::solver::Solver;

@@ -53,6 +53,8 @@ pub struct BakeOptions {
     pub solver: Solver,
     /// Smooths the gathered light within charts where it is noisy.
     pub denoise: bool,
+    /// Closes seams: where charts meet smoothly, both sides show the same light.
+    pub seams: bool,
 }
 
 impl Default for BakeOptions {
@@ -67,6 +69,7 @@ impl Default for BakeOptions {
             threads: None,
             solver: Solver::default(),
             denoise: true,
+            seams: true,
         }
     }
 }

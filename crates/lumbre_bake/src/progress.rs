@@ -17,14 +17,15 @@ pub struct Progress {
 }
 
 /// The stages in their order, with their usual share of the time.
-const STAGES: [(&str, f32); 7] = [
+const STAGES: [(&str, f32); 8] = [
     ("layout", 0.03),
     ("hierarchy", 0.02),
     ("direct light", 0.2),
     ("form factors", 0.1),
     ("radiosity", 0.05),
     ("final gather", 0.55),
-    ("texels", 0.05),
+    ("texels", 0.03),
+    ("seams", 0.02),
 ];
 
 /// Reports to the caller, and notes the time of each stage.

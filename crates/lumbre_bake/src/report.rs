@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::SeamReport;
+
 /// The time of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageTime {
@@ -54,6 +56,8 @@ pub struct BakeReport {
     pub error_reached: bool,
     /// Share of the patches' mutual exchange that was cut so that no row of form factors exceeds 1.
     pub energy_lost: f64,
+    /// What closing the seams did; zeros where there were none.
+    pub seams: SeamReport,
     /// What was odd in the input, with names, and what was done about it.
     pub warnings: Vec<String>,
     /// Work that the scene did not call for, each with its reason.
@@ -88,6 +92,17 @@ impl std::fmt::Display for BakeReport {
             "{} triangles, {} patches, {} form factors; {:?} iterations, residual {:.1e}, energy lost {:.1e}",
             self.triangles, self.patches, self.form_factors, self.iterations, self.residual, self.energy_lost
         )?;
+        if self.seams.edges > 0 {
+            writeln!(
+                f,
+                "{} seams: jump {:.2} % before, {:.2} % after; texels moved by {:.2} % on average, {:.2} % at most",
+                self.seams.edges,
+                100.0 * self.seams.jump_before,
+                100.0 * self.seams.jump_after,
+                100.0 * self.seams.mean_change,
+                100.0 * self.seams.largest_change
+            )?;
+        }
         for stage in &self.stages {
             writeln!(f, "  {:<14} {:>8.3} s", stage.stage, stage.seconds)?;
         }

@@ -9,6 +9,7 @@ pub(crate) mod gather;
 pub(crate) mod hidden;
 pub(crate) mod lighting;
 pub(crate) mod rounds;
+pub(crate) mod seams;
 pub(crate) mod smooth;
 pub(crate) mod tile_sequence;
 

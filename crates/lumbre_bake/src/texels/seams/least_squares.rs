@@ -1,0 +1,285 @@
+//! The least squares behind closed seams, channel by channel, by preconditioned conjugate gradients:
+//!
+//! ```text
+//!   minimise  Σ over samples (A - B)² / (λ (variance of A + variance of B))  +  Σ over texels change² / variance
+//!   with      |change| <= 2 √variance,  value >= 0
+//! ```
+//!
+//! A texel's variance is its stated error's plus what its own place in the map cannot tell: half a texel of the light's
+//! slope around it. What is well known and even therefore stays. Not the choice of the samples.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::samples::{Reading, Sample};
+use super::{Maps, NO_CHART, SeamReport};
+
+/// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.
+const STIFFNESS: f64 = 0.02;
+/// Error of a texel that states none, relative to the mean: keeps the sums finite, and moves nothing (see the limit).
+const FLOOR: f64 = 1e-4;
+/// Half a texel of slope, of the range of the nine texels around: two texels wide along both axes.
+const HALF_A_TEXEL: f64 = 0.25;
+/// Standard errors that a texel may be moved by.
+const LIMIT: f64 = 2.0;
+/// Variance of a texel beside a chart, which shows no surface of its own, over that of its neighbours.
+const BESIDE: f64 = 4.0;
+/// Relative residual at which conjugate gradients end, and their most steps.
+const RESIDUAL: f64 = 1e-6;
+const MOST_STEPS: u32 = 400;
+/// Times that texels at their limit are taken out and the others solved again.
+const ACTIVE_SETS: u32 = 6;
+
+/// The texels that may move.
+pub(crate) struct Unknowns {
+    /// In the row of all maps, ascending.
+    texels: Vec<u32>,
+    /// Per texel and channel: the stated error's and the map's own.
+    variances: Vec<DVec3>,
+}
+
+/// A sample in terms of unknowns: coefficients of A - B.
+struct Equation {
+    unknowns: [u32; 8],
+    coefficients: [f64; 8],
+    length: f64,
+}
+
+impl Unknowns {
+    pub fn new(maps: &Maps<'_>, charts: &[u32], filled: &[Vec3], samples: &[Sample]) -> Self {
+        let read = |side: &Reading| {
+            let texels = side.texels.into_iter().zip(side.weights);
+            texels.filter(|(_, weight)| *weight > 0.0).map(|(texel, _)| texel)
+        };
+        let mut texels: Vec<u32> =
+            samples.iter().flat_map(|sample| sample.sides.iter().flat_map(read)).collect();
+        texels.sort_unstable();
+        texels.dedup();
+        let variances = texels.iter().map(|&texel| variance(maps, charts, filled, texel)).collect();
+        Self { texels, variances }
+    }
+
+    /// Moves the texels; edges are left for the caller to say.
+    pub fn solve(&self, samples: &[Sample], filled: &mut [Vec3], mean: f64) -> SeamReport {
+        let equations: Vec<Equation> = samples.iter().map(|sample| self.equation(sample)).collect();
+        let channels: Vec<(Vec<f64>, [f64; 2])> = (0..3usize)
+            .into_par_iter()
+            .map(|channel| {
+                let values: Vec<f64> =
+                    self.texels.iter().map(|&texel| f64::from(filled[texel as usize][channel])).collect();
+                let variances: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
+                let changes = Channel::new(&equations, &values, &variances, mean).solve();
+                let moved: Vec<f64> = values
+                    .iter()
+                    .zip(&changes)
+                    .map(|(value, change)| f64::from((value + change).max(0.0) as f32))
+                    .collect();
+                let jumps = [&values, &moved].map(|values| squared_jump(&equations, values));
+                // Limits that cut the changes might leave a jump that is worse than what was there.
+                let better = jumps[1] <= jumps[0] && moved.iter().all(|value| value.is_finite());
+                if better { (moved, jumps) } else { (values, [jumps[0]; 2]) }
+            })
+            .collect();
+        let mut report = SeamReport::default();
+        let mut sum = 0.0;
+        for (place, &texel) in self.texels.iter().enumerate() {
+            let before = filled[texel as usize];
+            let after =
+                DVec3::from_array(std::array::from_fn(|channel| channels[channel].0[place])).as_vec3();
+            let change = (after - before).abs().as_dvec3();
+            sum += change.element_sum() / 3.0;
+            report.largest_change = report.largest_change.max(change.max_element() / mean);
+            filled[texel as usize] = after;
+        }
+        report.mean_change = sum / self.texels.len().max(1) as f64 / mean;
+        let jump =
+            |which: usize| (channels.iter().map(|(_, jumps)| jumps[which]).sum::<f64>() / 3.0).sqrt() / mean;
+        (report.jump_before, report.jump_after) = (jump(0), jump(1));
+        report
+    }
+
+    fn equation(&self, sample: &Sample) -> Equation {
+        let (mut unknowns, mut coefficients) = ([0; 8], [0.0; 8]);
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            for corner in 0..4 {
+                let weight = sample.sides[side].weights[corner];
+                if weight > 0.0 {
+                    let texel = sample.sides[side].texels[corner];
+                    let place = self.texels.binary_search(&texel);
+                    unknowns[side * 4 + corner] =
+                        place.expect("every texel that is read is among the unknowns") as u32;
+                    coefficients[side * 4 + corner] = sign * f64::from(weight);
+                }
+            }
+        }
+        Equation { unknowns, coefficients, length: sample.length }
+    }
+}
+
+impl Equation {
+    /// A - B.
+    fn apply(&self, values: &[f64]) -> f64 {
+        self.unknowns.iter().zip(self.coefficients).map(|(&i, c)| c * values[i as usize]).sum()
+    }
+
+    fn add_transposed(&self, factor: f64, sums: &mut [f64]) {
+        for (&unknown, coefficient) in self.unknowns.iter().zip(self.coefficients) {
+            sums[unknown as usize] += factor * coefficient;
+        }
+    }
+}
+
+/// Mean over the seams' length.
+fn squared_jump(equations: &[Equation], values: &[f64]) -> f64 {
+    let (mut sum, mut length) = (0.0, 0.0);
+    for equation in equations {
+        sum += equation.length * equation.apply(values).powi(2);
+        length += equation.length;
+    }
+    if length > 0.0 { sum / length } else { 0.0 }
+}
+
+/// How far each channel of a texel may be off, squared.
+fn variance(maps: &Maps<'_>, charts: &[u32], filled: &[Vec3], texel: u32) -> DVec3 {
+    let Some(map) = maps.layout.maps.iter().rev().find(|map| map.first <= texel as usize) else {
+        return DVec3::ZERO;
+    };
+    let local = texel - map.first as u32;
+    let (x, y) = (local % map.width, local / map.width);
+    let own = charts[texel as usize];
+    let (mut low, mut high, mut stated) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
+    for ny in y.saturating_sub(1)..=(y + 1).min(map.height - 1) {
+        for nx in x.saturating_sub(1)..=(x + 1).min(map.width - 1) {
+            let other = map.first + (ny * map.width + nx) as usize;
+            let same = charts[other] != NO_CHART && (own == NO_CHART || charts[other] == own);
+            if same && filled[other].is_finite() {
+                (low, high) = (low.min(filled[other]), high.max(filled[other]));
+                // NaN, of a texel without a surface, is never the larger one.
+                stated = stated.max(maps.variances[other]);
+            }
+        }
+    }
+    if own != NO_CHART {
+        stated = maps.variances[texel as usize].max(0.0);
+    }
+    let range = if low.x <= high.x { (high - low).as_dvec3() } else { DVec3::ZERO };
+    let slope = range * HALF_A_TEXEL;
+    let variance = slope * slope + f64::from(stated);
+    let variance = if variance.is_finite() { variance } else { DVec3::ZERO };
+    if own == NO_CHART { variance * BESIDE } else { variance }
+}
+
+/// One channel's system for the changes.
+struct Channel<'a> {
+    equations: &'a [Equation],
+    /// Weight of each equation, and its jump before any change.
+    weights: Vec<f64>,
+    jumps: Vec<f64>,
+    /// Least and largest change of each texel.
+    bounds: Vec<[f64; 2]>,
+    /// 1 / variance.
+    stiffness: Vec<f64>,
+    /// Of the system's diagonal, 1 over it.
+    preconditioner: Vec<f64>,
+}
+
+impl<'a> Channel<'a> {
+    fn new(equations: &'a [Equation], values: &[f64], variances: &[f64], mean: f64) -> Self {
+        let floor = (FLOOR * mean).powi(2);
+        let stiffness: Vec<f64> = variances.iter().map(|variance| 1.0 / (variance + floor)).collect();
+        let mut diagonal = stiffness.clone();
+        let (mut weights, mut jumps) = (Vec::new(), Vec::new());
+        for equation in equations {
+            let both: f64 = equation
+                .unknowns
+                .iter()
+                .zip(equation.coefficients)
+                .map(|(&unknown, c)| c.abs() / stiffness[unknown as usize])
+                .sum();
+            let weight = 1.0 / (STIFFNESS * both);
+            for (&unknown, coefficient) in equation.unknowns.iter().zip(equation.coefficients) {
+                diagonal[unknown as usize] += weight * coefficient * coefficient;
+            }
+            weights.push(weight);
+            jumps.push(equation.apply(values));
+        }
+        let bound = |(value, variance): (&f64, &f64)| {
+            let limit = LIMIT * variance.sqrt();
+            [-limit.min(*value), limit]
+        };
+        Self {
+            equations,
+            weights,
+            jumps,
+            bounds: values.iter().zip(variances).map(bound).collect(),
+            stiffness,
+            preconditioner: diagonal.into_iter().map(|d| 1.0 / d).collect(),
+        }
+    }
+
+    /// The changes within their bounds: those at a bound are held there and the others solved again.
+    fn solve(&self) -> Vec<f64> {
+        let count = self.stiffness.len();
+        let mut held = vec![false; count];
+        let mut changes = vec![0.0; count];
+        for _ in 0..ACTIVE_SETS {
+            self.conjugate_gradients(&held, &mut changes);
+            let mut cut = false;
+            for ((change, [low, high]), held) in changes.iter_mut().zip(&self.bounds).zip(&mut held) {
+                let within = change.clamp(*low, *high);
+                if within != *change {
+                    (*change, *held, cut) = (within, true, true);
+                }
+            }
+            if !cut {
+                break;
+            }
+        }
+        changes
+    }
+
+    /// Solves for the changes that are not held, starting from what they are.
+    fn conjugate_gradients(&self, held: &[bool], changes: &mut [f64]) {
+        let count = changes.len();
+        let free = |vector: &mut [f64]| {
+            for (value, _) in vector.iter_mut().zip(held).filter(|(_, held)| **held) {
+                *value = 0.0;
+            }
+        };
+        let multiply = |x: &[f64], jumps: Option<&[f64]>| {
+            let mut product: Vec<f64> = x.iter().zip(&self.stiffness).map(|(x, s)| x * s).collect();
+            for (index, equation) in self.equations.iter().enumerate() {
+                let jump = jumps.map_or(0.0, |jumps| jumps[index]);
+                equation.add_transposed(self.weights[index] * (equation.apply(x) + jump), &mut product);
+            }
+            product
+        };
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut residual: Vec<f64> =
+            multiply(changes, Some(&self.jumps)).into_iter().map(|value| -value).collect();
+        free(&mut residual);
+        let mut scaled: Vec<f64> = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * p).collect();
+        let mut direction = scaled.clone();
+        let mut energy = dot(&residual, &scaled);
+        let enough = energy * RESIDUAL * RESIDUAL;
+        for _ in 0..MOST_STEPS {
+            if energy <= enough || !energy.is_finite() {
+                break;
+            }
+            let mut product = multiply(&direction, None);
+            free(&mut product);
+            let step = energy / dot(&direction, &product);
+            for place in 0..count {
+                changes[place] += step * direction[place];
+                residual[place] -= step * product[place];
+                scaled[place] = residual[place] * self.preconditioner[place];
+            }
+            let next = dot(&residual, &scaled);
+            let ratio = next / energy;
+            energy = next;
+            for (direction, scaled) in direction.iter_mut().zip(&scaled) {
+                *direction = scaled + ratio * *direction;
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Seams closed by least squares: where two borders of charts lie in one place and their surfaces join smoothly, the texels
+//! that bilinear filtering reads there are moved, by no more than they may be wrong, until both sides show the same light.
+//! Within a map, across maps and across objects. Not the filling beside charts: that is `fill`.
+//!
+//! ```text
+//!   borders of charts ─► pairs in one place ─► samples, two per texel ─────────────► least squares ─► texels
+//!                        (also parts of edges)  (normals agree, nothing in between)   (conjugate gradients)
+//! ```
+//!
+//! After Iwanicki, "Lighting Technology of The Last of Us", SIGGRAPH 2013 (the equations), and Sloan and Silvennoinen,
+//! "Directional Lightmap Encoding Insights", SIGGRAPH Asia 2018; the weights and limits by the texels' errors are our own.
+
+mod edge_grid;
+mod edges;
+mod least_squares;
+mod samples;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::footprint::Texel;
+use crate::scene::{BakeScene, LightmapLayout};
+use least_squares::Unknowns;
+
+/// What closing the seams did. Relative to the mean irradiance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SeamReport {
+    /// Pairs of edges that lie in one place, join smoothly and have lightmap coordinates of their own.
+    pub edges: usize,
+    /// RMS difference between the two sides along them, before.
+    pub jump_before: f64,
+    /// And after.
+    pub jump_after: f64,
+    /// Mean change of the texels beside seams.
+    pub mean_change: f64,
+    /// Largest change of a texel's channel.
+    pub largest_change: f64,
+}
+
+/// The maps as they are before the seams are closed.
+pub(crate) struct Maps<'a> {
+    pub scene: &'a BakeScene,
+    pub layout: &'a LightmapLayout,
+    pub texels: &'a [Texel],
+    pub charts: &'a [u32],
+    /// Per texel of all maps; NaN where it shows no surface.
+    pub variances: &'a [f32],
+    /// Mean irradiance of the open texels, mean of the channels.
+    pub mean: f64,
+}
+
+/// Chart of a texel that no surface covers in the open.
+const NO_CHART: u32 = u32::MAX;
+
+/// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known). Returns what was done, and the rays cast;
+/// a reason in place of a report where there is nothing to do.
+pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3]) -> (Result<SeamReport, &'static str>, u64) {
+    if maps.mean.is_nan() || maps.mean <= 0.0 {
+        return (Err("the maps are black"), 0);
+    }
+    let edges = edges::borders(maps.scene);
+    let mut charts = vec![NO_CHART; maps.layout.texels];
+    for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
+        charts[texel.index as usize] = maps.charts[texel.triangle as usize];
+    }
+    let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }.all();
+    if found.samples.is_empty() {
+        return (Err("no two borders of charts join smoothly in one place"), found.rays);
+    }
+    let unknowns = Unknowns::new(maps, &charts, filled, &found.samples);
+    let mut report = unknowns.solve(&found.samples, filled, maps.mean);
+    report.edges = found.pairs;
+    (Ok(report), found.rays)
+}
