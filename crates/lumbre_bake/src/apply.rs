@@ -9,7 +9,7 @@ use glam::Vec3;
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, Mesh};
 
 use crate::bake::map_texels;
-use crate::scene::{LightmapLayout, Object};
+use crate::scene::{LightmapLayout, Object, reading_first};
 
 /// How far each texel of an entity's [`Lightmap`] may be off: one standard error in the map's own unit (E/π, mean of the channels), row
 /// by row; NaN where the map shows no surface. Against a converged bake of the same map at least 95 % of the texels are within two.
@@ -42,10 +42,13 @@ pub(crate) fn apply(
             texels,
             encoding: LightmapEncoding::Rgb32Float,
         });
-        for (part, mesh) in object.parts.iter().zip(&map.meshes) {
+        for ((part, mesh), &moved) in object.parts.iter().zip(&map.meshes).zip(&map.moved) {
             let Ok(mut entity) = world.get_entity_mut(part.entity) else { continue };
             if !Arc::ptr_eq(&part.mesh, mesh) {
                 entity.insert(Mesh(Arc::clone(mesh)));
+            }
+            if let Some(textures) = part.textures.as_ref().filter(|_| moved) {
+                entity.insert(reading_first(textures));
             }
             entity.insert((Lightmap { image: Arc::clone(&image) }, LightmapError(Arc::clone(&errors))));
         }

@@ -115,7 +115,11 @@ fn run(
                 guide: &exchange.guide,
                 run: options.quality.effort().gather[0] / SCRAMBLES as u32,
             };
-            Some(rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?)
+            let leaked_before = scene.leaks.count();
+            let gathered =
+                rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?;
+            report.leaked_rays = scene.leaks.count() - leaked_before;
+            Some(gathered)
         }
     };
 

@@ -30,8 +30,8 @@ pub enum BakeError {
     },
     /// A material reads the coordinates that the lightmap would have to replace.
     #[error(
-        "{object}: a texture of its material uses TEXCOORD_1, which overlaps or tiles and so cannot hold a lightmap; put the texture's \
-         coordinates into TEXCOORD_0, or give the mesh a TEXCOORD_1 without overlaps"
+        "{object}: the textures of its material use TEXCOORD_0 and TEXCOORD_1, and TEXCOORD_1 overlaps or tiles and so cannot hold a \
+         lightmap; let them all use TEXCOORD_0, or give the mesh a TEXCOORD_1 without overlaps"
     )]
     CoordinatesInUse {
         /// The node's name.

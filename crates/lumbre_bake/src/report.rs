@@ -46,6 +46,9 @@ pub struct BakeReport {
     pub coverage: f64,
     /// Texels that lie wholly or partly inside other geometry; the hidden part does not count into their value.
     pub hidden_texels: usize,
+    /// Rays of the final gather that ended on the black back of a one-sided surface, inside something closed, or left a scene that
+    /// rooms close on all sides; they bring no light.
+    pub leaked_rays: u64,
     /// Gather rays per covered texel, on average.
     pub gather_rays: f64,
     /// Mean irradiance over covered texels, W/m², linear RGB.
@@ -84,8 +87,8 @@ impl std::fmt::Display for BakeReport {
         )?;
         writeln!(
             f,
-            "{} rays ({:.2} million a second), {:.0} gathered per texel",
-            self.rays, self.mega_rays_per_second, self.gather_rays
+            "{} rays ({:.2} million a second), {:.0} gathered per texel, {} leaked",
+            self.rays, self.mega_rays_per_second, self.gather_rays, self.leaked_rays
         )?;
         writeln!(
             f,

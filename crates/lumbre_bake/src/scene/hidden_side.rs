@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-/// For each triangle, whether its connected piece is closed: every directed edge has one that runs back.
+/// For each triangle, its connected piece if that is closed: every directed edge has one that runs back.
 /// Vertices are the same where their coordinates are, bit by bit.
-pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<bool> {
+pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
     let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
     let corners: Vec<[u32; 3]> = triangles
         .iter()
@@ -34,7 +34,11 @@ pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<bool> {
             closed[find(&mut parent, vertex) as usize] = false;
         }
     }
-    corners.iter().map(|&[a, ..]| closed[find(&mut parent, a) as usize]).collect()
+    let piece = |&[a, ..]: &[u32; 3]| {
+        let piece = find(&mut parent, a);
+        closed[piece as usize].then_some(piece)
+    };
+    corners.iter().map(piece).collect()
 }
 
 fn find(parent: &mut [u32], mut at: u32) -> u32 {
@@ -57,9 +61,9 @@ mod tests {
         let far = Vec3::splat(9.0);
         triangles.push([far, far + Vec3::X, far + Vec3::Y]);
         let found = closed_pieces(&triangles);
-        assert!(found[..closed].iter().all(|&closed| closed));
-        assert!(!found[closed]);
+        assert!(found[..closed].iter().all(Option::is_some));
+        assert!(found[closed].is_none());
         triangles.remove(0);
-        assert!(closed_pieces(&triangles).iter().all(|&closed| !closed));
+        assert!(closed_pieces(&triangles).iter().all(Option::is_none));
     }
 }

@@ -7,9 +7,8 @@ use glam::{DAffine3, Vec2, Vec3};
 use lumbre_mesh::uv_validation::validate_uv1;
 use lumbre_mesh::{TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
 
-use lumbre_scene::MaterialTextures;
-
-use super::{Canonical, Object, Part};
+use super::texture_coordinates::{free_second, sets_read};
+use super::{Canonical, Object};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The texels of one object.
@@ -17,6 +16,8 @@ use crate::{BakeError, BakeOptions, Density};
 pub(crate) struct MapLayout {
     /// One per part of the object, with `uv1`.
     pub meshes: Vec<Arc<TriangleMesh>>,
+    /// Of each part, whether its textures' coordinates moved from `uv1` to `uv0`.
+    pub moved: Vec<bool>,
     /// Texels across.
     pub width: u32,
     /// Texel rows.
@@ -60,7 +61,7 @@ pub(crate) fn lay_out(
     let mut texels = 0u64;
     for object in objects {
         let key = instance_key(object, space);
-        let (meshes, width, height) = match instances.get(&key) {
+        let made = match instances.get(&key) {
             Some(known) => known.clone(),
             None => {
                 let made = lay_out_object(object, space, density, options, warnings)?;
@@ -68,11 +69,12 @@ pub(crate) fn lay_out(
                 made
             }
         };
+        let Made { meshes, moved, width, height } = made;
         texels += u64::from(width) * u64::from(height);
         if texels > MOST_TEXELS {
             return Err(BakeError::TooManyTexels { texels, limit: MOST_TEXELS });
         }
-        layout.maps.push(MapLayout { meshes, width, height, first: layout.texels });
+        layout.maps.push(MapLayout { meshes, moved, width, height, first: layout.texels });
         layout.texels = texels as usize;
     }
     Ok(layout)
@@ -83,6 +85,8 @@ fn instance_key(object: &Object, space: Canonical) -> Vec<u64> {
     let mut key = Vec::with_capacity(object.parts.len() * 7);
     for part in &object.parts {
         key.push(Arc::as_ptr(&part.mesh) as usize as u64);
+        // A mesh whose second set holds a texture's coordinates in one place may be free in another.
+        key.extend(sets_read(part.textures.as_ref()).map(u64::from));
         let m = part.transform.matrix3;
         let scale = space.scale * space.scale;
         for (a, b) in [
@@ -140,8 +144,14 @@ impl Placed {
     }
 }
 
-/// Meshes with `uv1`, texels across, texel rows.
-type Made = (Vec<Arc<TriangleMesh>>, u32, u32);
+/// What objects share that are laid out alike.
+#[derive(Clone)]
+struct Made {
+    meshes: Vec<Arc<TriangleMesh>>,
+    moved: Vec<bool>,
+    width: u32,
+    height: u32,
+}
 
 fn lay_out_object(
     object: &Object,
@@ -158,7 +168,8 @@ fn lay_out_object(
         };
         match validate_uv1(&placed.mesh, side, side) {
             Ok(report) if report.is_sound() => {
-                return Ok((object.parts.iter().map(|part| Arc::clone(&part.mesh)).collect(), side, side));
+                let meshes = object.parts.iter().map(|part| Arc::clone(&part.mesh)).collect();
+                return Ok(Made { meshes, moved: vec![false; object.parts.len()], width: side, height: side });
             }
             Ok(report) => warnings.push(format!(
                 "{}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
@@ -171,24 +182,25 @@ fn lay_out_object(
             Err(error) => warnings.push(format!("{}: {error}; it was unwrapped anew", object.name)),
         }
     }
-    let reads_uv1 = |part: &Part| {
-        let textures = part.textures.iter();
-        textures.flat_map(MaterialTextures::references).any(|texture| texture.tex_coord == 1)
-    };
-    if object.parts.iter().any(reads_uv1) {
-        return Err(BakeError::CoordinatesInUse { object: object.name.clone() });
+    let (object, moved) = free_second(object)?;
+    if moved.contains(&true) {
+        warnings.push(format!(
+            "{}: its textures' coordinates were moved from TEXCOORD_1, where the lightmap needs its own, to TEXCOORD_0, which \
+             nothing else read",
+            object.name
+        ));
     }
     let (unwrapped, width, height) = match options.density {
-        Density::MapSize(side) => (fit(object, &placed, side, options.gap)?, side, side),
+        Density::MapSize(side) => (fit(&object, &placed, side, options.gap)?, side, side),
         _ => {
-            let made = unwrap_at_most(object, &placed, density, options.gap, warnings)?;
+            let made = unwrap_at_most(&object, &placed, density, options.gap, warnings)?;
             let (width, height) = (made.width.max(1), made.height.max(1));
             (made, width, height)
         }
     };
     // From the rectangle of the charts to the map it lies in.
     let shrink = Vec2::new(unwrapped.width as f32 / width as f32, unwrapped.height as f32 / height as f32);
-    Ok((split(object, &unwrapped, shrink), width, height))
+    Ok(Made { meshes: split(&object, &unwrapped, shrink), moved, width, height })
 }
 
 /// The densest unwrap that fits a square of `side` texels.

@@ -4,14 +4,17 @@
 mod collect;
 mod duplicates;
 mod hidden_side;
+mod leaks;
 mod lightmap_layout;
 pub(crate) mod material;
 mod occlusion;
 mod texture;
+mod texture_coordinates;
 mod triangles;
 
 pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky};
 pub(crate) use lightmap_layout::{LightmapLayout, lay_out, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
+pub(crate) use texture_coordinates::reading_first;
 pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle};

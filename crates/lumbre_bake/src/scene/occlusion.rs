@@ -32,8 +32,18 @@ pub(crate) enum SurfaceHit {
 const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
 
 impl BakeScene {
-    /// The first thing on a ray with a direction of unit length.
+    /// The first thing on a ray with a direction of unit length. Counts it among the leaks if it ended where none should.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
+        let hit = self.first_surface(origin, direction);
+        match hit {
+            SurfaceHit::Back | SurfaceHit::Inside => self.leaks.note(),
+            SurfaceHit::None if self.leaks.closed_scene => self.leaks.note(),
+            SurfaceHit::None | SurfaceHit::Lit { .. } => {}
+        }
+        hit
+    }
+
+    fn first_surface(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
         let ray = Ray::new(origin, direction);
         let Some(mut hit) = self.closest(&ray, |_| true) else { return SurfaceHit::None };
         let triangle = &self.triangles[hit.triangle as usize];

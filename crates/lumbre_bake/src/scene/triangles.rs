@@ -6,7 +6,9 @@ use lumbre_rays::{Bvh, triangle_extent};
 
 use super::duplicates::superseded;
 use super::hidden_side::closed_pieces;
+use super::leaks::{Extent, Leaks, all_within, rooms};
 use super::material::{LARGEST_REFLECTANCE, Side};
+use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, Object, SurfaceMaterial};
 use crate::BakeError;
 
@@ -112,6 +114,8 @@ pub(crate) struct BakeScene {
     pub bvh: Bvh,
     /// Whether some surface lets light through in places.
     pub masked: bool,
+    /// Rays that ended where none should.
+    pub leaks: Leaks,
 }
 
 /// Most triangles: patches and texels name them by 32 bits, the hierarchy by 29.
@@ -130,8 +134,11 @@ impl BakeScene {
             return Err(BakeError::TooManyTriangles { triangles: count, limit: MOST_TRIANGLES });
         }
         let (mut triangles, mut surfaces) = (Vec::with_capacity(count), Vec::new());
+        let mut rooms = Vec::new();
         for (index, object) in objects.iter().enumerate() {
+            let first = triangles.len();
             extract(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
+            rooms.extend(mark_closed(&mut triangles[first..]));
         }
         mark_superseded(&mut triangles, &surfaces, warnings);
         let solid: Vec<[Vec3; 3]> = triangles
@@ -140,7 +147,9 @@ impl BakeScene {
             .map(|t| if t.superseded { [Vec3::NAN; 3] } else { t.corners })
             .collect();
         let masked = surfaces.iter().any(SurfaceMaterial::is_masked);
-        Ok(Self { space, bvh: Bvh::build(&solid), triangles, surfaces, masked })
+        let closed_scene = all_within(&rooms, triangles.iter().map(|triangle| triangle.corners));
+        let leaks = Leaks::new(closed_scene);
+        Ok(Self { space, bvh: Bvh::build(&solid), triangles, surfaces, masked, leaks })
     }
 }
 
@@ -155,9 +164,8 @@ fn extract(
 ) {
     let map = &layout.maps[index as usize];
     let size = Vec2::new(map.width as f32, map.height as f32);
-    let first = triangles.len();
     let (mut not_finite, mut without_area) = (0, 0);
-    for (part, mesh) in object.parts.iter().zip(&map.meshes) {
+    for ((part, mesh), &moved) in object.parts.iter().zip(&map.meshes).zip(&map.moved) {
         let surface = surfaces.len() as u32;
         // A texture brings its factor down; what is above the limit after that is clamped texel by texel.
         let textured = part
@@ -167,7 +175,7 @@ fn extract(
         check_reflectance(&part.material.front.diffuse, textured, &object.name, warnings);
         surfaces.push(SurfaceMaterial {
             material: part.material.clone(),
-            textures: part.textures.clone(),
+            textures: textures_of(part, moved),
             mesh: mesh.clone(),
         });
         let positions: Vec<Vec3> = mesh
@@ -224,11 +232,6 @@ fn extract(
             });
         }
     }
-    let corners: Vec<[Vec3; 3]> = triangles[first..].iter().map(|triangle| triangle.corners).collect();
-    for (triangle, closed) in triangles[first..].iter_mut().zip(closed_pieces(&corners)) {
-        triangle.closed = closed;
-        triangle.two_sided &= !closed;
-    }
     if not_finite > 0 {
         warnings.push(format!(
             "{}: {not_finite} triangles with NaN or infinite positions were left out",
@@ -238,6 +241,17 @@ fn extract(
     if without_area > 0 {
         warnings.push(format!("{}: {without_area} triangles without area were left out", object.name));
     }
+}
+
+/// Marks the closed pieces of an object; returns the extents of those that look inward.
+fn mark_closed(triangles: &mut [SceneTriangle]) -> Vec<Extent> {
+    let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
+    let pieces = closed_pieces(&corners);
+    for (triangle, piece) in triangles.iter_mut().zip(&pieces) {
+        triangle.closed = piece.is_some();
+        triangle.two_sided &= piece.is_none();
+    }
+    rooms(&corners, &pieces)
 }
 
 fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut Vec<String>) {
