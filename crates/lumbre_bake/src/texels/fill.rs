@@ -110,7 +110,9 @@ fn continued(
     let center = Vec2::new(x as f32, y as f32) + 0.5;
     let mut moments = [0.0f64; 6];
     let mut sums = [glam::DVec3::ZERO; 3];
-    let (mut low, mut high, mut nearest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, (f32::INFINITY, Vec3::ZERO));
+    // Of the texels next to it, and of those one further.
+    let mut ranges = [(Vec3::INFINITY, Vec3::NEG_INFINITY); 2];
+    let mut nearest = (f32::INFINITY, Vec3::ZERO);
     for (nx, ny) in around(width, height, x, y, 2) {
         if !own_counts && nx == x && ny == y {
             continue;
@@ -127,8 +129,8 @@ fn continued(
         for (sum, term) in sums.iter_mut().zip([1.0, dx, dy]) {
             *sum += value * (weight * term);
         }
-        low = low.min(other.value);
-        high = high.max(other.value);
+        let range = &mut ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)];
+        *range = (range.0.min(other.value), range.1.max(other.value));
         if d.length() < nearest.0 {
             nearest = (d.length(), other.value);
         }
@@ -145,6 +147,8 @@ fn continued(
     let towards = spread.inverse() * DVec2::new(-sx, -sy);
     let [mean, with_x, with_y] = sums.map(|sum| sum / moments[0]);
     let value = (mean + (with_x - mean * sx) * towards.x + (with_y - mean * sy) * towards.y).as_vec3();
+    // A shadow's edge two texels away does not reach a texel whose neighbours know nothing of it.
+    let (low, high) = if ranges[0].0.x <= ranges[0].1.x { ranges[0] } else { ranges[1] };
     let reach = (high - low) * 0.5;
     let value = value.clamp((low - reach).max(Vec3::ZERO), high + reach);
     Some(if value.is_finite() { value } else { nearest.1 })
