@@ -73,11 +73,12 @@ fn add_light(world: &mut World, reflectance: f32) {
 }
 
 fn run(world: &mut World) -> BakeReport {
-    let options = BakeOptions {
-        density: Density::TexelsPerMeter(1.0 / TEXEL),
-        quality: Quality::Draft,
-        ..BakeOptions::default()
-    };
+    run_with(world, Quality::Draft)
+}
+
+fn run_with(world: &mut World, quality: Quality) -> BakeReport {
+    let options =
+        BakeOptions { density: Density::TexelsPerMeter(1.0 / TEXEL), quality, ..BakeOptions::default() };
     bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
 }
 
@@ -263,7 +264,7 @@ fn under_a_wall(thickness: f32, reflectance: f32, steps: &[f64]) -> (Vec<f64>, f
         spawn(&mut world, wall, Material { double_sided: true, ..matt(reflectance, 0.0) });
     }
     add_light(&mut world, reflectance);
-    run(&mut world);
+    run_with(&mut world, Quality::Final);
     let found = look_up(&world, floor);
     let lit_side = found.iter().filter(|found| found.position.x < 0.0);
     let (sum, count) = lit_side.fold((0.0, 0.0), |(s, n), found| (s + found.irradiance, n + 1.0));
@@ -287,7 +288,8 @@ fn a_floor_that_runs_through_under_the_wall_leaks_a_texel_at_most() {
         assert!(direct[5..].iter().all(|&leak| leak == 0.0) && walls == 0.0, "{direct:?} {walls}");
         let (all, walls) = under_a_wall(thickness, 0.6, &steps);
         println!("{thickness}, with bounces: {all:.4?}; walls {walls:.4}");
-        // A limit, not a goal: texels and patches that straddle the wall are lit on one side of it and shine on both.
-        assert!(all[5..].iter().all(|&leak| leak < 0.03), "{all:?} {walls}");
+        // Texels and patches that straddle the wall are lit on one side of it and shine on both; a strip half a texel wide at half
+        // the light beside it, seen from three texels and more, and its bounces.
+        assert!(all[5..].iter().all(|&leak| leak < 0.02) && all[7] < 0.002, "{all:?} {walls}");
     }
 }
