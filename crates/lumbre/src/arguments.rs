@@ -116,6 +116,9 @@ pub struct Bake {
     /// Worker threads; as many as there are cores without this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Lets small meshes share atlases of at most N x N texels.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=8192))]
+    pub atlas_size: Option<u32>,
     /// Leaves the seams between charts as they are.
     #[arg(long)]
     pub no_seams: bool,

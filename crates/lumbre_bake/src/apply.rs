@@ -8,7 +8,7 @@ use bevy_ecs::prelude::{Component, Entity, With, World};
 use glam::Vec3;
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, Mesh};
 
-use crate::bake::map_texels;
+use crate::pages::Pages;
 use crate::scene::{LightmapLayout, Object, reading_first};
 
 /// How far each texel of an entity's [`Lightmap`] may be off: one standard error in the map's own unit (E/π, mean of the channels), row
@@ -23,34 +23,51 @@ pub(crate) fn apply(
     layout: &LightmapLayout,
     irradiance: &[Vec3],
     variances: &[f32],
+    pages: &Pages,
 ) {
     forget_lightmaps(world, objects);
     let mut names = HashSet::new();
+    let light = |texel: usize| {
+        let e = irradiance[texel];
+        if e.is_finite() { e / PI } else { Vec3::ZERO }
+    };
+    let error = |texel: usize| variances[texel].sqrt() / PI;
+    let image = |name: String, width: u32, height: u32, texels: Vec<Vec3>| {
+        Arc::new(LightmapImage { name, width, height, texels, encoding: LightmapEncoding::Rgb32Float })
+    };
+    let shared: Vec<(Lightmap, LightmapError)> = (0..pages.pages.len())
+        .map(|index| {
+            let page = &pages.pages[index];
+            let texels = pages.compose(index, layout, light, Vec3::ZERO);
+            let name = file_name(&format!("atlas-{}", index + 1), &mut names);
+            let errors = pages.compose(index, layout, error, f32::NAN);
+            let image = image(name, page.width, page.height, texels);
+            (Lightmap { image }, LightmapError(errors.into()))
+        })
+        .collect();
     for (index, object) in objects.iter().enumerate() {
         let map = &layout.maps[index];
-        let texels = map_texels(layout, index, irradiance)
-            .iter()
-            .map(|e| if e.is_finite() { *e / PI } else { Vec3::ZERO })
-            .collect();
-        let first = map.first;
-        let errors = &variances[first..first + (map.width * map.height) as usize];
-        let errors: Arc<[f32]> = errors.iter().map(|variance| variance.sqrt() / PI).collect();
-        let image = Arc::new(LightmapImage {
-            name: file_name(&object.name, &mut names),
-            width: map.width,
-            height: map.height,
-            texels,
-            encoding: LightmapEncoding::Rgb32Float,
-        });
+        let lightmap = match pages.places[index] {
+            Some(place) => shared[place.page].clone(),
+            None => {
+                let own = map.first..map.first + (map.width * map.height) as usize;
+                let texels = own.clone().map(light).collect();
+                let name = file_name(&object.name, &mut names);
+                let image = image(name, map.width, map.height, texels);
+                (Lightmap { image }, LightmapError(own.map(error).collect()))
+            }
+        };
         for ((part, mesh), &moved) in object.parts.iter().zip(&map.meshes).zip(&map.moved) {
             let Ok(mut entity) = world.get_entity_mut(part.entity) else { continue };
-            if !Arc::ptr_eq(&part.mesh, mesh) {
+            if pages.places[index].is_some() {
+                entity.insert(Mesh(pages.on_page(layout, index, mesh)));
+            } else if !Arc::ptr_eq(&part.mesh, mesh) {
                 entity.insert(Mesh(Arc::clone(mesh)));
             }
             if let Some(textures) = part.textures.as_ref().filter(|_| moved) {
                 entity.insert(reading_first(textures));
             }
-            entity.insert((Lightmap { image: Arc::clone(&image) }, LightmapError(Arc::clone(&errors))));
+            entity.insert(lightmap.clone());
         }
     }
 }

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
+use crate::pages::Pages;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, sky, world_points};
 use crate::texels::charts::charts;
@@ -147,8 +148,10 @@ fn run(
         Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
     note_seams(&maps, &mut filled, options, &mut report);
     watch.advance(1.0)?;
-    apply::apply(world, &objects, &layout, &filled, &errors);
-    report.maps = layout.maps.len();
+    let pages = Pages::new(&layout, options.atlas_size, options.gap);
+    apply::apply(world, &objects, &layout, &filled, &errors, &pages);
+    report.atlases = pages.pages.len();
+    report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
     Ok(finish(report, &mut watch))
 }
 
@@ -213,10 +216,4 @@ fn note_direct_error(texels: &[Texel], variances: &[f32], options: &BakeOptions,
     let error = (sum / f64::from(count.max(1))).sqrt();
     report.estimated_error = if mean > 0.0 { error / mean } else { 0.0 };
     report.error_reached = report.estimated_error <= options.error;
-}
-
-/// What the layout's maps hold, for tests and messages.
-pub(crate) fn map_texels<'a>(layout: &LightmapLayout, map: usize, filled: &'a [Vec3]) -> &'a [Vec3] {
-    let map = &layout.maps[map];
-    &filled[map.first..map.first + (map.width * map.height) as usize]
 }

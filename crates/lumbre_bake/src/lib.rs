@@ -37,6 +37,7 @@ mod apply;
 mod bake;
 mod error;
 mod options;
+mod pages;
 mod progress;
 mod report;
 mod sampling;

@@ -45,6 +45,9 @@ pub struct BakeOptions {
     /// Free texels between charts, and how far values are carried past a chart's border: 2 for bilinear filtering,
     /// 4 for bicubic.
     pub gap: u32,
+    /// Lets the maps of several objects share atlases of at most so many texels a side, in [16, 8192]; each object has a map of
+    /// its own without it. Copies of an object then have meshes of their own, with their places in the atlas.
+    pub atlas_size: Option<u32>,
     /// Scrambles every sample sequence. The same seed gives the same bits on any number of threads.
     pub seed: u32,
     /// Worker threads; as many as the machine has if absent.
@@ -65,6 +68,7 @@ impl Default for BakeOptions {
             time: None,
             quality: Quality::Final,
             gap: 2,
+            atlas_size: None,
             seed: 0,
             threads: None,
             solver: Solver::default(),
@@ -136,6 +140,9 @@ impl BakeOptions {
         }
         if self.gap > 64 {
             return wrong("gap", self.gap.to_string(), "at most 64 texels");
+        }
+        if self.atlas_size.is_some_and(|side| !(16..=8192).contains(&side)) {
+            return wrong("atlas size", format!("{:?}", self.atlas_size), "a number of texels in [16, 8192]");
         }
         if self.threads.is_some_and(|threads| !(1..=1024).contains(&threads)) {
             return wrong("threads", format!("{:?}", self.threads), "a number in [1, 1024]");

@@ -38,8 +38,10 @@ pub struct BakeReport {
     pub residual: f64,
     /// Bound on the relative error of the solution: residual / (1 - largest reflectance).
     pub residual_bound: f64,
-    /// Lightmaps made.
+    /// Lightmaps made, atlases among them.
     pub maps: usize,
+    /// Lightmaps that several objects share.
+    pub atlases: usize,
     /// Texels of all maps.
     pub texels: usize,
     /// Share of the texels that a surface covers, in [0, 1].

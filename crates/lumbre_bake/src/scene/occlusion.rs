@@ -49,7 +49,9 @@ impl BakeScene {
         let triangle = &self.triangles[hit.triangle as usize];
         if hit.back_face && !triangle.two_sided {
             // Of the two faces of a sheet, the one that looks at the ray.
-            let slack = SAME_PLACE * (hit.distance + triangle.extent);
+            // What a plane's place is off by, a grazing ray meets further along.
+            let cosine = triangle.normal.dot(direction).abs().max(1.0 / 1024.0);
+            let slack = SAME_PLACE * (hit.distance + triangle.extent) / cosine;
             let near = ray.with_range((hit.distance - slack).max(0.0), hit.distance + slack);
             let facing = |index: u32| self.triangles[index as usize].normal.dot(direction) < 0.0;
             match self.closest(&near, facing) {

@@ -1,0 +1,136 @@
+//! Maps that share atlases show what maps of their own show.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
+use lumbre_mesh::{TriangleMesh, shapes};
+use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
+
+mod common;
+
+fn matt(reflectance: f32) -> Material {
+    let front = Surface { diffuse: Vec3::splat(reflectance), ..Surface::default() };
+    Material { front, ..Material::default() }
+}
+
+/// A floor, sixteen boxes that share a mesh, and a tile whose own coordinates fill the whole square, under a light.
+fn scene() -> World {
+    let mut world = World::new();
+    let floor = Mesh(Arc::new(shapes::plane(8.0, 8.0, 1, 1)));
+    world.spawn((Name::new("floor"), floor, matt(0.5), StaticObject));
+    let block = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.5), 1)));
+    for (index, name) in (0..16).map(|index| (index, format!("box {index:02}"))) {
+        let at =
+            Transform::from_xyz(f64::from(index % 4) * 1.5 - 2.25, 0.5, f64::from(index / 4) * 1.5 - 2.25);
+        world.spawn((Name::new(name), block.clone(), matt(0.5), StaticObject, at));
+    }
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let tile = TriangleMesh {
+        positions: corners.map(|[x, z]| Vec3::new(x, 1.5, z)).to_vec(),
+        uv1: corners.map(Vec2::from).to_vec(),
+        indices: vec![0, 2, 1, 0, 3, 2],
+        ..TriangleMesh::default()
+    };
+    world.spawn((Name::new("tile"), Mesh(Arc::new(tile)), matt(0.5), StaticObject));
+    let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
+    world.spawn((light, Transform::from_xyz(0.3, 2.5, 0.2)));
+    world
+}
+
+fn run(world: &mut World, atlas_size: Option<u32>) -> Result<BakeReport, BakeError> {
+    let options = BakeOptions {
+        density: Density::TexelsPerMeter(12.0),
+        quality: Quality::Draft,
+        atlas_size,
+        ..BakeOptions::default()
+    };
+    bake(world, &options, &mut |_| ControlFlow::Continue(()))
+}
+
+/// By object: what is read, bilinearly, at points of each triangle, corners and edges among them; the map and its errors.
+type Read = BTreeMap<String, (Vec<DVec3>, String, usize)>;
+
+fn read(world: &mut World) -> Read {
+    let mut query = world.query::<(&Name, &Mesh, &Lightmap, &LightmapError)>();
+    let read = query.iter(world).map(|(name, mesh, map, errors)| {
+        assert_eq!(errors.0.len(), map.image.texels.len());
+        let mut values = Vec::new();
+        for triangle in mesh.0.triangles() {
+            let [a, b, c] = triangle.map(|v| mesh.0.uv1[v as usize].as_dvec2());
+            for i in 0..=6 {
+                for k in 0..=6 - i {
+                    let uv: DVec2 = a + (b - a) * (f64::from(i) / 6.0) + (c - a) * (f64::from(k) / 6.0);
+                    values.push(common::bilinear(&map.image, uv));
+                }
+            }
+        }
+        let known = errors.0.iter().filter(|error| error.is_finite()).count();
+        (name.to_string(), (values, map.image.name.clone(), known))
+    });
+    read.collect()
+}
+
+#[test]
+fn an_atlas_shows_what_maps_of_their_own_show() {
+    let mut alone = scene();
+    let report = run(&mut alone, None).expect("the scene bakes");
+    assert_eq!((report.maps, report.atlases), (18, 0));
+    let expected = read(&mut alone);
+    for (side, least_pages) in [(64, 1), (40, 2)] {
+        let mut world = scene();
+        let report = run(&mut world, Some(side)).expect("the scene bakes");
+        println!("{side}: {} maps, {} atlases", report.maps, report.atlases);
+        // The floor's 97 texels a side keep their own map.
+        assert_eq!(report.maps, report.atlases + 1);
+        assert!(report.atlases >= least_pages);
+        for (name, map) in common::maps(&mut world) {
+            assert!(name.starts_with("floor") || (map.width <= side && map.height <= side), "{name}");
+            assert_eq!(map.texels.len(), (map.width * map.height) as usize);
+        }
+        let found = read(&mut world);
+        assert_eq!(found.len(), 18);
+        for (name, (values, map, _)) in &found {
+            assert_eq!(map.starts_with("atlas-"), name != "floor", "{name} {map}");
+            for (value, expected) in values.iter().zip(&expected[name].0) {
+                // Coordinates in another range round differently: 2^-24 of a page against a texel's slope.
+                assert!((*value - *expected).abs().max_element() < 1e-4, "{name}: {value} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn atlases_survive_the_file_and_the_same_bits_come_again() {
+    let [mut world, mut again] = [scene(), scene()];
+    run(&mut world, Some(64)).expect("the scene bakes");
+    run(&mut again, Some(64)).expect("the scene bakes");
+    assert_eq!(common::bits(&mut world), common::bits(&mut again));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.glb");
+    lumbre_scene::save(&mut world, &path).unwrap();
+    let files = std::fs::read_dir(folder.path())
+        .unwrap()
+        .filter_map(|file| file.ok()?.file_name().into_string().ok());
+    let atlases = files.filter(|name| name.starts_with("atlas-") && name.ends_with(".exr")).count();
+    let mut loaded = World::new();
+    lumbre_scene::load(&mut loaded, &path).unwrap();
+    let mut query = loaded.query::<&Lightmap>();
+    let mut images: Vec<_> = query.iter(&loaded).map(|map| Arc::as_ptr(&map.image)).collect();
+    assert_eq!(images.len(), 18);
+    images.sort_unstable();
+    images.dedup();
+    assert_eq!(images.len(), atlases + 1);
+}
+
+#[test]
+fn an_atlas_out_of_range_is_named() {
+    for side in [0, 15, 8193] {
+        let error = run(&mut World::new(), Some(side)).unwrap_err();
+        assert!(error.to_string().contains("atlas size"), "{error}");
+    }
+}
