@@ -116,6 +116,9 @@ pub struct Bake {
     /// Worker threads; as many as there are cores without this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Free texels between charts: 2 for bilinear filtering, 4 for bicubic.
+    #[arg(long, value_name = "TEXELS", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub gap: u32,
     /// Lets small meshes share atlases of at most N x N texels.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=8192))]
     pub atlas_size: Option<u32>,

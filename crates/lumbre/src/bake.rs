@@ -36,6 +36,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             BakeQuality::Final => Quality::Final,
         },
         threads: asked.threads.map(usize::from),
+        gap: asked.gap,
         atlas_size: asked.atlas_size,
         seams: !asked.no_seams,
         ..BakeOptions::default()

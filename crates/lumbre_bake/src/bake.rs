@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use crate::pages::Pages;
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, sky, world_points};
+use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
 use crate::texels::charts::charts;
 use crate::texels::error_estimate::variances;
 use crate::texels::fill::fill;

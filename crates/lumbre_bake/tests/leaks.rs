@@ -92,9 +92,9 @@ struct Found {
 
 /// Random points of an entity's surface, edges and corners among them; the same for the same triangles.
 fn look_up(world: &World, entity: Entity) -> Vec<Found> {
-    let mesh = &world.get::<Mesh>(entity).unwrap().0;
-    let map = &world.get::<Lightmap>(entity).unwrap().image;
-    let errors = &world.get::<LightmapError>(entity).unwrap().0;
+    let mesh = &world.get::<Mesh>(entity).expect("it was baked").0;
+    let map = &world.get::<Lightmap>(entity).expect("it was baked").image;
+    let errors = &world.get::<LightmapError>(entity).expect("it was baked").0;
     let mut state = 7u64;
     let mut random = || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

@@ -60,8 +60,9 @@ fn run(world: &mut World) -> Result<BakeReport, BakeError> {
 
 /// Where the texture is read at each corner of each triangle.
 fn texture_reading(world: &World, entity: Entity) -> Vec<Vec2> {
-    let mesh = &world.get::<Mesh>(entity).unwrap().0;
-    let texture = world.get::<MaterialTextures>(entity).unwrap().base_color.as_ref().unwrap();
+    let mesh = &world.get::<Mesh>(entity).expect("it was baked").0;
+    let texture =
+        world.get::<MaterialTextures>(entity).expect("it was baked").base_color.as_ref().expect("it has one");
     let coordinates = if texture.tex_coord == 0 { &mesh.uv0 } else { &mesh.uv1 };
     mesh.indices.iter().map(|&vertex| coordinates[vertex as usize]).collect()
 }
@@ -77,7 +78,7 @@ fn a_tiling_second_set_moves_to_the_first_and_survives_the_file() {
         report.warnings.iter().any(|line| line.contains("tiled floor: its textures' coordinates were moved"))
     );
     assert_eq!(texture_reading(&world, entity), before);
-    let mesh = &world.get::<Mesh>(entity).unwrap().0;
+    let mesh = &world.get::<Mesh>(entity).expect("it was baked").0;
     assert!(mesh.uv1.iter().all(|uv| uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all()));
     assert!(world.get::<Lightmap>(entity).is_some());
 
