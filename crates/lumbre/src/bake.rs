@@ -6,9 +6,10 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use lumbre::bake::{BakeOptions, BakeReport, Density, Quality, bake};
-use lumbre::scene::save;
+use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
-use crate::arguments::{Bake, BakeQuality};
+use crate::arguments::{Bake, BakeQuality, ExrTexels};
+use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{extension, load};
 use crate::output::progress_bar;
 
@@ -45,20 +46,35 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         ControlFlow::Continue(())
     })?;
     bar.finish_and_clear();
-    for note in save(&mut world, &asked.output)?.notes {
+    let saved = save_with(&mut world, &asked.output, &save_options(asked))?;
+    for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
     }
-    for warning in &report.warnings {
+    for warning in report.warnings.iter().cloned().chain(warnings_of_files(&saved.lightmaps)) {
         eprintln!("lumbre: warning: {warning}");
     }
     let mut out = std::io::stdout().lock();
     if asked.json {
-        serde_json::to_writer_pretty(&mut out, &report)?;
+        let mut json = serde_json::to_value(&report)?;
+        let files: Vec<_> = saved.lightmaps.iter().map(FileLine::from).collect();
+        json["files"] = serde_json::to_value(files)?;
+        serde_json::to_writer_pretty(&mut out, &json)?;
         writeln!(out)?;
     } else {
-        write!(out, "{}", summary(&report))?;
+        write!(out, "{}{}", summary(&report), summary_of_files(&saved.lightmaps))?;
     }
     Ok(())
+}
+
+fn save_options(asked: &Bake) -> SaveOptions {
+    SaveOptions {
+        encoding: match asked.exr {
+            ExrTexels::Float => None,
+            ExrTexels::Half => Some(LightmapEncoding::Rgb16Float),
+        },
+        ktx2: asked.ktx2,
+        supercompression: if asked.ktx2_raw { Supercompression::None } else { Supercompression::Zstandard },
+    }
 }
 
 /// What would be wrong with the output is said before the work, not after it.

@@ -29,7 +29,7 @@ mod uri;
 mod value;
 
 pub use error::{LoadError, LoadProblem, Note};
-pub use export::{SaveError, SaveReport, save};
+pub use export::{LightmapFile, SaveError, SaveOptions, SaveReport, save, save_with};
 pub use import::{LoadReport, load, load_slice, load_slice_within};
 pub use limits::LoadLimits;
 
