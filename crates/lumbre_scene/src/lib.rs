@@ -3,7 +3,8 @@
 //! ```text
 //!  .glb, .gltf ──► load ──► World ──► save ──► .glb, .gltf (+ .bin, lightmaps as .exr, .ktx2)
 //!                             │
-//!         node: Name, Transform, GlobalTransform, [Light], [Camera], [Extras]
+//!         node: Name, Transform, GlobalTransform, [Light], [Camera], [Extras],
+//!               [IrradianceVolume]
 //!           ├─ primitive: Mesh, Material, Primitive, [MaterialTextures], [Lightmap], [Shading],
 //!           │             StaticObject or DynamicObject
 //!           └─ node below ...

@@ -312,3 +312,44 @@ fn irradiance_volumes_are_laid_out_as_bevy_samples_them() {
     let flat = lightmap_to_ktx2(&light(4, 4), PackedFormat::Rgb9E5, Supercompression::None).unwrap().0;
     assert!(IrradianceVolume::from_ktx2(&flat, 1 << 20).is_err(), "two dimensions are no volume");
 }
+
+#[test]
+fn an_irradiance_volume_comes_back_in_its_place() {
+    let cubes =
+        light(6, 12).texels.chunks_exact(6).map(|sides| AmbientCube(sides.try_into().unwrap())).collect();
+    let volume = IrradianceVolume { resolution: glam::UVec3::new(2, 3, 2), cubes };
+    let place = Transform::from_xyz(1.0, 2.0, 3.0).with_scale(DVec3::new(4.0, 5.0, 6.0));
+    let mut world = world(light(4, 4));
+    world.spawn((Name::new("floor"), volume.clone(), place));
+    let folder = tempfile::tempdir().unwrap();
+    let mut files = Vec::new();
+    for name in ["once.glb", "twice.glb"] {
+        let path = folder.path().join(name);
+        let report = save(&mut world, &path).unwrap();
+        let [map, image] = &report.lightmaps[..] else { panic!("{:?}", report.lightmaps) };
+        assert_ne!(map.path.file_stem(), image.path.file_stem(), "one name each, with every extension");
+        assert_eq!(image.encoding, "rgb9e5");
+        files.push(std::fs::read(&image.path).unwrap());
+        world = World::new();
+        let loaded = load(&mut world, &path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(loaded.notes, []);
+        let mut query = world.query::<(&IrradianceVolume, &Transform, &Name)>();
+        let (found, at, name) = query.single(&world).unwrap();
+        assert_eq!((found.resolution, *at, name.as_str()), (volume.resolution, place, "floor"));
+        for (found, original) in found.cubes.iter().zip(&volume.cubes) {
+            for (found, original) in found.0.iter().zip(&original.0) {
+                let bound = PackedFormat::Rgb9E5.largest_error(*original);
+                assert!((*found - *original).abs().cmple(bound).all(), "{original} became {found}");
+            }
+        }
+    }
+    assert_eq!(files[0], files[1], "what is encoded once loses nothing more");
+    let named = folder.path().join("twice.glb");
+    let names: Vec<_> =
+        std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    for path in names.iter().filter(|path| path.extension().is_some_and(|extension| extension == "ktx2")) {
+        std::fs::write(path, b"no image").unwrap();
+    }
+    let error = load(&mut World::new(), &named).unwrap_err();
+    assert!(error.to_string().contains(".ktx2"), "{error}");
+}

@@ -16,7 +16,7 @@ use super::{container, export_scene, uri};
 use crate::lightmap_files::{
     EncodingError, LightmapFileError, PackedFormat, Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,
 };
-use crate::{LightmapEncoding, LightmapImage};
+use crate::{IrradianceVolume, LightmapEncoding, LightmapImage};
 
 /// What is written beside what a glTF file and its OpenEXR lightmaps need.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub struct SaveOptions {
     pub supercompression: Supercompression,
 }
 
-/// An image of a lightmap that saving wrote.
+/// An image of a lightmap or of an irradiance volume that saving wrote.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightmapFile {
     /// The file.
@@ -50,7 +50,7 @@ pub struct SaveReport {
     pub files: Vec<PathBuf>,
     /// Bytes of the glTF file and its .bin.
     pub bytes: u64,
-    /// The images of lightmaps among the files.
+    /// The images of lightmaps and irradiance volumes among the files.
     pub lightmaps: Vec<LightmapFile>,
     /// What could not be expressed and was left out.
     pub notes: Vec<Note>,
@@ -185,6 +185,18 @@ pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Resul
             write(image_path.with_extension("ktx2"), format.name(), file)?;
         }
     }
+    for (name, volume) in &lightmaps.volumes {
+        let format = PackedFormat::Rgb9E5;
+        let (image, error) =
+            volume.to_ktx2(format, options.supercompression).map_err(|error| SaveError::Image {
+                place: "irradiance volume".to_owned(),
+                image: name.clone(),
+                problem: error.to_string(),
+            })?;
+        let path = path.with_file_name(name);
+        files.write(&path, &image)?;
+        written.push(LightmapFile { path, encoding: format.name(), bytes: image.len() as u64, error });
+    }
     let bin_name = format!("{stem}.bin");
     let (json, data, notes) = document(nodes, scene, (!binary).then_some(bin_name.as_str()));
     let mut bytes = data.len() as u64;
@@ -282,12 +294,14 @@ pub(crate) struct LightmapFiles {
     encoding: Option<LightmapEncoding>,
     known: HashMap<*const LightmapImage, usize>,
     images: Vec<(String, Arc<LightmapImage>)>,
+    volumes: Vec<(String, IrradianceVolume)>,
     names: HashSet<String>,
 }
 
 impl LightmapFiles {
     fn new(stem: String, encoding: Option<LightmapEncoding>) -> Self {
-        Self { stem, encoding, known: HashMap::new(), images: Vec::new(), names: HashSet::new() }
+        let (images, volumes, names) = Default::default();
+        Self { stem, encoding, known: HashMap::new(), images, volumes, names }
     }
 
     /// The extension object for a node that shows an image.
@@ -297,28 +311,50 @@ impl LightmapFiles {
         node: Option<&str>,
         index: usize,
     ) -> Value {
-        let known = *self.known.entry(Arc::as_ptr(image)).or_insert_with(|| {
-            let number = index.to_string();
-            // Names become file names: only what every file system takes.
-            let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
-            let label: String =
-                node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
-            let stem = &self.stem;
-            let candidates = std::iter::once(format!("{stem}.{label}.exr"))
-                .chain((index..).map(|number| format!("{stem}.{label}.{number}.exr")));
-            // Case counts on some file systems only.
-            let name = candidates
-                .into_iter()
-                .find(|name| self.names.insert(name.to_lowercase()))
-                .unwrap_or_default();
-            self.images.push((name, image.clone()));
-            self.images.len() - 1
-        });
+        let known = match self.known.get(&Arc::as_ptr(image)) {
+            Some(&known) => known,
+            None => {
+                let name = self.file_name(node, index, "exr");
+                self.known.insert(Arc::as_ptr(image), self.images.len());
+                self.images.push((name, image.clone()));
+                self.images.len() - 1
+            }
+        };
         let encoding = match self.encoding.unwrap_or(image.encoding) {
             LightmapEncoding::Rgb32Float => "rgb32f",
             LightmapEncoding::Rgb16Float => "rgb16f",
             LightmapEncoding::Rgb9E5 => "rgb9e5",
         };
         json!({"image": uri::percent_encoded(&self.images[known].0), "texCoord": 1, "encoding": encoding})
+    }
+
+    /// The extension object for a node with an irradiance volume.
+    pub(crate) fn volume_reference(
+        &mut self,
+        volume: &IrradianceVolume,
+        node: Option<&str>,
+        index: usize,
+    ) -> Value {
+        let name = self.file_name(node, index, "ktx2");
+        let reference =
+            json!({"image": uri::percent_encoded(&name), "encoding": PackedFormat::Rgb9E5.name()});
+        self.volumes.push((name, volume.clone()));
+        reference
+    }
+
+    /// A name that no other image of the file has, whatever its extension.
+    fn file_name(&mut self, node: Option<&str>, index: usize, extension: &str) -> String {
+        let number = index.to_string();
+        // Names become file names: only what every file system takes.
+        let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
+        let label: String =
+            node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
+        let stem = &self.stem;
+        let candidates = std::iter::once(format!("{stem}.{label}"))
+            .chain((index..).map(|number| format!("{stem}.{label}.{number}")));
+        // Case counts on some file systems only.
+        let name =
+            candidates.into_iter().find(|name| self.names.insert(name.to_lowercase())).unwrap_or_default();
+        format!("{name}.{extension}")
     }
 }

@@ -8,9 +8,11 @@
 //! Bevy stretches the grid over the unit cube around the origin of the entity, and rotates neither normals nor sides: volumes are aligned
 //! with the world's axes.
 
+use bevy_ecs::component::Component;
 use glam::{UVec3, Vec3};
 
 use super::{EncodingError, Ktx2Error, Ktx2Texture, LightmapFileError, PackedFormat, Supercompression};
+use crate::Transform;
 
 /// The light at a point: E/π for surfaces that face +X, −X, +Y, −Y, +Z and −Z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,8 +28,11 @@ impl AmbientCube {
     }
 }
 
-/// Ambient cubes at the centres of the cells of a grid.
-#[derive(Clone, Debug, PartialEq)]
+/// Ambient cubes at the centres of the cells of a grid: the baked light for what moves.
+///
+/// The entity's transform maps the unit cube [-1/2, 1/2]^3 to the grid; it may move and stretch it, but not rotate it.
+#[derive(Component, Clone, Debug, PartialEq)]
+#[require(Transform)]
 pub struct IrradianceVolume {
     /// Cells along x, y and z.
     pub resolution: UVec3,
