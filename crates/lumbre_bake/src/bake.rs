@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
+use crate::probes::Wanted;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, collect, lay_out, lights, sky, world_points};
 use crate::texels::charts::charts;
@@ -60,9 +61,11 @@ fn run(
     if objects.is_empty() {
         report.skipped.push("everything: the scene has no static mesh".into());
         apply::forget_lightmaps(world, &[]);
+        apply::place_volume(world, None);
         report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
+    let wanted = Wanted::of(world, &objects);
     let points =
         objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
@@ -77,6 +80,7 @@ fn run(
             .skipped
             .push("everything: no surface emits, no light is static or mixed, and there is no sky".into());
         apply::forget_lightmaps(world, &[]);
+        apply::place_volume(world, None);
         report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
@@ -95,8 +99,8 @@ fn run(
 
     let exchange =
         Exchange::new(&scene, &sources, options, texel_side(&scene, &texels), &mut watch, &mut report)?;
-    let indirect = match &exchange {
-        None => None,
+    let (indirect, volume) = match &exchange {
+        None => (None, wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?),
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
             let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
@@ -114,7 +118,10 @@ fn run(
                 guide: &exchange.guide,
                 run: options.quality.effort().gather[0] / SCRAMBLES as u32,
             };
-            Some(rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?)
+            let gathered =
+                rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?;
+            let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
+            (Some(gathered), volume)
         }
     };
 
@@ -137,6 +144,7 @@ fn run(
         errors[texel.index as usize] = *variance;
     }
     apply::apply(world, &objects, &layout, &filled, &errors);
+    apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));
     report.maps = layout.maps.len();
     Ok(finish(report, &mut watch))
 }
@@ -147,7 +155,9 @@ fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
     let casting: f64 = report
         .stages
         .iter()
-        .filter(|stage| ["direct light", "form factors", "final gather"].contains(&stage.stage.as_str()))
+        .filter(|stage| {
+            ["direct light", "form factors", "final gather", "probes"].contains(&stage.stage.as_str())
+        })
         .map(|stage| stage.seconds)
         .sum();
     report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };

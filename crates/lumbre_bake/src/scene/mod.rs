@@ -10,7 +10,7 @@ mod occlusion;
 mod texture;
 mod triangles;
 
-pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky};
+pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky, under_a_dynamic_object};
 pub(crate) use lightmap_layout::{LightmapLayout, lay_out, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;

@@ -148,6 +148,12 @@ impl<'a> Sources<'a> {
         Self { scene, emitters, tree, lights, sky: sky * PI }
     }
 
+    /// The emissive triangles among them that are to be kept, and no lights.
+    pub fn only_emitters(&self, keep: impl Fn(&Emitter) -> bool) -> Self {
+        let emitters = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
+        Self { scene: self.scene, emitters, lights: Vec::new() }
+    }
+
     /// Whether nothing shines.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty() && self.lights.is_empty() && !self.has_sky()
