@@ -127,9 +127,25 @@ pub struct Bake {
     /// How OpenEXR images hold their texels.
     #[arg(long, value_enum, default_value_t = ExrTexels::Float)]
     pub exr: ExrTexels,
+    /// Whether to bake light for what moves.
+    #[arg(long, value_enum, default_value_t = BakeProbes::Auto)]
+    pub probes: BakeProbes,
+    /// Metres between probes at most; chosen from the scene's size without this.
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub probe_spacing: Option<f64>,
     /// Prints the report as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BakeProbes {
+    /// If something in the scene moves.
+    Auto,
+    /// Also if nothing moves yet.
+    Always,
+    /// Not at all.
+    Never,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

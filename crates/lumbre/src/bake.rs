@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use lumbre::bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre::bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
 use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
-use crate::arguments::{Bake, BakeQuality, ExrTexels};
+use crate::arguments::{Bake, BakeProbes, BakeQuality, ExrTexels};
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{extension, load};
 use crate::output::progress_bar;
@@ -36,6 +36,12 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             BakeQuality::Draft => Quality::Draft,
             BakeQuality::Final => Quality::Final,
         },
+        probes: match asked.probes {
+            BakeProbes::Auto => Probes::Automatic,
+            BakeProbes::Always => Probes::Always,
+            BakeProbes::Never => Probes::Never,
+        },
+        probe_spacing: asked.probe_spacing,
         threads: asked.threads.map(usize::from),
         ..BakeOptions::default()
     };
@@ -109,6 +115,14 @@ fn summary(report: &BakeReport) -> String {
         report.seconds,
         report.threads,
     );
+    if report.probes.resolution != [0; 3] {
+        let [x, y, z] = report.probes.resolution;
+        text.push_str(&format!(
+            "{x} x {y} x {z} probes ({} inside geometry), estimated error {:.2} %\n",
+            report.probes.inside,
+            100.0 * report.probes.estimated_error
+        ));
+    }
     for stage in &report.stages {
         text.push_str(&format!("  {:24} {:7.2} s\n", stage.stage, stage.seconds));
     }

@@ -31,7 +31,7 @@ pub fn summary_of_files(files: &[LightmapFile]) -> String {
     }
     let mut text = String::new();
     for encoding in encodings {
-        let of_it = || files.iter().filter(|file| file.encoding == encoding);
+        let of_it = || files.iter().filter(move |file| file.encoding == encoding);
         let worst =
             |figure: fn(&EncodingError) -> f64| of_it().map(|file| figure(&file.error)).fold(0.0, f64::max);
         text.push_str(&format!(

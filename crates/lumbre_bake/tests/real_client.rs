@@ -11,7 +11,7 @@ use std::path::Path;
 
 use bevy_ecs::world::World;
 use glam::{DMat4, DVec2, DVec3};
-use lumbre_bake::{BakeOptions, Density, Quality, bake};
+use lumbre_bake::{BakeOptions, Density, Probes, Quality, bake};
 use lumbre_scene::{LightmapEncoding, PackedFormat, SaveOptions, Supercompression, load, save_with};
 
 mod common;
@@ -163,11 +163,16 @@ impl Client {
     }
 }
 
-fn baked(model: &Path, side: u32) -> World {
+fn baked(model: &Path, side: u32, error: f64) -> World {
     let mut world = World::new();
     load(&mut world, model).unwrap_or_else(|error| panic!("{error}"));
-    let options =
-        BakeOptions { density: Density::MapSize(side), quality: Quality::Draft, ..BakeOptions::default() };
+    let options = BakeOptions {
+        density: Density::MapSize(side),
+        quality: Quality::Draft,
+        error,
+        probes: Probes::Never,
+        ..BakeOptions::default()
+    };
     bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
     world
 }
@@ -196,9 +201,11 @@ fn the_cornell_box_as_bevy_finds_it() {
         .map(|entry| entry.expect("its entries can be read").path())
         .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("cornell")))
         .flat_map(|path| common::read_reference(&path))
+        // Not every channel of every point is known.
+        .filter(|point| point.irradiance.is_finite())
         .collect();
     assert!(points.len() > 100, "there are reference points");
-    let mut world = baked(&model, 128);
+    let mut world = baked(&model, 128, 0.01);
     let folder = tempfile::tempdir().expect("there is room for it");
     for format in PackedFormat::ALL {
         let path = folder.path().join("cornell baked.glb");
@@ -206,7 +213,7 @@ fn the_cornell_box_as_bevy_finds_it() {
         let client = Client::read(&path);
         let mut errors = Vec::new();
         let mut mean = 0.0;
-        for point in points.iter().filter(|point| point.irradiance.is_finite()) {
+        for point in &points {
             let Some(found) = client.radiance(point.position, point.normal) else { continue };
             let expected = point.irradiance / std::f64::consts::PI;
             errors.push((found - expected).abs().element_sum() / 3.0);
@@ -225,7 +232,7 @@ fn the_cornell_box_as_bevy_finds_it() {
 #[test]
 fn the_ktx2_shows_what_the_open_exr_shows() {
     let Some(model) = common::shared("models/cornell_box.glb") else { return };
-    let mut world = baked(&model, 48);
+    let mut world = baked(&model, 48, 0.01);
     let folder = tempfile::tempdir().expect("there is room for it");
     let path = folder.path().join("level.gltf");
     for format in PackedFormat::ALL {
@@ -262,9 +269,11 @@ fn the_ktx2_shows_what_the_open_exr_shows() {
 }
 
 #[test]
+#[ignore = "bakes a whole level: a minute and more"]
 fn the_demo_level_as_bevy_finds_it() {
     let model = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/demo.glb"));
-    let mut world = baked(model, 16);
+    // The format is asked for, not the light.
+    let mut world = baked(model, 8, 1.0);
     let folder = tempfile::tempdir().expect("there is room for it");
     let path = folder.path().join("demo.baked.glb");
     saved(&mut world, &path, PackedFormat::Rgb9E5);
