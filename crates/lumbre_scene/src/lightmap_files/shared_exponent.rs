@@ -55,7 +55,7 @@ mod tests {
         for exponent in 0..32u32 {
             for red in 0..512u32 {
                 // Green and blue run through all mantissas as well, in orders of their own.
-                let code = red | (red * 5 + 3) % 512 << 9 | (red * 301 + 77) % 512 << 18 | exponent << 27;
+                let code = red | ((red * 5 + 3) % 512) << 9 | ((red * 301 + 77) % 512) << 18 | exponent << 27;
                 let color = decode(code);
                 assert_eq!(color.x, red as f32 * 2f32.powi(exponent as i32 - 24));
                 assert_eq!(decode(encode(color)), color, "{code:#x}");
