@@ -101,7 +101,7 @@ impl ProbeLight<'_> {
                 SurfaceHit::Lit { triangle, side, at, .. } => {
                     self.outgoing.map_or(Vec3::ZERO, |outgoing| outgoing.leaving(triangle, side, at))
                 }
-                SurfaceHit::None => Vec3::ZERO,
+                SurfaceHit::None => self.outgoing.map_or(Vec3::ZERO, |outgoing| outgoing.sky),
                 SurfaceHit::Back | SurfaceHit::Inside => {
                     backs += 1;
                     Vec3::ZERO

@@ -1,6 +1,6 @@
 //! Irradiance probes: the baked light in the space between surfaces, for what moves there. Not the lightmaps, and not the drawing.
 //!
-//! A probe holds what a moving object does not get from lights in real time: bounces of everything that is baked, and emissive faces
+//! A probe holds what a moving object does not get from lights in real time: bounces of everything that is baked, the sky, and emissive faces
 //! (those with an `EmissiveLight` apart, which are polygon lights in a frame). The direct light of point, spot and directional lights is
 //! left out, also of static ones: a frame lights what has no lightmap with them.
 //!

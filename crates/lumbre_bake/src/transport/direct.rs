@@ -150,8 +150,9 @@ impl<'a> Sources<'a> {
 
     /// The emissive triangles among them that are to be kept, and no lights.
     pub fn only_emitters(&self, keep: impl Fn(&Emitter) -> bool) -> Self {
-        let emitters = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
-        Self { scene: self.scene, emitters, lights: Vec::new() }
+        let emitters: Vec<Emitter> = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
+        let tree = EmitterTree::new(&emitters, &lamps(self.scene, &emitters));
+        Self { scene: self.scene, emitters, tree, lights: Vec::new(), sky: Vec3::ZERO }
     }
 
     /// Whether nothing shines.
