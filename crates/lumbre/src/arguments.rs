@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{FlatRule, ReflectionModel, Shading};
 use lumbre::render::Display;
+use lumbre::scene::PackedFormat;
 
 /// Lighting for games that tells you what it costs.
 #[derive(Debug, Parser)]
@@ -37,6 +38,7 @@ pub enum Command {
 Examples:
   lumbre bake room.glb -o room.baked.glb
   lumbre bake room.glb -o room.baked.glb --error 0.005 --time 120
+  lumbre bake room.glb -o room.baked.glb --ktx2 rgb9e5
   lumbre bake box.glb -o box.baked.glb --map-size 256 --json > report.json")]
     Bake(Bake),
     /// Draw frames without a window.
@@ -125,9 +127,42 @@ pub struct Bake {
     /// Leaves the seams between charts as they are.
     #[arg(long)]
     pub no_seams: bool,
+    /// Writes each lightmap as a KTX2 image too, as Bevy reads it.
+    #[arg(long, value_name = "rgb9e5|b10g11r11", value_parser = packed_format)]
+    pub ktx2: Option<PackedFormat>,
+    /// Leaves KTX2 images without Zstandard compression.
+    #[arg(long, requires = "ktx2")]
+    pub ktx2_raw: bool,
+    /// How OpenEXR images hold their texels.
+    #[arg(long, value_enum, default_value_t = ExrTexels::Float)]
+    pub exr: ExrTexels,
+    /// Whether to bake light for what moves.
+    #[arg(long, value_enum, default_value_t = BakeProbes::Auto)]
+    pub probes: BakeProbes,
+    /// Metres between probes at most; chosen from the scene's size without this.
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub probe_spacing: Option<f64>,
     /// Prints the report as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BakeProbes {
+    /// If something in the scene moves.
+    Auto,
+    /// Also if nothing moves yet.
+    Always,
+    /// Not at all.
+    Never,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ExrTexels {
+    /// 32 bits a channel.
+    Float,
+    /// 16 bits a channel: half the size, within 1/2048 of each channel.
+    Half,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -253,6 +288,11 @@ fn reflection(text: &str) -> Result<ReflectionModel, String> {
 
 fn flat_rule(text: &str) -> Result<FlatRule, String> {
     named(FlatRule::from_name(text), FlatRule::ALL.iter().map(|choice| choice.name()))
+}
+
+fn packed_format(text: &str) -> Result<PackedFormat, String> {
+    let found = PackedFormat::ALL.into_iter().find(|format| format.name() == text);
+    named(found, PackedFormat::ALL.iter().map(|format| format.name()))
 }
 
 fn on_or_off(text: &str) -> Result<bool, String> {

@@ -5,10 +5,11 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use lumbre::bake::{BakeOptions, BakeReport, Density, Quality, bake};
-use lumbre::scene::save;
+use lumbre::bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
+use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
-use crate::arguments::{Bake, BakeQuality};
+use crate::arguments::{Bake, BakeProbes, BakeQuality, ExrTexels};
+use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{extension, load};
 use crate::output::progress_bar;
 
@@ -35,6 +36,12 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             BakeQuality::Draft => Quality::Draft,
             BakeQuality::Final => Quality::Final,
         },
+        probes: match asked.probes {
+            BakeProbes::Auto => Probes::Automatic,
+            BakeProbes::Always => Probes::Always,
+            BakeProbes::Never => Probes::Never,
+        },
+        probe_spacing: asked.probe_spacing,
         threads: asked.threads.map(usize::from),
         gap: asked.gap,
         atlas_size: asked.atlas_size,
@@ -48,20 +55,35 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         ControlFlow::Continue(())
     })?;
     bar.finish_and_clear();
-    for note in save(&mut world, &asked.output)?.notes {
+    let saved = save_with(&mut world, &asked.output, &save_options(asked))?;
+    for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
     }
-    for warning in &report.warnings {
+    for warning in report.warnings.iter().cloned().chain(warnings_of_files(&saved.lightmaps)) {
         eprintln!("lumbre: warning: {warning}");
     }
     let mut out = std::io::stdout().lock();
     if asked.json {
-        serde_json::to_writer_pretty(&mut out, &report)?;
+        let mut json = serde_json::to_value(&report)?;
+        let files: Vec<_> = saved.lightmaps.iter().map(FileLine::from).collect();
+        json["files"] = serde_json::to_value(files)?;
+        serde_json::to_writer_pretty(&mut out, &json)?;
         writeln!(out)?;
     } else {
-        write!(out, "{}", summary(&report))?;
+        write!(out, "{}{}", summary(&report), summary_of_files(&saved.lightmaps))?;
     }
     Ok(())
+}
+
+fn save_options(asked: &Bake) -> SaveOptions {
+    SaveOptions {
+        encoding: match asked.exr {
+            ExrTexels::Float => None,
+            ExrTexels::Half => Some(LightmapEncoding::Rgb16Float),
+        },
+        ktx2: asked.ktx2,
+        supercompression: if asked.ktx2_raw { Supercompression::None } else { Supercompression::Zstandard },
+    }
 }
 
 /// What would be wrong with the output is said before the work, not after it.
@@ -96,6 +118,14 @@ fn summary(report: &BakeReport) -> String {
         report.seconds,
         report.threads,
     );
+    if report.probes.resolution != [0; 3] {
+        let [x, y, z] = report.probes.resolution;
+        text.push_str(&format!(
+            "{x} x {y} x {z} probes ({} inside geometry), estimated error {:.2} %\n",
+            report.probes.inside,
+            100.0 * report.probes.estimated_error
+        ));
+    }
     for stage in &report.stages {
         text.push_str(&format!("  {:24} {:7.2} s\n", stage.stage, stage.seconds));
     }

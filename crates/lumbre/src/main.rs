@@ -3,6 +3,7 @@
 mod arguments;
 mod bake;
 mod explain;
+mod lightmap_report;
 mod loading;
 mod output;
 mod play;

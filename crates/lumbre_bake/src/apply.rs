@@ -6,7 +6,10 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::{Component, Entity, With, World};
 use glam::Vec3;
-use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, Mesh};
+use lumbre_scene::{
+    Children, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage, Mesh, Name, Transform,
+    update_transforms,
+};
 
 use crate::pages::Pages;
 use crate::scene::{LightmapLayout, Object, reading_first};
@@ -79,6 +82,24 @@ pub(crate) fn forget_lightmaps(world: &mut World, objects: &[Object]) {
     let stale: Vec<Entity> = mapped.iter(world).filter(|entity| !kept.contains(entity)).collect();
     for entity in stale {
         world.entity_mut(entity).remove::<(Lightmap, LightmapError)>();
+    }
+}
+
+/// Puts the light for what moves in its place, and takes away that of an earlier bake.
+pub(crate) fn place_volume(world: &mut World, volume: Option<(Transform, IrradianceVolume)>) {
+    let mut query = world.query_filtered::<Entity, With<IrradianceVolume>>();
+    let stale: Vec<Entity> = query.iter(world).collect();
+    for entity in stale {
+        // What hangs below it is not the bake's.
+        if world.get::<Children>(entity).is_some_and(|children| !children.is_empty()) {
+            world.entity_mut(entity).remove::<IrradianceVolume>();
+        } else {
+            world.despawn(entity);
+        }
+    }
+    if let Some((transform, volume)) = volume {
+        world.spawn((Name::new("irradiance volume"), transform, volume));
+        update_transforms(world);
     }
 }
 

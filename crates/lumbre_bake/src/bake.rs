@@ -6,6 +6,7 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 
 use crate::pages::Pages;
+use crate::probes::Wanted;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
 use crate::texels::charts::charts;
@@ -62,9 +63,11 @@ fn run(
     if objects.is_empty() {
         report.skipped.push("everything: the scene has no static mesh".into());
         apply::forget_lightmaps(world, &[]);
+        apply::place_volume(world, None);
         report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
+    let wanted = Wanted::of(world, &objects);
     let points =
         objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
@@ -79,6 +82,7 @@ fn run(
             .skipped
             .push("everything: no surface emits, no light is static or mixed, and there is no sky".into());
         apply::forget_lightmaps(world, &[]);
+        apply::place_volume(world, None);
         report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
@@ -97,8 +101,8 @@ fn run(
 
     let exchange =
         Exchange::new(&scene, &sources, options, texel_side(&scene, &texels), &mut watch, &mut report)?;
-    let indirect = match &exchange {
-        None => None,
+    let (indirect, volume) = match &exchange {
+        None => (None, wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?),
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
             let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
@@ -120,7 +124,8 @@ fn run(
             let gathered =
                 rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
-            Some(gathered)
+            let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
+            (Some(gathered), volume)
         }
     };
 
@@ -152,6 +157,7 @@ fn run(
     apply::apply(world, &objects, &layout, &filled, &errors, &pages);
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
+    apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));
     Ok(finish(report, &mut watch))
 }
 
@@ -161,7 +167,9 @@ fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
     let casting: f64 = report
         .stages
         .iter()
-        .filter(|stage| ["direct light", "form factors", "final gather"].contains(&stage.stage.as_str()))
+        .filter(|stage| {
+            ["direct light", "form factors", "final gather", "probes"].contains(&stage.stage.as_str())
+        })
         .map(|stage| stage.seconds)
         .sum();
     report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };

@@ -8,6 +8,7 @@
 //!            lay out uv1         (pooled, reciprocal)   (per channel)   direct light              Lightmap E/π
 //!            triangles, BVH     emitters, lights ─► direct light        final gather, rounds
 //!            materials                                                  smooth ─► fill
+//!                                                                      probes: grid ─► light ─► fill ──► IrradianceVolume
 //! ```
 //!
 //! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per
@@ -38,6 +39,7 @@ mod bake;
 mod error;
 mod options;
 mod pages;
+mod probes;
 mod progress;
 mod report;
 mod sampling;
@@ -48,8 +50,8 @@ mod transport;
 pub use apply::LightmapError;
 pub use bake::bake;
 pub use error::BakeError;
-pub use options::{BakeOptions, Density, Quality};
+pub use options::{BakeOptions, Density, Probes, Quality};
 pub use progress::Progress;
-pub use report::{BakeReport, StageTime};
+pub use report::{BakeReport, ProbeReport, StageTime};
 pub use texels::seams::SeamReport;
 pub use transport::solver::Solver;

@@ -18,6 +18,18 @@ pub enum Density {
     MapSize(u32),
 }
 
+/// Whether light is baked for what moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Probes {
+    /// If something in the scene moves.
+    #[default]
+    Automatic,
+    /// Also if nothing moves yet.
+    Always,
+    /// Not at all.
+    Never,
+}
+
 /// How much work the sampling may take before the error is reached.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Quality {
@@ -58,6 +70,10 @@ pub struct BakeOptions {
     pub denoise: bool,
     /// Closes seams: where charts meet smoothly, both sides show the same light.
     pub seams: bool,
+    /// Whether light is baked for what moves.
+    pub probes: Probes,
+    /// Metres between probes at most, positive and finite; by the scene's size, for up to 4096 of them, if absent.
+    pub probe_spacing: Option<f64>,
 }
 
 impl Default for BakeOptions {
@@ -74,6 +90,8 @@ impl Default for BakeOptions {
             solver: Solver::default(),
             denoise: true,
             seams: true,
+            probes: Probes::default(),
+            probe_spacing: None,
         }
     }
 }
@@ -137,6 +155,9 @@ impl BakeOptions {
         }
         if !(self.error.is_finite() && self.error > 0.0) {
             return wrong("error", self.error.to_string(), "a positive finite number");
+        }
+        if let Some(spacing) = self.probe_spacing.filter(|spacing| !(spacing.is_finite() && *spacing > 0.0)) {
+            return wrong("probe spacing", spacing.to_string(), "a positive finite number of metres");
         }
         if self.gap > 64 {
             return wrong("gap", self.gap.to_string(), "at most 64 texels");

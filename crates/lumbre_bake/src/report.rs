@@ -13,6 +13,19 @@ pub struct StageTime {
     pub seconds: f64,
 }
 
+/// The probes of a bake; all zeros without any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ProbeReport {
+    /// Probes along x, y and z.
+    pub resolution: [u32; 3],
+    /// Metres between them.
+    pub spacing: [f64; 3],
+    /// How many lie inside geometry and show their neighbours' light.
+    pub inside: usize,
+    /// Estimated relative RMSE that sampling leaves in them.
+    pub estimated_error: f64,
+}
+
 /// What a bake did, what it cost and how good it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BakeReport {
@@ -59,6 +72,8 @@ pub struct BakeReport {
     pub estimated_error: f64,
     /// Whether the estimated error is at most the one asked for.
     pub error_reached: bool,
+    /// Light for what moves.
+    pub probes: ProbeReport,
     /// Share of the patches' mutual exchange that was cut so that no row of form factors exceeds 1.
     pub energy_lost: f64,
     /// What closing the seams did; zeros where there were none.
@@ -106,6 +121,14 @@ impl std::fmt::Display for BakeReport {
                 100.0 * self.seams.jump_after,
                 100.0 * self.seams.mean_change,
                 100.0 * self.seams.largest_change
+            )?;
+        }
+        if self.probes.resolution != [0; 3] {
+            let ProbeReport { resolution: [x, y, z], inside, estimated_error, .. } = self.probes;
+            writeln!(
+                f,
+                "{x} x {y} x {z} probes, {inside} inside geometry, error {:.2} %",
+                100.0 * estimated_error
             )?;
         }
         for stage in &self.stages {

@@ -68,6 +68,14 @@ pub(crate) fn frame(normal: Vec3) -> [Vec3; 2] {
     ]
 }
 
+/// A unit vector with density 1 / 4π: Archimedes' equal-area map of the cylinder.
+pub(crate) fn sphere_direction(u: f32, v: f32) -> Vec3 {
+    let z = 1.0 - 2.0 * u;
+    let radius = (1.0 - z * z).max(0.0).sqrt();
+    let (sine, cosine) = (TAU * v).sin_cos();
+    Vec3::new(radius * cosine, radius * sine, z)
+}
+
 /// A direction with density cos θ / π about a unit `normal`.
 pub(crate) fn cosine_about(normal: Vec3, u: f32, v: f32) -> Vec3 {
     let [x, y] = frame(normal);

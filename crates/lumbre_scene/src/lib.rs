@@ -1,9 +1,10 @@
 //! Scenes: components, transform hierarchy, glTF in and out, and the census. No GPU, no lighting equations.
 //!
 //! ```text
-//!  .glb, .gltf ──► load ──► World ──► save ──► .glb, .gltf (+ .bin, lightmaps as .exr)
+//!  .glb, .gltf ──► load ──► World ──► save ──► .glb, .gltf (+ .bin, lightmaps as .exr, .ktx2)
 //!                             │
-//!         node: Name, Transform, GlobalTransform, [Light], [Camera], [Extras]
+//!         node: Name, Transform, GlobalTransform, [Light], [Camera], [Extras],
+//!               [IrradianceVolume]
 //!           ├─ primitive: Mesh, Material, Primitive, [MaterialTextures], [Lightmap], [Shading],
 //!           │             StaticObject or DynamicObject
 //!           └─ node below ...
@@ -41,6 +42,7 @@ mod default_camera;
 mod gltf;
 mod hidden_cone;
 mod image;
+mod lightmap_files;
 mod settings;
 mod transform;
 
@@ -54,11 +56,15 @@ pub use components::{
 };
 pub use default_camera::default_camera;
 pub use gltf::{
-    LoadError, LoadLimits, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS, SaveError, SaveReport, load,
-    load_slice, load_slice_within, save,
+    LightmapFile, LoadError, LoadLimits, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS, SaveError,
+    SaveOptions, SaveReport, load, load_slice, load_slice_within, save, save_with,
 };
 pub use hidden_cone::{HiddenCone, hidden_cones};
 pub use image::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};
+pub use lightmap_files::{
+    AmbientCube, EncodingError, IrradianceVolume, Ktx2Error, Ktx2Texture, LightmapFileError, PackedFormat,
+    Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,
+};
 pub use lumbre_optics::{Light, Material, Shading};
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};

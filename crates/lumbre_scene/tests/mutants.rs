@@ -9,7 +9,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
-use lumbre_scene::load_slice;
+use glam::Vec3;
+use lumbre_scene::{
+    LightmapEncoding, LightmapImage, PackedFormat, Supercompression, lightmap_to_ktx2, load_slice,
+};
 use serde_json::json;
 use support::{File, png};
 
@@ -266,21 +269,29 @@ fn no_damaged_lightmap_panics() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = File::new();
     file.square(|_, _| {});
+    // What it is shows in its bytes, not in its name.
     file.root["nodes"][0]["extensions"] = json!({"LUMBRE_lightmap": {"image": "l.exr"}});
     let file = file.glb();
     let path = folder.path().join("l.exr");
     image::Rgb32FImage::from_fn(9, 5, |x, y| image::Rgb([x as f32, y as f32, 0.5])).save(&path).unwrap();
-    let original = std::fs::read(&path).unwrap();
-    let (mut loaded, mut refused) = (0, 0);
-    for seed in 0..1_000 {
-        std::fs::write(&path, mutant(&original, &mut Random(seed))).unwrap();
-        match load_slice(&mut World::new(), &file, "level", Some(folder.path())) {
-            Ok(_) => loaded += 1,
-            Err(error) => {
-                assert!(error.to_string().contains("l.exr"), "{error}");
-                refused += 1;
+    let open_exr = std::fs::read(&path).unwrap();
+    let texels = (0..45).map(|at| Vec3::new(at as f32, 1.0, 0.5)).collect();
+    let (name, encoding) = (String::new(), LightmapEncoding::default());
+    let image = LightmapImage { name, width: 9, height: 5, texels, encoding };
+    let ktx2 = [Supercompression::None, Supercompression::Zstandard]
+        .map(|scheme| lightmap_to_ktx2(&image, PackedFormat::Rgb9E5, scheme).unwrap().0);
+    for original in std::iter::once(open_exr).chain(ktx2) {
+        let (mut loaded, mut refused) = (0, 0);
+        for seed in 0..1_000 {
+            std::fs::write(&path, mutant(&original, &mut Random(seed))).unwrap();
+            match load_slice(&mut World::new(), &file, "level", Some(folder.path())) {
+                Ok(_) => loaded += 1,
+                Err(error) => {
+                    assert!(error.to_string().contains("l.exr"), "{error}");
+                    refused += 1;
+                }
             }
         }
+        assert!(loaded > 50 && refused > 50, "{loaded} loaded, {refused} refused");
     }
-    assert!(loaded > 50 && refused > 50, "{loaded} loaded, {refused} refused");
 }

@@ -88,7 +88,8 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
     Ok(objects)
 }
 
-fn under_a_dynamic_object(world: &World, parent: Option<&ChildOf>) -> bool {
+/// Whether something moves with what is above it.
+pub(crate) fn under_a_dynamic_object(world: &World, parent: Option<&ChildOf>) -> bool {
     let mut above = parent.map(ChildOf::parent);
     while let Some(entity) = above {
         if world.get::<DynamicObject>(entity).is_some() {

@@ -12,7 +12,7 @@ mod texture;
 mod texture_coordinates;
 mod triangles;
 
-pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky};
+pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky, under_a_dynamic_object};
 pub(crate) use lightmap_layout::{LightmapLayout, lay_out, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;

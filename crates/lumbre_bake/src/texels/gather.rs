@@ -279,6 +279,13 @@ impl Outgoing<'_> {
         self.sample(&receiver, self.guide.regions.at(from.triangle, from.side, from.at), u, v)
     }
 
+    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.
+    pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
+        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
+        let irradiance = self.direct_at(triangle, side, at, patch) + self.patch_indirect[patch as usize];
+        self.reflectance(triangle, side, at, patch) * irradiance
+    }
+
     fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {
         let scene_triangle = &self.scene.triangles[triangle as usize];
         let surface = &self.scene.surfaces[scene_triangle.surface as usize];

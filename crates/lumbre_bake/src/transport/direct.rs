@@ -148,6 +148,13 @@ impl<'a> Sources<'a> {
         Self { scene, emitters, tree, lights, sky: sky * PI }
     }
 
+    /// The emissive triangles among them that are to be kept, and no lights.
+    pub fn only_emitters(&self, keep: impl Fn(&Emitter) -> bool) -> Self {
+        let emitters: Vec<Emitter> = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
+        let tree = EmitterTree::new(&emitters, &lamps(self.scene, &emitters));
+        Self { scene: self.scene, emitters, tree, lights: Vec::new(), sky: Vec3::ZERO }
+    }
+
     /// Whether nothing shines.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty() && self.lights.is_empty() && !self.has_sky()

@@ -1,7 +1,6 @@
-//! Saving: a World as a .glb, or a .gltf with a .bin, and its lightmaps as OpenEXR images beside it.
+//! Saving: a World as a .glb, or a .gltf with a .bin, and its lightmaps as OpenEXR and KTX2 images beside it.
 
 use std::collections::{HashMap, HashSet};
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -14,7 +13,35 @@ use super::error::Note;
 use super::export_files::Files;
 use super::export_nodes::Nodes;
 use super::{container, export_scene, uri};
-use crate::{LightmapEncoding, LightmapImage};
+use crate::lightmap_files::{
+    EncodingError, LightmapFileError, PackedFormat, Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,
+};
+use crate::{IrradianceVolume, LightmapEncoding, LightmapImage};
+
+/// What is written beside what a glTF file and its OpenEXR lightmaps need.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SaveOptions {
+    /// How OpenEXR images hold their texels, in place of what each lightmap says: half floats for [`LightmapEncoding::Rgb16Float`], else
+    /// 32-bit floats.
+    pub encoding: Option<LightmapEncoding>,
+    /// Writes each lightmap as a KTX2 image too, under the name of its OpenEXR image with the extension `ktx2`.
+    pub ktx2: Option<PackedFormat>,
+    /// How KTX2 images are compressed.
+    pub supercompression: Supercompression,
+}
+
+/// An image of a lightmap or of an irradiance volume that saving wrote.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightmapFile {
+    /// The file.
+    pub path: PathBuf,
+    /// How it holds a texel: `rgb32f`, `rgb16f`, `rgb9e5` or `b10g11r11`.
+    pub encoding: &'static str,
+    /// Its bytes.
+    pub bytes: u64,
+    /// What the encoding costs.
+    pub error: EncodingError,
+}
 
 /// What saving wrote.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +50,8 @@ pub struct SaveReport {
     pub files: Vec<PathBuf>,
     /// Bytes of the glTF file and its .bin.
     pub bytes: u64,
+    /// The images of lightmaps and irradiance volumes among the files.
+    pub lightmaps: Vec<LightmapFile>,
     /// What could not be expressed and was left out.
     pub notes: Vec<Note>,
 }
@@ -115,6 +144,14 @@ pub enum SaveError {
 /// # Errors
 /// [`SaveError`] with the place and the remedy. Nothing half-written is left behind.
 pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
+    save_with(world, path, &SaveOptions::default())
+}
+
+/// As [`save`], with choices.
+///
+/// # Errors
+/// As [`save`].
+pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Result<SaveReport, SaveError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let binary = match extension.as_deref() {
         Some("glb") => true,
@@ -122,13 +159,43 @@ pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
         _ => return Err(SaveError::Extension { path: path.to_owned() }),
     };
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut lightmaps = LightmapFiles::new(stem.clone());
+    let mut lightmaps = LightmapFiles::new(stem.clone(), options.encoding);
     let nodes = Nodes::collect(world, &mut lightmaps)?;
     let scene = export_scene::settings(world)?;
 
     let mut files = Files::default();
+    let mut written = Vec::new();
     for (name, image) in &lightmaps.images {
-        files.write(&path.with_file_name(name), &open_exr(image)?)?;
+        let failed = |error: LightmapFileError| SaveError::Image {
+            place: "lightmap".to_owned(),
+            image: image.name.clone(),
+            problem: error.to_string(),
+        };
+        let mut write = |path: PathBuf, encoding, (bytes, error): (Vec<u8>, EncodingError)| {
+            files.write(&path, &bytes)?;
+            written.push(LightmapFile { path, encoding, bytes: bytes.len() as u64, error });
+            Ok::<_, SaveError>(())
+        };
+        let image_path = path.with_file_name(name);
+        let encoding = options.encoding.unwrap_or(image.encoding);
+        let name = if encoding == LightmapEncoding::Rgb16Float { "rgb16f" } else { "rgb32f" };
+        write(image_path.clone(), name, lightmap_to_open_exr(image, encoding).map_err(failed)?)?;
+        if let Some(format) = options.ktx2 {
+            let file = lightmap_to_ktx2(image, format, options.supercompression).map_err(failed)?;
+            write(image_path.with_extension("ktx2"), format.name(), file)?;
+        }
+    }
+    for (name, volume) in &lightmaps.volumes {
+        let format = PackedFormat::Rgb9E5;
+        let (image, error) =
+            volume.to_ktx2(format, options.supercompression).map_err(|error| SaveError::Image {
+                place: "irradiance volume".to_owned(),
+                image: name.clone(),
+                problem: error.to_string(),
+            })?;
+        let path = path.with_file_name(name);
+        files.write(&path, &image)?;
+        written.push(LightmapFile { path, encoding: format.name(), bytes: image.len() as u64, error });
     }
     let bin_name = format!("{stem}.bin");
     let (json, data, notes) = document(nodes, scene, (!binary).then_some(bin_name.as_str()));
@@ -148,7 +215,7 @@ pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
         bytes += text.len() as u64;
         files.write(path, &text)?;
     }
-    Ok(SaveReport { files: files.commit()?, bytes, notes })
+    Ok(SaveReport { files: files.commit()?, bytes, lightmaps: written, notes })
 }
 
 /// The JSON and the binary data of a file.
@@ -224,14 +291,17 @@ fn extensions_in(value: &Value, used: &mut HashSet<String>) {
 /// Lightmap images to be written, each once, under names that do not collide.
 pub(crate) struct LightmapFiles {
     stem: String,
+    encoding: Option<LightmapEncoding>,
     known: HashMap<*const LightmapImage, usize>,
     images: Vec<(String, Arc<LightmapImage>)>,
+    volumes: Vec<(String, IrradianceVolume)>,
     names: HashSet<String>,
 }
 
 impl LightmapFiles {
-    fn new(stem: String) -> Self {
-        Self { stem, known: HashMap::new(), images: Vec::new(), names: HashSet::new() }
+    fn new(stem: String, encoding: Option<LightmapEncoding>) -> Self {
+        let (images, volumes, names) = Default::default();
+        Self { stem, encoding, known: HashMap::new(), images, volumes, names }
     }
 
     /// The extension object for a node that shows an image.
@@ -241,57 +311,50 @@ impl LightmapFiles {
         node: Option<&str>,
         index: usize,
     ) -> Value {
-        let known = *self.known.entry(Arc::as_ptr(image)).or_insert_with(|| {
-            let number = index.to_string();
-            // Names become file names: only what every file system takes.
-            let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
-            let label: String =
-                node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
-            let stem = &self.stem;
-            let candidates = std::iter::once(format!("{stem}.{label}.exr"))
-                .chain((index..).map(|number| format!("{stem}.{label}.{number}.exr")));
-            // Case counts on some file systems only.
-            let name = candidates
-                .into_iter()
-                .find(|name| self.names.insert(name.to_lowercase()))
-                .unwrap_or_default();
-            self.images.push((name, image.clone()));
-            self.images.len() - 1
-        });
-        let encoding = match image.encoding {
+        let known = match self.known.get(&Arc::as_ptr(image)) {
+            Some(&known) => known,
+            None => {
+                let name = self.file_name(node, index, "exr");
+                self.known.insert(Arc::as_ptr(image), self.images.len());
+                self.images.push((name, image.clone()));
+                self.images.len() - 1
+            }
+        };
+        let encoding = match self.encoding.unwrap_or(image.encoding) {
             LightmapEncoding::Rgb32Float => "rgb32f",
             LightmapEncoding::Rgb16Float => "rgb16f",
             LightmapEncoding::Rgb9E5 => "rgb9e5",
         };
         json!({"image": uri::percent_encoded(&self.images[known].0), "texCoord": 1, "encoding": encoding})
     }
-}
 
-/// An OpenEXR file of three f32 channels.
-fn open_exr(image: &LightmapImage) -> Result<Vec<u8>, SaveError> {
-    let failed = |problem: String| SaveError::Image {
-        place: "lightmap".to_owned(),
-        image: image.name.clone(),
-        problem,
-    };
-    let texels = u64::from(image.width) * u64::from(image.height);
-    if texels == 0 || image.texels.len() as u64 != texels {
-        return Err(failed(format!(
-            "{} texels are not {} x {}",
-            image.texels.len(),
-            image.width,
-            image.height
-        )));
+    /// The extension object for a node with an irradiance volume.
+    pub(crate) fn volume_reference(
+        &mut self,
+        volume: &IrradianceVolume,
+        node: Option<&str>,
+        index: usize,
+    ) -> Value {
+        let name = self.file_name(node, index, "ktx2");
+        let reference =
+            json!({"image": uri::percent_encoded(&name), "encoding": PackedFormat::Rgb9E5.name()});
+        self.volumes.push((name, volume.clone()));
+        reference
     }
-    if image.texels.iter().any(|texel| !texel.is_finite()) {
-        return Err(failed("a texel is NaN or infinite".to_owned()));
+
+    /// A name that no other image of the file has, whatever its extension.
+    fn file_name(&mut self, node: Option<&str>, index: usize, extension: &str) -> String {
+        let number = index.to_string();
+        // Names become file names: only what every file system takes.
+        let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
+        let label: String =
+            node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
+        let stem = &self.stem;
+        let candidates = std::iter::once(format!("{stem}.{label}"))
+            .chain((index..).map(|number| format!("{stem}.{label}.{number}")));
+        // Case counts on some file systems only.
+        let name =
+            candidates.into_iter().find(|name| self.names.insert(name.to_lowercase())).unwrap_or_default();
+        format!("{name}.{extension}")
     }
-    let bytes: Vec<u8> =
-        image.texels.iter().flat_map(|texel| texel.to_array()).flat_map(f32::to_ne_bytes).collect();
-    let mut file = Cursor::new(Vec::new());
-    let encoder = image::codecs::openexr::OpenExrEncoder::new(&mut file);
-    let format = image::ExtendedColorType::Rgb32F;
-    image::ImageEncoder::write_image(encoder, &bytes, image.width, image.height, format)
-        .map_err(|error| failed(error.to_string()))?;
-    Ok(file.into_inner())
 }

@@ -14,8 +14,8 @@ use super::export_data::Data;
 use super::extensions::{CameraExtension, ObjectExtension};
 use super::{export_light, export_material, export_scene};
 use crate::{
-    ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, LightmapImage,
-    MaterialTextures, Mesh, Primitive, Transform,
+    ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, IrradianceVolume, Lightmap,
+    LightmapImage, MaterialTextures, Mesh, Primitive, Transform,
 };
 
 /// The lists of a file being written.
@@ -110,6 +110,10 @@ impl Nodes {
             let own = groups.iter().position(|(appearance, _)| appearance.dynamic == dynamic);
             let own = own.map(|own| groups.remove(own));
             let name = world.get::<Name>(entity).map(|name| name.as_str().to_owned());
+            if let Some(volume) = world.get::<IrradianceVolume>(entity) {
+                let reference = lightmaps.volume_reference(volume, name.as_deref(), number);
+                extend(&mut node, "LUMBRE_irradiance_volume", reference);
+            }
             let mut object = ObjectExtension { dynamic: own_dynamic && !inherited, ..Default::default() };
             if let Some((appearance, group)) = own {
                 object.hidden = appearance.hidden;
@@ -302,6 +306,7 @@ fn is_primitive(world: &World, entity: Entity) -> bool {
         && world.get::<Camera>(entity).is_none()
         && world.get::<Name>(entity).is_none()
         && world.get::<Extras>(entity).is_none()
+        && world.get::<IrradianceVolume>(entity).is_none()
         && world.get::<Children>(entity).is_none_or(|children| children.is_empty())
 }
 

@@ -155,6 +155,12 @@ pub(crate) struct LightmapExtension {
     pub encoding: Option<String>,
 }
 
+/// `nodes[i].extensions.LUMBRE_irradiance_volume`. What packs a colour shows in the image; `encoding` tells it to others.
+#[derive(Deserialize, Serialize, Clone, Debug)]
+pub(crate) struct IrradianceVolumeExtension {
+    pub image: String,
+}
+
 /// `nodes[i].extensions.LUMBRE_object`.
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "camelCase")]

@@ -162,6 +162,9 @@ fn spawn_node(world: &mut World, node: &PreparedNode) -> Entity {
     if node.dynamic {
         entity.insert(DynamicObject);
     }
+    if let Some(volume) = &node.irradiance_volume {
+        entity.insert(volume.clone());
+    }
     if let Some(extras) = &node.extras {
         entity.insert(Extras(extras.clone()));
     }

@@ -1,4 +1,4 @@
-//! LUMBRE_lightmap: reads the OpenEXR image beside a baked file. Not the making of lightmaps.
+//! LUMBRE_lightmap: reads the OpenEXR or KTX2 image beside a baked file. Not the making of lightmaps.
 
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -13,6 +13,7 @@ use super::error::LoadProblem;
 use super::extensions::LightmapExtension;
 use super::limits::{Budget, LoadLimits};
 use super::uri;
+use crate::lightmap_files::{Ktx2Error, Ktx2Header};
 use crate::{Lightmap, LightmapEncoding, LightmapImage};
 
 /// Most texels per byte of an OpenEXR file: zlib expands at most 1032 times, and a texel of three halves has six bytes.
@@ -63,20 +64,51 @@ impl Lightmaps {
         let bytes = uri::fetch(&source.image, base, &place)?;
         let name =
             uri::relative(&source.image).map(|path| path.to_string_lossy().into_owned()).unwrap_or_default();
-        let image = Arc::new(decode(&bytes, name, encoding, &place, limits, budget)?);
+        // By its bytes, not by its name.
+        let decode = if Ktx2Header::recognizes(&bytes) { decode_ktx2 } else { decode_open_exr };
+        let (width, height, texels) = decode(&bytes, &place, limits, budget)?;
+        if let Some(at) = texels.iter().position(|texel| !texel.is_finite()) {
+            let (column, row) = (at as u32 % width, at as u32 / width);
+            let problem = format!("texel {column} of row {row} is NaN or infinite; bake again");
+            return Err(LoadProblem::Image { place, problem });
+        }
+        let image = Arc::new(LightmapImage { name, width, height, texels, encoding });
         self.read.insert(key, image.clone());
         Ok(Lightmap { image })
     }
 }
 
-fn decode(
+/// Width, height and texels of an image.
+type Decoded = (u32, u32, Vec<Vec3>);
+
+fn decode_ktx2(
     bytes: &[u8],
-    name: String,
-    encoding: LightmapEncoding,
     place: &str,
     limits: &LoadLimits,
     budget: &mut Budget,
-) -> Result<LightmapImage, LoadProblem> {
+) -> Result<Decoded, LoadProblem> {
+    let refused = |problem: String| LoadProblem::Image { place: place.to_owned(), problem };
+    let unreadable = |error: Ktx2Error| refused(error.to_string());
+    let header = Ktx2Header::read(bytes).map_err(unreadable)?;
+    let (width, height) = (header.width, header.height);
+    if header.depth.is_some() || width.max(height) > limits.image_side {
+        let (depth, side) = (header.depth.unwrap_or(1), limits.image_side);
+        return Err(refused(format!(
+            "claims {width} x {height} x {depth} texels; a lightmap has one slice, and at most {side} per side are allowed"
+        )));
+    }
+    // As bytes, as packed texels and as colours.
+    budget.charge(header.texels, 4 + 4 + 12, || place.to_owned())?;
+    let texture = header.texture().map_err(unreadable)?;
+    Ok((width, height, texture.colors().collect()))
+}
+
+fn decode_open_exr(
+    bytes: &[u8],
+    place: &str,
+    limits: &LoadLimits,
+    budget: &mut Budget,
+) -> Result<Decoded, LoadProblem> {
     let refused = |problem: String| LoadProblem::Image { place: place.to_owned(), problem };
     let undecodable =
         |error: image::ImageError| refused(format!("cannot be decoded as OpenEXR: {error}; bake again"));
@@ -100,12 +132,5 @@ fn decode(
         .chunks_exact(12)
         .map(|texel| Vec3::new(float(&texel[..4]), float(&texel[4..8]), float(&texel[8..])))
         .collect();
-    if let Some(at) = texels.iter().position(|texel| !texel.is_finite()) {
-        return Err(refused(format!(
-            "texel {} of row {} is NaN or infinite; bake again",
-            at as u32 % width,
-            at as u32 / width
-        )));
-    }
-    Ok(LightmapImage { name, width, height, texels, encoding })
+    Ok((width, height, texels))
 }

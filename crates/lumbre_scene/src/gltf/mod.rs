@@ -18,6 +18,7 @@ mod extensions;
 mod hierarchy;
 mod import;
 mod import_image;
+mod import_irradiance_volume;
 mod import_light;
 mod import_lightmap;
 mod import_material;
@@ -29,7 +30,7 @@ mod uri;
 mod value;
 
 pub use error::{LoadError, LoadProblem, Note};
-pub use export::{SaveError, SaveReport, save};
+pub use export::{LightmapFile, SaveError, SaveOptions, SaveReport, save, save_with};
 pub use import::{LoadReport, load, load_slice, load_slice_within};
 pub use limits::LoadLimits;
 
@@ -41,6 +42,7 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "LUMBRE_camera",
+    "LUMBRE_irradiance_volume",
     "LUMBRE_lightmap",
     "LUMBRE_lights_phong",
     "LUMBRE_materials_phong",

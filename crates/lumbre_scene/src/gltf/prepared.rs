@@ -12,15 +12,17 @@ use super::accessor::Buffers;
 use super::document::{self, Document, element, extension};
 use super::error::{LoadProblem, Notes};
 use super::extensions::{
-    CameraExtension, LightReference, LightmapExtension, ObjectExtension, ShadingExtension,
+    CameraExtension, IrradianceVolumeExtension, LightReference, LightmapExtension, ObjectExtension,
+    ShadingExtension,
 };
 use super::hierarchy::{Hierarchy, hierarchy, transform};
 use super::import_image::Images;
+use super::import_irradiance_volume::irradiance_volume;
 use super::import_lightmap::Lightmaps;
 use super::limits::{Budget, LoadLimits};
 use super::value::number;
 use super::{import_light, import_material, import_mesh, import_scene};
-use crate::{Camera, Lightmap, MaterialTextures, Primitive, SceneSettings, Transform};
+use crate::{Camera, IrradianceVolume, Lightmap, MaterialTextures, Primitive, SceneSettings, Transform};
 
 /// A primitive of a mesh with its material.
 pub(crate) struct PreparedPrimitive {
@@ -44,6 +46,7 @@ pub(crate) struct PreparedNode {
     pub shading: Option<Shading>,
     pub reflection: Option<ReflectionModel>,
     pub lightmap: Option<Lightmap>,
+    pub irradiance_volume: Option<IrradianceVolume>,
     pub dynamic: bool,
     pub hidden: bool,
     pub emissive_light: bool,
@@ -149,6 +152,10 @@ pub(crate) fn prepare(
             Some(source) => Some(lightmaps.lightmap(&source, &place, base, &limits, &mut images.budget)?),
             None => None,
         };
+        let volume =
+            extension::<IrradianceVolumeExtension>(&node.extensions, "LUMBRE_irradiance_volume", &place)?
+                .map(|source| irradiance_volume(&source, &place, base, &limits, &mut images.budget))
+                .transpose()?;
         if let Some(primitives) = lightmap.as_ref().and(node.mesh).and_then(|mesh| meshes.get(&mesh))
             && primitives.iter().any(|primitive| primitive.mesh.uv1.is_empty())
         {
@@ -174,6 +181,7 @@ pub(crate) fn prepare(
             shading,
             reflection,
             lightmap,
+            irradiance_volume: volume,
             dynamic: dynamic.contains(&index),
             hidden: object.hidden,
             emissive_light: object.emissive_light,

@@ -1,0 +1,140 @@
+//! Irradiance probes: the baked light in the space between surfaces, for what moves there. Not the lightmaps, and not the drawing.
+//!
+//! A probe holds what a moving object does not get from lights in real time: bounces of everything that is baked, the sky, and emissive faces
+//! (those with an `EmissiveLight` apart, which are polygon lights in a frame). The direct light of point, spot and directional lights is
+//! left out, also of static ones: a frame lights what has no lightmap with them.
+//!
+//! ```text
+//!   grid: cells over the static scene and what moves ─► light: six sides per cell, inside or not ─► fill: cells inside geometry
+//! ```
+
+mod fill;
+mod grid;
+mod light;
+
+use bevy_ecs::prelude::*;
+use lumbre_scene::{
+    AmbientCube, ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, IrradianceVolume, Mesh,
+};
+
+pub(crate) use light::Seen;
+
+use self::grid::Grid;
+use crate::options::Probes;
+use crate::progress::Watch;
+use crate::scene::{BakeScene, Object, under_a_dynamic_object, world_points};
+use crate::texels::gather::Outgoing;
+use crate::texels::in_chunks;
+use crate::transport::direct::Sources;
+use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
+
+/// A volume and where it is.
+pub(crate) struct PlacedVolume {
+    pub volume: IrradianceVolume,
+    pub grid: Grid,
+}
+
+/// What the World asks of the probes.
+pub(crate) struct Wanted {
+    /// Corners of what moves, world space.
+    moving: Vec<glam::DVec3>,
+    any: bool,
+    /// By the index of its material in the scene, whether a surface is a polygon light in a frame.
+    real_time: Vec<bool>,
+}
+
+impl Wanted {
+    /// Reads the World.
+    pub fn of(world: &mut World, objects: &[Object]) -> Self {
+        let mut query = world.query_filtered::<(
+            &Mesh,
+            Option<&GlobalTransform>,
+            Option<&DynamicObject>,
+            Option<&ChildOf>,
+        ), Without<Hidden>>();
+        let (mut moving, mut any) = (Vec::new(), false);
+        for (mesh, transform, dynamic, parent) in query.iter(world) {
+            if dynamic.is_some() || under_a_dynamic_object(world, parent) {
+                any = true;
+                let transform = transform.copied().unwrap_or_default();
+                moving.extend(world_points(&transform.0, &mesh.0));
+            }
+        }
+        let parts = objects.iter().flat_map(|object| &object.parts);
+        let real_time = parts.map(|part| world.get::<EmissiveLight>(part.entity).is_some()).collect();
+        Self { moving, any, real_time }
+    }
+
+    /// Bakes the probes, if they are called for; the report says why not.
+    pub fn bake(
+        &self,
+        scene: &BakeScene,
+        sources: &Sources<'_>,
+        outgoing: Option<&Outgoing<'_>>,
+        options: &BakeOptions,
+        watch: &mut Watch<'_>,
+        report: &mut BakeReport,
+    ) -> Result<Option<PlacedVolume>, BakeError> {
+        let reason = match options.probes {
+            Probes::Never => Some("they are switched off"),
+            Probes::Automatic if !self.any => Some("nothing moves"),
+            Probes::Automatic | Probes::Always => None,
+        };
+        if let Some(reason) = reason {
+            report.skipped.push(format!("probes: {reason}"));
+            return Ok(None);
+        }
+        let real_time = |triangle: u32| {
+            let surface = scene.triangles[triangle as usize].surface;
+            self.real_time.get(surface as usize).copied().unwrap_or(false)
+        };
+        let emitters = sources.only_emitters(|emitter| !real_time(emitter.triangle));
+        if emitters.is_empty() && outgoing.is_none() {
+            report
+                .skipped
+                .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
+            return Ok(None);
+        }
+        watch.stage("probes", report)?;
+        let grid = Grid::new(scene, &self.moving, options.probe_spacing, &mut report.warnings);
+        let light =
+            light::ProbeLight { scene, emitters: &emitters, outgoing, effort: effort(options.quality) };
+        let seen: Vec<Seen> = in_chunks(grid.count(), watch, |index| {
+            light.at(grid.position(index), options.seed, index as u32)
+        })?;
+        report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();
+        let valid: Vec<bool> = seen.iter().map(|seen| !seen.inside).collect();
+        let mut cubes: Vec<AmbientCube> = seen.iter().map(|seen| seen.cube).collect();
+        fill::fill(grid.resolution, &valid, &mut cubes);
+        report.probes = ProbeReport {
+            resolution: grid.resolution.to_array(),
+            spacing: grid.spacing(scene.space).to_array(),
+            inside: valid.iter().filter(|valid| !**valid).count(),
+            estimated_error: light::relative_error(&seen),
+        };
+        if report.probes.inside == grid.count() {
+            report.warnings.push(
+                "every probe lies inside geometry and is dark; give a smaller probe spacing, or turn the faces \
+                 of the walls to the inside"
+                    .into(),
+            );
+        }
+        let volume = IrradianceVolume { resolution: grid.resolution, cubes };
+        Ok(Some(PlacedVolume { volume, grid }))
+    }
+}
+
+/// Rays of a probe over the sphere for each of four scrambles, and to the emitters for each of its sides.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ProbeEffort {
+    sphere: u32,
+    shadow: u32,
+}
+
+fn effort(quality: Quality) -> ProbeEffort {
+    match quality {
+        Quality::Draft => ProbeEffort { sphere: 32, shadow: 16 },
+        Quality::Final => ProbeEffort { sphere: 128, shadow: 64 },
+        Quality::Reference => ProbeEffort { sphere: 1024, shadow: 512 },
+    }
+}

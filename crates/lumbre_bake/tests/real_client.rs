@@ -1,0 +1,285 @@
+//! A baked level as a program that is not ours finds it: the .glb by the `gltf` crate, the KTX2 by the `ktx2` crate and by its bytes,
+//! judged by what Bevy documents for its `Lightmap`. Nothing of `lumbre_scene` reads here, except where both are compared.
+//!
+//! Bevy's contract (`bevy_pbr::Lightmap` and its shader): the mesh's second UV channel (`ATTRIBUTE_UV_1`, glTF's TEXCOORD_1) in [0, 1],
+//! v = 0 the top row; a 2D float texture that can be filtered, linear, not sRGB; texel x `lightmap_exposure` x diffuse colour is the
+//! radiance, so a texel is E/π with an exposure of 1 (where the camera's own exposure is 1).
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use bevy_ecs::world::World;
+use glam::{DMat4, DVec2, DVec3};
+use lumbre_bake::{BakeOptions, Density, Probes, Quality, bake};
+use lumbre_scene::{LightmapEncoding, PackedFormat, SaveOptions, Supercompression, load, save_with};
+
+mod common;
+
+/// A texture as Bevy would upload it.
+struct Texture {
+    width: usize,
+    height: usize,
+    texels: Vec<DVec3>,
+}
+
+impl Texture {
+    /// Header by the `ktx2` crate, texels by the words of the Vulkan specification.
+    fn read(path: &Path) -> Self {
+        let bytes = std::fs::read(path).expect("the KTX2 image lies beside the level");
+        let reader = ktx2::Reader::new(&bytes[..]).expect("Bevy's reader takes it");
+        let header = reader.header();
+        // Bevy takes a picture without depth, layers and more faces than one for a 2D texture; of one row for a 1D texture.
+        assert_eq!(
+            (header.pixel_depth, header.layer_count, header.face_count, header.level_count),
+            (0, 0, 1, 1)
+        );
+        assert!(header.pixel_width > 1 && header.pixel_height > 1);
+        assert_eq!(reader.transfer_function(), Some(ktx2::TransferFunction::Linear));
+        assert_eq!(reader.color_model(), Some(ktx2::ColorModel::RGBSDA));
+        // What the size of a frame says by its own: nothing is compressed here, so that no decoder is trusted.
+        assert_eq!(header.supercompression_scheme, None);
+        let level = reader.levels().next().expect("there is a level");
+        let (width, height) = (header.pixel_width as usize, header.pixel_height as usize);
+        assert_eq!(level.data.len(), 4 * width * height);
+        let words =
+            level.data.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+        let small_float = |bits: u32, mantissa: u32| {
+            let (exponent, fraction) = (bits >> mantissa, bits & ((1 << mantissa) - 1));
+            let fraction = f64::from(fraction) / f64::from(1 << mantissa);
+            match exponent {
+                0 => fraction * 2f64.powi(-14),
+                _ => (1.0 + fraction) * 2f64.powi(exponent as i32 - 15),
+            }
+        };
+        // wgpu's Rgb9e5Ufloat and Rg11b10Ufloat: both are filterable float formats on every backend.
+        let texels = match header.format {
+            Some(ktx2::Format::E5B9G9R9_UFLOAT_PACK32) => words
+                .map(|word| {
+                    let channel = |shift: u32| f64::from(word >> shift & 0x1ff);
+                    DVec3::new(channel(0), channel(9), channel(18)) * 2f64.powi((word >> 27) as i32 - 24)
+                })
+                .collect(),
+            Some(ktx2::Format::B10G11R11_UFLOAT_PACK32) => words
+                .map(|word| {
+                    let (red, green) = (small_float(word & 0x7ff, 6), small_float(word >> 11 & 0x7ff, 6));
+                    DVec3::new(red, green, small_float(word >> 22, 5))
+                })
+                .collect(),
+            other => panic!("{other:?} is no filterable float format that was asked for"),
+        };
+        Self { width, height, texels }
+    }
+
+    /// As a GPU filters it, clamped at the border.
+    fn sample(&self, uv: DVec2) -> DVec3 {
+        let at = uv * DVec2::new(self.width as f64, self.height as f64) - 0.5;
+        let (low, part) = (at.floor(), at - at.floor());
+        let read = |x: f64, y: f64| {
+            let column = (low.x + x).clamp(0.0, self.width as f64 - 1.0) as usize;
+            let row = (low.y + y).clamp(0.0, self.height as f64 - 1.0) as usize;
+            self.texels[row * self.width + column]
+        };
+        read(0.0, 0.0).lerp(read(1.0, 0.0), part.x).lerp(read(0.0, 1.0).lerp(read(1.0, 1.0), part.x), part.y)
+    }
+}
+
+/// A lightmapped triangle in the world.
+struct Face {
+    corners: [DVec3; 3],
+    uv: [DVec2; 3],
+    texture: String,
+}
+
+/// What a client finds in a baked level.
+struct Client {
+    faces: Vec<Face>,
+    textures: HashMap<String, Texture>,
+}
+
+impl Client {
+    fn read(path: &Path) -> Self {
+        let gltf = gltf::Gltf::open(path).expect("the gltf crate takes the level");
+        assert!(gltf.extensions_used().any(|name| name == "LUMBRE_lightmap"));
+        assert!(gltf.extensions_required().next().is_none(), "any viewer may open it");
+        let (mut faces, mut textures) = (Vec::new(), HashMap::new());
+        let scene = gltf.default_scene().expect("there is a scene");
+        let mut open: Vec<_> = scene.nodes().map(|node| (node, DMat4::IDENTITY)).collect();
+        while let Some((node, above)) = open.pop() {
+            let local = node.transform().matrix();
+            let matrix = above * DMat4::from_cols_array_2d(&local.map(|column| column.map(f64::from)));
+            open.extend(node.children().map(|child| (child, matrix)));
+            let Some(extension) = node.extension_value("LUMBRE_lightmap") else { continue };
+            assert_eq!(extension["texCoord"], 1, "Bevy's UV_1");
+            let name = extension["image"].as_str().expect("the image is named").replace("%20", " ");
+            let name = Path::new(&name).with_extension("ktx2").to_string_lossy().into_owned();
+            let image = path.with_file_name(&name);
+            textures.entry(name.clone()).or_insert_with(|| Texture::read(&image));
+            for primitive in node.mesh().expect("a lightmapped node has a mesh").primitives() {
+                let reader = primitive.reader(|_| gltf.blob.as_deref());
+                let positions: Vec<DVec3> = reader
+                    .read_positions()
+                    .expect("there are positions")
+                    .map(|p| matrix.transform_point3(DVec3::from_array(p.map(f64::from))))
+                    .collect();
+                let uv: Vec<DVec2> = reader
+                    .read_tex_coords(1)
+                    .expect("a lightmapped mesh has TEXCOORD_1")
+                    .into_f32()
+                    .map(|uv| DVec2::from_array(uv.map(f64::from)))
+                    .collect();
+                assert_eq!(uv.len(), positions.len());
+                let inside = |uv: &DVec2| uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all();
+                assert!(uv.iter().all(inside), "Bevy packs them into 16 bits of [0, 1]");
+                let indices: Vec<usize> = match reader.read_indices() {
+                    Some(indices) => indices.into_u32().map(|index| index as usize).collect(),
+                    None => (0..positions.len()).collect(),
+                };
+                faces.extend(indices.chunks_exact(3).map(|triangle| Face {
+                    corners: [0, 1, 2].map(|at| positions[triangle[at]]),
+                    uv: [0, 1, 2].map(|at| uv[triangle[at]]),
+                    texture: name.clone(),
+                }));
+            }
+        }
+        Self { faces, textures }
+    }
+
+    /// What Bevy reflects there for a white diffuse material with an exposure of 1.
+    fn radiance(&self, position: DVec3, normal: DVec3) -> Option<DVec3> {
+        self.faces.iter().find_map(|face| {
+            let [a, b, c] = face.corners;
+            let cross = (b - a).cross(c - a);
+            let size = cross.length();
+            let facing = cross / size;
+            let apart = position - a;
+            let u = apart.cross(c - a).dot(facing) / size;
+            let v = (b - a).cross(apart).dot(facing) / size;
+            let near = apart.dot(facing).abs() < 1e-3 * size.sqrt();
+            let within = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+            let uv = face.uv[0] + (face.uv[1] - face.uv[0]) * u + (face.uv[2] - face.uv[0]) * v;
+            (near && within && facing.dot(normal) > 0.99).then(|| self.textures[&face.texture].sample(uv))
+        })
+    }
+}
+
+fn baked(model: &Path, side: u32, error: f64) -> World {
+    let mut world = World::new();
+    load(&mut world, model).unwrap_or_else(|error| panic!("{error}"));
+    let options = BakeOptions {
+        density: Density::MapSize(side),
+        quality: Quality::Draft,
+        error,
+        probes: Probes::Never,
+        ..BakeOptions::default()
+    };
+    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    world
+}
+
+fn saved(world: &mut World, path: &Path, format: PackedFormat) {
+    let options = SaveOptions {
+        encoding: Some(LightmapEncoding::Rgb16Float),
+        ktx2: Some(format),
+        supercompression: Supercompression::None,
+    };
+    let report = save_with(world, path, &options).expect("the folder takes it");
+    assert!(report.lightmaps.iter().any(|file| file.encoding == format.name()));
+    for file in &report.lightmaps {
+        assert_eq!((file.error.saturated, file.error.negative), (0, 0), "{file:?}");
+        // Floats of 10 bits are off by at most 1/64, and by a third of that on average.
+        assert!(file.error.relative_rmse < 0.02, "{file:?}");
+    }
+}
+
+#[test]
+fn the_cornell_box_as_bevy_finds_it() {
+    let Some(model) = common::shared("models/cornell_box.glb") else { return };
+    let Some(reference) = common::shared("conformance/bake") else { return };
+    let points: Vec<_> = std::fs::read_dir(reference)
+        .expect("the folder can be read")
+        .map(|entry| entry.expect("its entries can be read").path())
+        .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("cornell")))
+        .flat_map(|path| common::read_reference(&path))
+        // Not every channel of every point is known.
+        .filter(|point| point.irradiance.is_finite())
+        .collect();
+    assert!(points.len() > 100, "there are reference points");
+    let mut world = baked(&model, 128, 0.01);
+    let folder = tempfile::tempdir().expect("there is room for it");
+    for format in PackedFormat::ALL {
+        let path = folder.path().join("cornell baked.glb");
+        saved(&mut world, &path, format);
+        let client = Client::read(&path);
+        let mut errors = Vec::new();
+        let mut mean = 0.0;
+        for point in &points {
+            let Some(found) = client.radiance(point.position, point.normal) else { continue };
+            let expected = point.irradiance / std::f64::consts::PI;
+            errors.push((found - expected).abs().element_sum() / 3.0);
+            mean += expected.element_sum() / 3.0;
+        }
+        assert!(errors.len() * 10 > points.len() * 9, "{} of {} points found", errors.len(), points.len());
+        mean /= errors.len() as f64;
+        errors.sort_by(f64::total_cmp);
+        // Units, rows and channels: each would be off by more than the whole if it were another. A draft at 128 texels is within some
+        // per cent of the converged light.
+        let median = errors[errors.len() / 2] / mean;
+        assert!(median < 0.03, "{format:?}: median error {median}");
+    }
+}
+
+#[test]
+fn the_ktx2_shows_what_the_open_exr_shows() {
+    let Some(model) = common::shared("models/cornell_box.glb") else { return };
+    let mut world = baked(&model, 48, 0.01);
+    let folder = tempfile::tempdir().expect("there is room for it");
+    let path = folder.path().join("level.gltf");
+    for format in PackedFormat::ALL {
+        saved(&mut world, &path, format);
+        let maps = |path: &Path| {
+            let mut world = World::new();
+            load(&mut world, path).unwrap_or_else(|error| panic!("{error}"));
+            common::maps(&mut world)
+        };
+        let open_exr = maps(&path);
+        // A level that names the KTX2 images instead. A frame is linear in what they hold, and its filter a mean of texels: what bounds
+        // the texels bounds the frame.
+        let text = std::fs::read_to_string(&path).expect("a .gltf is text");
+        let other = path.with_file_name("other.gltf");
+        std::fs::write(&other, text.replace(".exr", ".ktx2")).expect("the folder takes it");
+        let packed = maps(&other);
+        assert!(!open_exr.is_empty() && open_exr.len() == packed.len());
+        let mut differ = 0;
+        for ((_, open_exr), (name, packed)) in open_exr.iter().zip(&packed) {
+            assert!(name.ends_with(".ktx2") && packed.texels.len() == open_exr.texels.len());
+            let independent = Texture::read(&path.with_file_name(name));
+            for ((half, texel), client) in open_exr.texels.iter().zip(&packed.texels).zip(&independent.texels)
+            {
+                // Both came from the same floats: a half is off by 1/2048 of a channel, or by 2^-25.
+                let bound = format.largest_error(*half * 1.001)
+                    + (*half / 2047.0).max(glam::Vec3::splat(2f32.powi(-25)));
+                assert!((*half - *texel).abs().cmple(bound).all(), "{half} and {texel}");
+                assert_eq!(texel.as_dvec3(), *client, "our reader and the client's");
+                differ += u32::from(half != texel);
+            }
+        }
+        assert!(differ > 0, "another encoding was read");
+    }
+}
+
+#[test]
+#[ignore = "bakes a whole level: a minute and more"]
+fn the_demo_level_as_bevy_finds_it() {
+    let model = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/demo.glb"));
+    // The format is asked for, not the light.
+    let mut world = baked(model, 8, 1.0);
+    let folder = tempfile::tempdir().expect("there is room for it");
+    let path = folder.path().join("demo.baked.glb");
+    saved(&mut world, &path, PackedFormat::Rgb9E5);
+    let client = Client::read(&path);
+    assert!(client.faces.len() > 100 && client.textures.len() > 1);
+    assert!(
+        client.textures.values().any(|texture| texture.texels.iter().any(|texel| texel.max_element() > 0.0))
+    );
+}

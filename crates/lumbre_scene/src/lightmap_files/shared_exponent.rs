@@ -1,0 +1,121 @@
+//! RGB9E5: three nine-bit mantissas that share a five-bit exponent, 32 bits a colour. Not formats with an exponent per channel.
+//!
+//! A channel is m · 2^(e − 24), m < 512, e < 32 (`EXT_texture_shared_exponent`, N = 9, B = 15, Emax = 31; the same numbers are
+//! `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`): red in bits 0 to 8, green 9 to 17, blue 18 to 26, the exponent 27 to 31.
+
+use glam::{DVec3, Vec3};
+
+/// The largest number: 511/512 · 2^16.
+pub(crate) const LARGEST: f32 = 65_408.0;
+
+const MANTISSA: u32 = 9;
+/// The exponent's bias and the mantissa's bits.
+const SHIFT: i32 = 15 + MANTISSA as i32;
+
+/// The nearest shared-exponent colour of a finite colour; ties go up. Channels below 0 become 0, those above 65408 become 65408.
+///
+/// Each channel is within half a unit of its colour: at most largest channel / 511.5, and at most 2^-25 where that is less
+/// (the rule of `EXT_texture_shared_exponent`, evaluated without rounding in f64).
+pub(crate) fn encode(color: Vec3) -> u32 {
+    let color = color.clamp(Vec3::ZERO, Vec3::splat(LARGEST)).as_dvec3();
+    let largest = color.max_element();
+    // floor(log2) from the bits: exact. f64 has an exponent of its own for every f32 but 0, whose field is far below the bias as well.
+    let floor_log2 = ((largest.to_bits() >> 52) & 0x7ff) as i32 - 1023;
+    let mut exponent = floor_log2.max(-16) + 16;
+    let round = |color: DVec3, exponent: i32| (color * power_of_two(SHIFT - exponent) + 0.5).floor();
+    if round(color, exponent).max_element() > 511.0 {
+        // The largest channel rounded up to the next power of two. Never at exponent 31: 65408 is its largest mantissa.
+        exponent += 1;
+    }
+    let mantissas = round(color, exponent).as_uvec3();
+    mantissas.x
+        | mantissas.y << MANTISSA
+        | mantissas.z << (2 * MANTISSA)
+        | (exponent as u32) << (3 * MANTISSA)
+}
+
+/// The colour that 32 bits stand for, exactly.
+pub(crate) fn decode(bits: u32) -> Vec3 {
+    let exponent = (bits >> (3 * MANTISSA)) as i32;
+    let mantissa = |channel: u32| f64::from(bits >> (channel * MANTISSA) & 0x1ff);
+    (DVec3::new(mantissa(0), mantissa(1), mantissa(2)) * power_of_two(exponent - SHIFT)).as_vec3()
+}
+
+/// 2^n, exactly, for n in [-1022, 1023].
+fn power_of_two(n: i32) -> f64 {
+    f64::from_bits(((n + 1023) as u64) << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_decodes_and_encodes_to_the_same_color() {
+        for exponent in 0..32u32 {
+            for red in 0..512u32 {
+                // Green and blue run through all mantissas as well, in orders of their own.
+                let code = red | ((red * 5 + 3) % 512) << 9 | ((red * 301 + 77) % 512) << 18 | exponent << 27;
+                let color = decode(code);
+                assert_eq!(color.x, red as f32 * 2f32.powi(exponent as i32 - 24));
+                assert_eq!(decode(encode(color)), color, "{code:#x}");
+            }
+        }
+        assert_eq!(decode(encode(Vec3::splat(LARGEST))), Vec3::splat(LARGEST));
+        assert_eq!(encode(Vec3::ZERO), 0);
+        // 1.0 is 256 · 2^(16 − 24).
+        assert_eq!(encode(Vec3::ONE), 256 | 256 << 9 | 256 << 18 | 16 << 27);
+    }
+
+    /// Whether a channel can be written nearer with the same exponent: brute force over the neighbours.
+    fn nearest(color: Vec3, code: u32) {
+        let (decoded, exponent) = (decode(code).as_dvec3(), (code >> 27) as i32);
+        let unit = 2f64.powi(exponent - 24);
+        let difference = (decoded - color.as_dvec3()).abs();
+        assert!(difference.max_element() <= 0.5 * unit, "{color} became {decoded}, unit {unit}");
+        // The smallest exponent that holds the colour: with one less its largest channel rounds beyond 511.
+        if exponent > 0 {
+            let mantissa = (color.max_element() as f64 / (0.5 * unit) + 0.5).floor();
+            assert!(mantissa > 511.0, "{color} would fit exponent {}", exponent - 1);
+        }
+    }
+
+    #[test]
+    fn the_nearest_color_within_the_closed_bound() {
+        let mut state = 0x9e37_79b9_7f4a_7c15u64;
+        let mut random = || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            state
+        };
+        for _ in 0..400_000 {
+            // Any positive float up to the largest, log-uniform, subnormals included.
+            let mut channel = || f32::from_bits((random() >> 32) as u32 % (LARGEST.to_bits() + 1));
+            let color = Vec3::new(channel(), channel(), channel());
+            let code = encode(color);
+            nearest(color, code);
+            let largest = f64::from(color.max_element());
+            let bound = (largest / 511.5).max(2f64.powi(-25));
+            let difference = (decode(code).as_dvec3() - color.as_dvec3()).abs().max_element();
+            assert!(difference <= bound, "{color}: {difference} above {bound}");
+        }
+        // Where the largest channel rounds up to a power of two and takes the next exponent.
+        for power in -14..16 {
+            for step in 0..64 {
+                let red = f32::from_bits((2f32.powi(power)).to_bits() - step * 1024);
+                let color = Vec3::new(red, red * 0.377, red * 1e-3);
+                nearest(color, encode(color));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_clamped() {
+        assert_eq!(decode(encode(Vec3::new(-1.0, 1e30, f32::MAX))), Vec3::new(0.0, LARGEST, LARGEST));
+        assert_eq!(encode(Vec3::splat(-0.0)), 0);
+        assert_eq!(encode(Vec3::splat(f32::MIN_POSITIVE)), 0);
+        // Half the smallest unit goes up, as the rule has it.
+        assert_eq!(decode(encode(Vec3::splat(2f32.powi(-25)))), Vec3::splat(2f32.powi(-24)));
+    }
+}
