@@ -35,7 +35,10 @@
 
 mod apply;
 mod bake;
+mod checkpoint;
+mod content_hash;
 mod error;
+mod memory;
 mod options;
 mod progress;
 mod report;
@@ -45,9 +48,11 @@ mod texels;
 mod transport;
 
 pub use apply::LightmapError;
-pub use bake::bake;
+pub use bake::{bake, bake_with};
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use content_hash::{ContentHash, content_hash};
 pub use error::BakeError;
 pub use options::{BakeOptions, Density, Quality};
 pub use progress::Progress;
-pub use report::{BakeReport, StageTime};
+pub use report::{BakeReport, Ended, StageTime};
 pub use transport::solver::Solver;

@@ -38,7 +38,8 @@ pub struct BakeOptions {
     /// Relative RMSE that sampling may leave in the lightmap (0.01 is one per cent of the mean); positive.
     /// Gathering stops there, or at the quality's largest number of rays.
     pub error: f64,
-    /// Wall-clock time after which no further round of samples begins. Bits then depend on the machine's speed.
+    /// Wall-clock time after which no more samples are taken: the map is complete, with what there was time for. Bits then depend on
+    /// the machine's speed.
     pub time: Option<Duration>,
     /// How much work the sampling may take.
     pub quality: Quality,
@@ -53,6 +54,8 @@ pub struct BakeOptions {
     pub solver: Solver,
     /// Smooths the gathered light within charts where it is noisy.
     pub denoise: bool,
+    /// Bytes that the bake may take beside the World: fewer patches and rays where more would not fit.
+    pub memory: Option<u64>,
 }
 
 impl Default for BakeOptions {
@@ -67,6 +70,7 @@ impl Default for BakeOptions {
             threads: None,
             solver: Solver::default(),
             denoise: true,
+            memory: None,
         }
     }
 }
