@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// This crate, and those whose arithmetic goes into a texel.
-const CRATES: [&str; 4] = ["lumbre_bake", "lumbre_rays", "lumbre_mesh", "lumbre_optics"];
+/// This crate, those whose arithmetic goes into a texel, and the one that reads and writes scenes.
+const CRATES: [&str; 5] = ["lumbre_bake", "lumbre_rays", "lumbre_mesh", "lumbre_optics", "lumbre_scene"];
 
 fn main() -> std::io::Result<()> {
     let own = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());

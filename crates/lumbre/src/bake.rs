@@ -1,33 +1,65 @@
 //! `lumbre bake`: a level in, the same level with lightmaps out.
 
+use std::ffi::OsString;
 use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
-use lumbre::bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use bevy_ecs::world::World;
+use lumbre::bake::{
+    BakeError, BakeOptions, BakeReport, Checkpoint, Density, Quality, bake_with, content_hash,
+};
 use lumbre::scene::save;
 
 use crate::arguments::{Bake, BakeQuality};
-use crate::loading::{extension, load};
+use crate::bake_record::{Asked, BakeRecord, hash_of_files};
+use crate::loading::{extension, load_with_files};
 use crate::output::progress_bar;
 
 /// Runs the command.
 pub fn run(asked: &Bake) -> anyhow::Result<()> {
     check_output(&asked.output)?;
-    let mut world = load(&asked.input)?;
-    if asked.resume {
+    let (mut world, beside) = load_with_files(&asked.input)?;
+    let options = options(asked);
+    let what = Asked {
+        content: content_hash(&mut world, &options)?.to_string(),
+        input: hash_of_files(std::iter::once(&asked.input).chain(&beside))
+            .with_context(|| format!("{} cannot be read", asked.input.display()))?,
+        time: options.time.as_ref().map(Duration::as_secs_f64),
+    };
+    if let Some(record) = BakeRecord::unchanged(&asked.output, &what) {
         eprintln!(
-            "lumbre: note: there is no checkpoint of {}: baking from the start",
+            "lumbre: note: {}: unchanged: it is of this level and these options already",
             asked.output.display()
         );
+        return print(&record.report, asked.json);
     }
+    let checkpoint = Checkpoint::new(checkpoint_path(&asked.output), asked.resume);
+    let report = interruptible(&mut world, &options, &checkpoint, &asked.output)?;
+    let saved = save(&mut world, &asked.output)
+        .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
+    for note in saved.notes {
+        eprintln!("lumbre: note: {}: {note}", asked.output.display());
+    }
+    for warning in &report.warnings {
+        eprintln!("lumbre: warning: {warning}");
+    }
+    BakeRecord::write(&asked.output, what, &saved.files, &report)?;
+    checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
+    print(&report, asked.json)
+}
+
+fn options(asked: &Bake) -> BakeOptions {
     let density = match (asked.texels_per_meter, asked.map_size) {
         (Some(density), _) => Density::TexelsPerMeter(density),
         (None, Some(side)) => Density::MapSize(side),
         (None, None) => Density::Automatic,
     };
-    let options = BakeOptions {
+    BakeOptions {
         density,
         error: asked.error,
         time: asked.time,
@@ -36,27 +68,80 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             BakeQuality::Final => Quality::Final,
         },
         threads: asked.threads.map(usize::from),
+        memory: asked.memory,
         ..BakeOptions::default()
-    };
+    }
+}
+
+/// Bakes, until the end or the first interruption.
+fn interruptible(
+    world: &mut World,
+    options: &BakeOptions,
+    checkpoint: &Checkpoint,
+    output: &Path,
+) -> anyhow::Result<BakeReport> {
+    if !checkpoint.resume && checkpoint.path.exists() {
+        eprintln!(
+            "lumbre: note: {}: a checkpoint of an interrupted bake is replaced (--resume would continue it)",
+            checkpoint.path.display()
+        );
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked_to = Arc::clone(&stop);
+    let handled = ctrlc::set_handler(move || {
+        // Whoever asks twice does not want to wait for the checkpoint.
+        if asked_to.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    });
+    if let Err(error) = handled {
+        eprintln!("lumbre: warning: an interruption will end the bake at once: {error}");
+    }
     let bar = progress_bar();
-    let report = bake(&mut world, &options, &mut |progress| {
+    let baked = bake_with(world, options, Some(checkpoint), &mut |progress| {
         bar.set_message(progress.stage);
         bar.set_position((progress.fraction * 1000.0) as u64);
-        ControlFlow::Continue(())
-    })?;
+        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
     bar.finish_and_clear();
-    for note in save(&mut world, &asked.output)?.notes {
-        eprintln!("lumbre: note: {}: {note}", asked.output.display());
+    match baked {
+        Ok(report) => Ok(report),
+        Err(BakeError::Cancelled { stage }) => {
+            bail!(
+                "interrupted during {stage}; {} is as it was; {}",
+                output.display(),
+                how_to_continue(&checkpoint.path)
+            )
+        }
+        Err(error) => {
+            if !matches!(error, BakeError::Checkpoint { .. }) {
+                // Nothing could be continued with it; that it cannot be removed is not the error to tell.
+                let _ = checkpoint.remove();
+            }
+            Err(error.into())
+        }
     }
-    for warning in &report.warnings {
-        eprintln!("lumbre: warning: {warning}");
-    }
+}
+
+fn how_to_continue(checkpoint: &Path) -> String {
+    format!("the same command with --resume continues from {}", checkpoint.display())
+}
+
+/// `room.baked.glb` has its checkpoint in `room.baked.glb.checkpoint`.
+fn checkpoint_path(output: &Path) -> PathBuf {
+    let mut name = OsString::from(output);
+    name.push(".checkpoint");
+    name.into()
+}
+
+/// The report as it was asked for.
+fn print(report: &BakeReport, json: bool) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    if asked.json {
-        serde_json::to_writer_pretty(&mut out, &report)?;
+    if json {
+        serde_json::to_writer_pretty(&mut out, report)?;
         writeln!(out)?;
     } else {
-        write!(out, "{}", summary(&report))?;
+        write!(out, "{}", summary(report))?;
     }
     Ok(())
 }
@@ -67,7 +152,13 @@ fn check_output(path: &Path) -> anyhow::Result<()> {
     if !["glb", "gltf"].contains(&extension.as_str()) {
         bail!("{}: .{extension} is not written, only .glb and .gltf", path.display());
     }
+    if path.is_dir() {
+        bail!("{}: this is a folder; name a file", path.display());
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        bail!("{}: there is no folder {}; make it first", path.display(), folder.display());
+    }
     tempfile::tempfile_in(folder)
         .map(drop)
         .with_context(|| format!("{}: the folder {} cannot be written to", path.display(), folder.display()))
@@ -85,11 +176,7 @@ fn summary(report: &BakeReport) -> String {
         report.rays as f64 * 1e-6,
         report.mega_rays_per_second,
         100.0 * report.estimated_error,
-        if report.error_reached {
-            "reached"
-        } else {
-            "not reached: give it more --time or ask for a larger --error"
-        },
+        report.ended,
         report.seconds,
         report.threads,
     );

@@ -16,7 +16,7 @@ use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureRef
 use crate::scene::{Object, Part, PlacedLight, collect, lights};
 use crate::{BakeError, BakeOptions, Density};
 
-/// The version of the crate, and of its sources and those of the crates whose arithmetic goes into a texel.
+/// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
 pub(crate) const BAKER: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("LUMBRE_BAKE_SOURCES"));
 
 /// A BLAKE3 hash of a bake's input; 64 hexadecimal digits when displayed.

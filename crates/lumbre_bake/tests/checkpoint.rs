@@ -33,49 +33,47 @@ fn checkpoint(path: &Path, resume: bool) -> Checkpoint {
     Checkpoint { interval: Duration::ZERO, ..Checkpoint::new(path, resume) }
 }
 
-/// Bakes until the callback has been called so often.
+/// More than there is.
+const NEVER: f32 = 2.0;
+
+/// Bakes until so much of the whole is done.
 fn interrupted(
     kept: &Checkpoint,
     options: &BakeOptions,
-    calls: usize,
+    fraction: f32,
 ) -> (World, Result<BakeReport, BakeError>) {
     let mut world = corner();
-    let mut count = 0;
-    let result = bake_with(&mut world, options, Some(kept), &mut |_| {
-        count += 1;
-        if count > calls { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    let result = bake_with(&mut world, options, Some(kept), &mut |progress| {
+        if progress.fraction >= fraction { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     (world, result)
 }
 
-fn whole(options: &BakeOptions) -> (Vec<u32>, BakeReport, usize) {
-    let (mut world, mut calls) = (corner(), 0);
-    let report = bake(&mut world, options, &mut |_| {
-        calls += 1;
-        ControlFlow::Continue(())
-    })
-    .unwrap();
-    (bits(&mut world), report, calls)
+fn whole(options: &BakeOptions) -> (Vec<u32>, BakeReport) {
+    let mut world = corner();
+    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(())).unwrap();
+    (bits(&mut world), report)
 }
 
 #[test]
 fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint");
-    let (expected, report, calls) = whole(&options());
-    assert!(calls > 20 && !expected.is_empty(), "{calls} chances to interrupt");
-    for stop in (0..calls).step_by(calls / 9) {
+    let (expected, report) = whole(&options());
+    assert!(!expected.is_empty());
+    // In every stage, and in the midst of the long ones.
+    for stop in [0.0, 0.04, 0.1, 0.25, 0.3, 0.35, 0.4, 0.42, 0.55, 0.7, 0.95] {
         let (mut world, result) = interrupted(&checkpoint(&path, false), &options(), stop);
         assert!(matches!(result, Err(BakeError::Cancelled { .. })), "{stop}: {result:?}");
         assert!(bits(&mut world).is_empty(), "an interrupted bake leaves the world as it was");
         // On another number of threads, and interrupted once more.
         let fewer = BakeOptions { threads: Some(1), ..options() };
         // Blocks are as long as the machine is fast: this may already be the end.
-        let (_, result) = interrupted(&checkpoint(&path, true), &fewer, stop + 5);
+        let (_, result) = interrupted(&checkpoint(&path, true), &fewer, stop + 0.1);
         assert!(matches!(result, Ok(_) | Err(BakeError::Cancelled { .. })), "{stop}: {result:?}");
-        let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), usize::MAX);
+        let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), NEVER);
         let resumed = result.unwrap();
-        assert!(bits(&mut world) == expected, "other bits after an interruption at {stop} of {calls}");
+        assert!(bits(&mut world) == expected, "other bits after an interruption at {stop}");
         assert_eq!(resumed.warnings, report.warnings);
         assert_eq!(
             (resumed.rays, resumed.patches, resumed.form_factors, resumed.iterations),
@@ -93,11 +91,11 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
 fn a_complete_checkpoint_holds_all_the_long_work() {
     let folder = tempfile::tempdir().unwrap();
     let kept = checkpoint(&folder.path().join("checkpoint"), true);
-    let (mut world, result) = interrupted(&kept, &options(), usize::MAX);
+    let (mut world, result) = interrupted(&kept, &options(), NEVER);
     let first = result.unwrap();
     assert!(first.warnings.iter().any(|warning| warning.contains("there is no such checkpoint")));
     let length = fs::metadata(&kept.path).unwrap().len();
-    let (mut again, result) = interrupted(&kept, &options(), usize::MAX);
+    let (mut again, result) = interrupted(&kept, &options(), NEVER);
     let second = result.unwrap();
     assert!(bits(&mut world) == bits(&mut again));
     assert!(second.resumed_seconds > 0.0 && second.seconds > second.resumed_seconds);
@@ -108,15 +106,15 @@ fn a_complete_checkpoint_holds_all_the_long_work() {
 fn whatever_became_of_the_file_the_bits_are_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint");
-    let (expected, ..) = whole(&options());
-    interrupted(&checkpoint(&path, false), &options(), usize::MAX).1.unwrap();
+    let (expected, _) = whole(&options());
+    interrupted(&checkpoint(&path, false), &options(), NEVER).1.unwrap();
     let sound = fs::read(&path).unwrap();
     let resumed = |bytes: &[u8], what: &str| {
         fs::write(&path, bytes).unwrap();
-        let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), usize::MAX);
+        let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), NEVER);
         let report = result.unwrap_or_else(|error| panic!("{what}: {error}"));
         assert!(bits(&mut world) == expected, "{what}: other bits");
-        let (_, again) = interrupted(&checkpoint(&path, true), &options(), usize::MAX);
+        let (_, again) = interrupted(&checkpoint(&path, true), &options(), NEVER);
         let again = again.unwrap();
         assert!(again.warnings.is_empty() && again.resumed_seconds > 0.0, "{what}: the file is whole again");
         report.warnings
@@ -152,9 +150,9 @@ fn a_checkpoint_of_another_bake_is_not_continued() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint");
     let other = BakeOptions { seed: 5, ..options() };
-    let (expected, ..) = whole(&options());
-    interrupted(&checkpoint(&path, false), &other, 12).1.unwrap_err();
-    let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), usize::MAX);
+    let (expected, _) = whole(&options());
+    interrupted(&checkpoint(&path, false), &other, 0.3).1.unwrap_err();
+    let (mut world, result) = interrupted(&checkpoint(&path, true), &options(), NEVER);
     let warnings = result.unwrap().warnings;
     assert!(warnings.iter().any(|warning| warning.contains("other options")), "{warnings:?}");
     assert!(bits(&mut world) == expected);
@@ -164,7 +162,7 @@ fn a_checkpoint_of_another_bake_is_not_continued() {
 fn what_cannot_be_a_checkpoint_is_an_error_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| checkpoint(&folder.path().join(name), true);
-    let refused = |kept: &Checkpoint| match interrupted(kept, &options(), usize::MAX).1 {
+    let refused = |kept: &Checkpoint| match interrupted(kept, &options(), NEVER).1 {
         Err(BakeError::Checkpoint { path, source }) => {
             assert_eq!(path, kept.path);
             source
@@ -181,7 +179,7 @@ fn what_cannot_be_a_checkpoint_is_an_error_before_the_work() {
     assert_eq!(refused(&at("folder")), CheckpointError::Foreign);
     assert!(matches!(refused(&at("no/such/folder")), CheckpointError::Unusable { .. }));
 
-    interrupted(&at("used"), &options(), 10).1.unwrap_err();
+    interrupted(&at("used"), &options(), 0.1).1.unwrap_err();
     let other = fs::File::open(at("used").path).unwrap();
     other.lock().unwrap();
     assert_eq!(refused(&at("used")), CheckpointError::InUse);
