@@ -110,6 +110,9 @@ pub struct Bake {
     /// Continues an interrupted bake from its checkpoint, if there is one.
     #[arg(long)]
     pub resume: bool,
+    /// Seconds between writes of the checkpoint: what a crash costs.
+    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = seconds)]
+    pub checkpoint_every: Duration,
     /// Memory that the bake may take beside the level, like 512MiB or 4GiB; it makes do with fewer patches and rays.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub memory: Option<u64>,

@@ -38,7 +38,10 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         );
         return print(&record.report, asked.json);
     }
-    let checkpoint = Checkpoint::new(checkpoint_path(&asked.output), asked.resume);
+    let checkpoint = Checkpoint {
+        interval: asked.checkpoint_every,
+        ..Checkpoint::new(checkpoint_path(&asked.output), asked.resume)
+    };
     let report = interruptible(&mut world, &options, &checkpoint, &asked.output)?;
     let saved = save(&mut world, &asked.output)
         .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
