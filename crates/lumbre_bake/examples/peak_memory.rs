@@ -2,6 +2,7 @@
 //! estimate, the peak of the process (VmHWM of Linux) before and after, and the patches.
 
 use std::error::Error;
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -35,7 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let before = peak()?;
     let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
     eprint!("{report}");
-    println!(
+    writeln!(
+        std::io::stdout(),
         "{{\"estimate\":{},\"before\":{before},\"after\":{},\"patches\":{},\"form_factors\":{},\"texels\":{},\"seconds\":{:.1}}}",
         report.memory_bytes,
         peak()?,
@@ -43,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         report.form_factors,
         report.texels,
         report.seconds
-    );
+    )?;
     Ok(())
 }
 

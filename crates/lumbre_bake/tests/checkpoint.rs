@@ -1,5 +1,7 @@
 //! A bake that is interrupted and resumed, at any moment and with whatever has become of its checkpoint.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! The content hash: equal for equal scenes, other for everything that may change a texel.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;

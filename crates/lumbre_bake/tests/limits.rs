@@ -1,5 +1,7 @@
 //! What a bake may take: time and memory. Not how long anything takes on this machine.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
