@@ -43,13 +43,13 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         ..Checkpoint::new(checkpoint_path(&asked.output), asked.resume)
     };
     let report = interruptible(&mut world, &options, &checkpoint, &asked.output)?;
+    for warning in &report.warnings {
+        eprintln!("lumbre: warning: {warning}");
+    }
     let saved = save(&mut world, &asked.output)
         .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
-    }
-    for warning in &report.warnings {
-        eprintln!("lumbre: warning: {warning}");
     }
     BakeRecord::write(&asked.output, what, &saved.files, &report)?;
     checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
