@@ -22,8 +22,8 @@ use corner::corner;
 
 fn options() -> BakeOptions {
     BakeOptions {
-        density: Density::MapSize(40),
-        error: 0.002,
+        density: Density::MapSize(24),
+        error: 0.004,
         quality: Quality::Final,
         threads: Some(2),
         ..BakeOptions::default()
@@ -64,7 +64,7 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
     let (expected, report) = whole(&options());
     assert!(!expected.is_empty());
     // In every stage, and in the midst of the long ones.
-    for stop in [0.0, 0.04, 0.1, 0.25, 0.3, 0.35, 0.4, 0.42, 0.55, 0.7, 0.95] {
+    for stop in [0.0, 0.1, 0.3, 0.38, 0.42, 0.6, 0.95] {
         let (mut world, result) = interrupted(&checkpoint(&path, false), &options(), stop);
         assert!(matches!(result, Err(BakeError::Cancelled { .. })), "{stop}: {result:?}");
         assert!(bits(&mut world).is_empty(), "an interrupted bake leaves the world as it was");
