@@ -13,7 +13,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
 
-use crate::scene::{Object, Part, PlacedLight, collect, lights};
+use crate::scene::{Object, Part, PlacedLight, collect, lights, sky};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
@@ -37,7 +37,7 @@ impl fmt::Display for ContentHash {
 }
 
 /// The hash of everything that [`bake`](crate::bake) reads of a world and its options, and of the baker itself: static meshes in their
-/// places, what their materials reflect, emit and let through with the pixels of their textures, and the lights that are baked, all in
+/// places, what their materials reflect, emit and let through with the pixels of their textures, the lights that are baked and the sky, all in
 /// the order in which they are baked. Take it before the bake, which gives meshes new coordinates.
 ///
 /// Equal hashes mean equal bits, unless [`BakeOptions::time`] cuts a bake short: the hash leaves it out, like the number of threads.
@@ -48,11 +48,17 @@ impl fmt::Display for ContentHash {
 pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentHash, BakeError> {
     options.check()?;
     let objects = collect(world)?;
-    Ok(hash_of(&objects, &lights(world), options))
+    let placed = lights(world);
+    Ok(hash_of(&objects, &placed, sky(world), options))
 }
 
 /// The hash of what was collected already.
-pub(crate) fn hash_of(objects: &[Object], lights: &[PlacedLight], options: &BakeOptions) -> ContentHash {
+pub(crate) fn hash_of(
+    objects: &[Object],
+    lights: &[PlacedLight],
+    sky: Vec3,
+    options: &BakeOptions,
+) -> ContentHash {
     let mut images = Images::default();
     let mut hasher = Hasher::new("lumbre bake");
     hasher.options(options);
@@ -67,6 +73,7 @@ pub(crate) fn hash_of(objects: &[Object], lights: &[PlacedLight], options: &Bake
         hasher.number(*numbers.entry(Arc::as_ptr(&part.mesh)).or_insert(next));
     }
     hasher.hashes(&lights.iter().map(light_hash).collect::<Vec<_>>());
+    hasher.color(&sky);
     hasher.finish()
 }
 
@@ -90,8 +97,19 @@ fn object_hash(object: &Object, images: &mut Images) -> ContentHash {
 fn light_hash(placed: &PlacedLight) -> ContentHash {
     let PlacedLight { light, position, axis } = placed;
     // Lights that are off are not baked at all; highlights, ambient terms and shadow maps are the frame's.
-    let Light { kind, ambient: _, diffuse, specular: _, attenuation, spot, enabled: _, shadow: _, bake } =
-        light;
+    let Light {
+        kind,
+        ambient: _,
+        diffuse,
+        specular: _,
+        attenuation,
+        spot,
+        enabled: _,
+        shadow: _,
+        bake,
+        radius,
+        angle,
+    } = light;
     let Attenuation { constant, linear, quadratic, clamp, range } = *attenuation;
     let mut hasher = Hasher::new("light");
     hasher.number(match kind {
@@ -105,7 +123,7 @@ fn light_hash(placed: &PlacedLight) -> ContentHash {
         BakeMode::Static => 2,
     });
     hasher.color(diffuse);
-    hasher.floats(&[constant, linear, quadratic, range]);
+    hasher.floats(&[constant, linear, quadratic, range, *radius, *angle]);
     hasher.number(clamp.into());
     match *spot {
         None => hasher.number(0),
