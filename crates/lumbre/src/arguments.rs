@@ -100,7 +100,7 @@ pub struct Bake {
     /// Relative RMSE that the lightmap may have by its own estimate.
     #[arg(long, default_value_t = 0.01, value_parser = positive)]
     pub error: f64,
-    /// Seconds after which no further samples are begun.
+    /// Seconds after which no more samples are taken; the map is complete all the same.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub time: Option<Duration>,
     /// Texels along a metre of surface; chosen from the scene's area without this.
@@ -112,6 +112,12 @@ pub struct Bake {
     /// Continues an interrupted bake from its checkpoint, if there is one.
     #[arg(long)]
     pub resume: bool,
+    /// Seconds between writes of the checkpoint: what a crash costs.
+    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = seconds)]
+    pub checkpoint_every: Duration,
+    /// Memory that the bake may take beside the level, like 512MiB or 4GiB; it makes do with fewer patches and rays.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub memory: Option<u64>,
     /// How much work may go into it.
     #[arg(long, value_enum, default_value_t = BakeQuality::Final)]
     pub quality: BakeQuality,
@@ -257,6 +263,25 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(positive(text)?).map_err(|error| error.to_string())
 }
 
+fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit: u64 = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1,
+        "kib" => 1 << 10,
+        "mib" => 1 << 20,
+        "gib" => 1 << 30,
+        "tib" => 1 << 40,
+        _ => return Err("bytes are wanted, or KiB, MiB, GiB, TiB of them, like 4GiB".into()),
+    };
+    let bytes = positive(digits.trim_end())? * unit as f64;
+    // Beyond this f64 counts no single bytes, and no machine has them.
+    if (1.0..=9e15).contains(&bytes) {
+        Ok(bytes as u64)
+    } else {
+        Err("from 1 byte to 8000TiB are wanted".into())
+    }
+}
+
 fn factor(text: &str) -> Result<f32, String> {
     match positive(text)? as f32 {
         value if value > 0.0 && value.is_finite() => Ok(value),
@@ -305,4 +330,25 @@ fn on_or_off(text: &str) -> Result<bool, String> {
 
 fn display(text: &str) -> Result<Display, String> {
     named(Display::from_name(text), Display::ALL.iter().map(|choice| choice.name()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_read_with_their_units() {
+        for (text, expected) in [
+            ("4GiB", 4 << 30),
+            ("512MiB", 512 << 20),
+            ("1.5 GiB", 3 << 29),
+            ("1000000", 1_000_000),
+            ("64kib", 65_536),
+        ] {
+            assert_eq!(bytes(text), Ok(expected), "{text}");
+        }
+        for text in ["", "GiB", "-1GiB", "4GB", "0", "0.1", "inf", "NaN", "1e300TiB", "4 GiB 3"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+    }
 }

@@ -1,34 +1,72 @@
 //! `lumbre bake`: a level in, the same level with lightmaps out.
 
+use std::ffi::OsString;
 use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
-use lumbre::bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
+use bevy_ecs::world::World;
+use lumbre::bake::{
+    BakeError, BakeOptions, BakeReport, Checkpoint, Density, Probes, Quality, bake_with, content_hash,
+};
 use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
 use crate::arguments::{Bake, BakeProbes, BakeQuality, ExrTexels};
+use crate::bake_record::{Asked, BakeRecord, hash_of_files};
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
-use crate::loading::{extension, load};
+use crate::loading::{extension, load_with_files};
 use crate::output::progress_bar;
 
 /// Runs the command.
 pub fn run(asked: &Bake) -> anyhow::Result<()> {
     check_output(&asked.output)?;
-    let mut world = load(&asked.input)?;
-    if asked.resume {
+    let (mut world, beside) = load_with_files(&asked.input)?;
+    let options = options(asked);
+    let files = save_options(asked);
+    let what = Asked {
+        content: content_hash(&mut world, &options)?.to_string(),
+        files: format!("{files:?}"),
+        input: hash_of_files(std::iter::once(&asked.input).chain(&beside))
+            .with_context(|| format!("{} cannot be read", asked.input.display()))?,
+        time: options.time.as_ref().map(Duration::as_secs_f64),
+    };
+    if let Some(record) = BakeRecord::unchanged(&asked.output, &what) {
         eprintln!(
-            "lumbre: note: there is no checkpoint of {}: baking from the start",
+            "lumbre: note: {}: unchanged: it is of this level and these options already",
             asked.output.display()
         );
+        return print(&record.report, &record.lightmaps, asked.json);
     }
+    let checkpoint = Checkpoint {
+        interval: asked.checkpoint_every,
+        ..Checkpoint::new(checkpoint_path(&asked.output), asked.resume)
+    };
+    let report = interruptible(&mut world, &options, &checkpoint, &asked.output)?;
+    let saved = save_with(&mut world, &asked.output, &files)
+        .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
+    for note in saved.notes {
+        eprintln!("lumbre: note: {}: {note}", asked.output.display());
+    }
+    for warning in report.warnings.iter().cloned().chain(warnings_of_files(&saved.lightmaps)) {
+        eprintln!("lumbre: warning: {warning}");
+    }
+    let lightmaps: Vec<FileLine> = saved.lightmaps.iter().map(FileLine::from).collect();
+    BakeRecord::write(&asked.output, what, &saved.files, &lightmaps, &report)?;
+    checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
+    print(&report, &lightmaps, asked.json)
+}
+
+fn options(asked: &Bake) -> BakeOptions {
     let density = match (asked.texels_per_meter, asked.map_size) {
         (Some(density), _) => Density::TexelsPerMeter(density),
         (None, Some(side)) => Density::MapSize(side),
         (None, None) => Density::Automatic,
     };
-    let options = BakeOptions {
+    BakeOptions {
         density,
         error: asked.error,
         time: asked.time,
@@ -36,43 +74,19 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             BakeQuality::Draft => Quality::Draft,
             BakeQuality::Final => Quality::Final,
         },
+        threads: asked.threads.map(usize::from),
+        memory: asked.memory,
         probes: match asked.probes {
             BakeProbes::Auto => Probes::Automatic,
             BakeProbes::Always => Probes::Always,
             BakeProbes::Never => Probes::Never,
         },
         probe_spacing: asked.probe_spacing,
-        threads: asked.threads.map(usize::from),
         gap: asked.gap,
         atlas_size: asked.atlas_size,
         seams: !asked.no_seams,
         ..BakeOptions::default()
-    };
-    let bar = progress_bar();
-    let report = bake(&mut world, &options, &mut |progress| {
-        bar.set_message(progress.stage);
-        bar.set_position((progress.fraction * 1000.0) as u64);
-        ControlFlow::Continue(())
-    })?;
-    bar.finish_and_clear();
-    let saved = save_with(&mut world, &asked.output, &save_options(asked))?;
-    for note in saved.notes {
-        eprintln!("lumbre: note: {}: {note}", asked.output.display());
     }
-    for warning in report.warnings.iter().cloned().chain(warnings_of_files(&saved.lightmaps)) {
-        eprintln!("lumbre: warning: {warning}");
-    }
-    let mut out = std::io::stdout().lock();
-    if asked.json {
-        let mut json = serde_json::to_value(&report)?;
-        let files: Vec<_> = saved.lightmaps.iter().map(FileLine::from).collect();
-        json["files"] = serde_json::to_value(files)?;
-        serde_json::to_writer_pretty(&mut out, &json)?;
-        writeln!(out)?;
-    } else {
-        write!(out, "{}{}", summary(&report), summary_of_files(&saved.lightmaps))?;
-    }
-    Ok(())
 }
 
 fn save_options(asked: &Bake) -> SaveOptions {
@@ -86,13 +100,94 @@ fn save_options(asked: &Bake) -> SaveOptions {
     }
 }
 
+/// Bakes, until the end or the first interruption.
+fn interruptible(
+    world: &mut World,
+    options: &BakeOptions,
+    checkpoint: &Checkpoint,
+    output: &Path,
+) -> anyhow::Result<BakeReport> {
+    if !checkpoint.resume && checkpoint.path.exists() {
+        eprintln!(
+            "lumbre: note: {}: a checkpoint of an interrupted bake is replaced (--resume would continue it)",
+            checkpoint.path.display()
+        );
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked_to = Arc::clone(&stop);
+    let handled = ctrlc::set_handler(move || {
+        // Whoever asks twice does not want to wait for the checkpoint.
+        if asked_to.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    });
+    if let Err(error) = handled {
+        eprintln!("lumbre: warning: an interruption will end the bake at once: {error}");
+    }
+    let bar = progress_bar();
+    let baked = bake_with(world, options, Some(checkpoint), &mut |progress| {
+        bar.set_message(progress.stage);
+        bar.set_position((progress.fraction * 1000.0) as u64);
+        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    bar.finish_and_clear();
+    match baked {
+        Ok(report) => Ok(report),
+        Err(BakeError::Cancelled { stage }) => {
+            bail!(
+                "interrupted during {stage}; {} is as it was; {}",
+                output.display(),
+                how_to_continue(&checkpoint.path)
+            )
+        }
+        Err(error) => {
+            if !matches!(error, BakeError::Checkpoint { .. }) {
+                // Nothing could be continued with it; that it cannot be removed is not the error to tell.
+                let _ = checkpoint.remove();
+            }
+            Err(error.into())
+        }
+    }
+}
+
+fn how_to_continue(checkpoint: &Path) -> String {
+    format!("the same command with --resume continues from {}", checkpoint.display())
+}
+
+/// `room.baked.glb` has its checkpoint in `room.baked.glb.checkpoint`.
+fn checkpoint_path(output: &Path) -> PathBuf {
+    let mut name = OsString::from(output);
+    name.push(".checkpoint");
+    name.into()
+}
+
+/// The report as it was asked for.
+fn print(report: &BakeReport, files: &[FileLine], json: bool) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    if json {
+        let mut json = serde_json::to_value(report)?;
+        json["files"] = serde_json::to_value(files)?;
+        serde_json::to_writer_pretty(&mut out, &json)?;
+        writeln!(out)?;
+    } else {
+        write!(out, "{}{}", summary(report), summary_of_files(files))?;
+    }
+    Ok(())
+}
+
 /// What would be wrong with the output is said before the work, not after it.
 fn check_output(path: &Path) -> anyhow::Result<()> {
     let extension = extension(path)?;
     if !["glb", "gltf"].contains(&extension.as_str()) {
         bail!("{}: .{extension} is not written, only .glb and .gltf", path.display());
     }
+    if path.is_dir() {
+        bail!("{}: this is a folder; name a file", path.display());
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        bail!("{}: there is no folder {}; make it first", path.display(), folder.display());
+    }
     tempfile::tempfile_in(folder)
         .map(drop)
         .with_context(|| format!("{}: the folder {} cannot be written to", path.display(), folder.display()))
@@ -110,11 +205,7 @@ fn summary(report: &BakeReport) -> String {
         report.rays as f64 * 1e-6,
         report.mega_rays_per_second,
         100.0 * report.estimated_error,
-        if report.error_reached {
-            "reached"
-        } else {
-            "not reached: give it more --time or ask for a larger --error"
-        },
+        report.ended,
         report.seconds,
         report.threads,
     );

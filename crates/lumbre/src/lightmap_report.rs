@@ -1,14 +1,14 @@
 //! What the files of a bake hold and what their encodings cost, for people and for programs. Not their writing.
 
 use lumbre::scene::{EncodingError, LightmapFile};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A file of the report in JSON.
-#[derive(Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FileLine {
     /// Its name, beside the baked level.
     file: String,
-    encoding: &'static str,
+    encoding: String,
     bytes: u64,
     /// Relative to the mean of the lit texels.
     error: EncodingError,
@@ -17,16 +17,16 @@ pub struct FileLine {
 impl From<&LightmapFile> for FileLine {
     fn from(file: &LightmapFile) -> Self {
         let name = file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Self { file: name, encoding: file.encoding, bytes: file.bytes, error: file.error }
+        Self { file: name, encoding: file.encoding.to_owned(), bytes: file.bytes, error: file.error }
     }
 }
 
 /// One line per encoding, with the worst of its files.
-pub fn summary_of_files(files: &[LightmapFile]) -> String {
+pub fn summary_of_files(files: &[FileLine]) -> String {
     let mut encodings: Vec<&str> = Vec::new();
     for file in files {
-        if !encodings.contains(&file.encoding) {
-            encodings.push(file.encoding);
+        if !encodings.contains(&file.encoding.as_str()) {
+            encodings.push(&file.encoding);
         }
     }
     let mut text = String::new();

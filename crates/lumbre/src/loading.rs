@@ -1,6 +1,6 @@
 //! From a file to a World with a camera, and from the command line's words to a frame's options.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use bevy_ecs::prelude::*;
@@ -15,13 +15,18 @@ struct FileOrder(Vec<Entity>);
 
 /// Loads a scene; what the importer has to remark goes to standard error.
 pub fn load(path: &Path) -> anyhow::Result<World> {
+    Ok(load_with_files(path)?.0)
+}
+
+/// [`load`], and the files beside the one that is named.
+pub fn load_with_files(path: &Path) -> anyhow::Result<(World, Vec<PathBuf>)> {
     let mut world = World::new();
     let report = scene::load(&mut world, path)?;
     for note in &report.notes {
         eprintln!("lumbre: note: {}: {note}", path.display());
     }
     world.insert_resource(FileOrder(report.nodes));
-    Ok(world)
+    Ok((world, report.files))
 }
 
 /// The options that the command line asks for. A scene without a camera gets one.

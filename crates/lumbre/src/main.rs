@@ -2,6 +2,7 @@
 
 mod arguments;
 mod bake;
+mod bake_record;
 mod explain;
 mod lightmap_report;
 mod loading;
@@ -9,6 +10,7 @@ mod output;
 mod play;
 mod render;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -18,9 +20,15 @@ use crate::arguments::{Arguments, Command};
 fn main() -> ExitCode {
     // Bad usage ends in here, with exit status 2.
     let arguments = Arguments::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_env("LUMBRE_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn,wgpu_hal=error,wgpu_core=error"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    let filter = tracing_subscriber::EnvFilter::try_from_env("LUMBRE_LOG").unwrap_or_else(|_| {
+        tracing_subscriber::EnvFilter::new("warn,lumbre_bake=info,wgpu_hal=error,wgpu_core=error")
+    });
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .init();
     let outcome = match arguments.command {
         None => play::run(&arguments::Play::parse_from_defaults()),
         Some(Command::Play(options)) => play::run(&options),

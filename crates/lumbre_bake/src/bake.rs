@@ -5,6 +5,9 @@ use std::ops::ControlFlow;
 use bevy_ecs::world::World;
 use glam::Vec3;
 
+use crate::checkpoint::Tape;
+use crate::content_hash::hash_of;
+use crate::memory::{self, Plan};
 use crate::pages::Pages;
 use crate::probes::Wanted;
 use crate::progress::Watch;
@@ -19,7 +22,7 @@ use crate::texels::seams::{Maps, close_seams};
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::{Direct, Sources};
 use crate::transport::exchange::Exchange;
-use crate::{BakeError, BakeOptions, BakeReport, Progress, apply};
+use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, Progress, apply};
 
 /// Bakes the light of a world's static objects into lightmaps.
 ///
@@ -39,13 +42,27 @@ pub fn bake(
     options: &BakeOptions,
     progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
 ) -> Result<BakeReport, BakeError> {
+    bake_with(world, options, None, progress)
+}
+
+/// [`bake`] that keeps what it has computed in a checkpoint, or goes on from one: an interrupted bake that is resumed gives the same
+/// bits as one that was not interrupted. What is wrong with a checkpoint that is there and not used stands in the report's warnings.
+///
+/// # Errors
+/// As [`bake`]; [`BakeError::Checkpoint`] if the file cannot be begun, or is something else.
+pub fn bake_with(
+    world: &mut World,
+    options: &BakeOptions,
+    checkpoint: Option<&Checkpoint>,
+    progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+) -> Result<BakeReport, BakeError> {
     options.check()?;
     match options.threads {
-        None => run(world, options, progress),
+        None => run(world, options, checkpoint, progress),
         Some(threads) => {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| BakeError::Threads { reason: error.to_string() })?;
-            pool.install(|| run(world, options, progress))
+            pool.install(|| run(world, options, checkpoint, progress))
         }
     }
 }
@@ -53,13 +70,20 @@ pub fn bake(
 fn run(
     world: &mut World,
     options: &BakeOptions,
+    checkpoint: Option<&Checkpoint>,
     progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
 ) -> Result<BakeReport, BakeError> {
     let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
-    let mut watch = Watch::new(progress);
+    let mut watch = Watch::new(progress, options.time);
     watch.stage("layout", &mut report)?;
     let objects = collect(world)?;
     let (placed, sky) = (lights(world), sky(world));
+    let hash = hash_of(&objects, &placed, sky, options);
+    report.content_hash = hash.to_string();
+    if let Some(checkpoint) = checkpoint {
+        watch.tape = Tape::open(checkpoint, &hash)
+            .map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
+    }
     if objects.is_empty() {
         report.skipped.push("everything: the scene has no static mesh".into());
         apply::forget_lightmaps(world, &[]);
@@ -87,6 +111,7 @@ fn run(
         return Ok(finish(report, &mut watch));
     }
     name_what_is_missing(&sources, &mut report);
+    memory::check_texels(&scene, &layout, options)?;
 
     watch.stage("direct light", &mut report)?;
     let mut texels = footprints(&scene, &layout);
@@ -95,12 +120,12 @@ fn run(
     (report.hidden_texels, report.rays) = (hidden, rays);
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
+    let plan = Plan::new(&scene, &layout, &texels, texel_side(&scene, &texels), options, &mut report)?;
     let direct = lighting::direct_light(&sources, &scene, &layout, &texels, options, &mut watch)?;
     report.rays += direct.iter().map(|direct| u64::from(direct.rays)).sum::<u64>();
     let baked: Vec<Vec3> = direct.iter().map(|direct| direct.baked).collect();
 
-    let exchange =
-        Exchange::new(&scene, &sources, options, texel_side(&scene, &texels), &mut watch, &mut report)?;
+    let exchange = Exchange::new(&scene, &sources, options, &plan, &mut watch, &mut report)?;
     let (indirect, volume) = match &exchange {
         None => (None, wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?),
         Some(exchange) => {
@@ -140,6 +165,7 @@ fn run(
     note_mean(&texels, &values, &mut report);
     if exchange.is_none() {
         note_direct_error(&texels, &variances, options, &mut report);
+        report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
     }
     let mut filled = fill(&layout, &texels, &charts, &values, options.gap);
     watch.advance(1.0)?;
@@ -163,7 +189,11 @@ fn run(
 
 fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
     watch.end_stage(&mut report);
+    // What is still to be done with the result may be interrupted too.
+    watch.tape.flush();
     report.seconds = watch.seconds();
+    report.resumed_seconds = watch.tape.resumed;
+    report.warnings.append(&mut watch.tape.warnings);
     let casting: f64 = report
         .stages
         .iter()

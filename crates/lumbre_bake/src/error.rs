@@ -63,10 +63,38 @@ pub enum BakeError {
         /// The limit.
         limit: usize,
     },
+    /// Even the fewest patches and rays would need more memory than is allowed.
+    #[error(
+        "the bake would need {} at least, of which {} for {covered} texels, and may take {}; allow more memory, lower the density or the \
+         map size, or use fewer triangles", mebibytes(*needed), mebibytes(*texels), mebibytes(*limit)
+    )]
+    Memory {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes of these that the texels need.
+        texels: u64,
+        /// Texels that show a surface.
+        covered: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// The checkpoint cannot be used.
+    #[error("the checkpoint {}: {source}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: std::path::PathBuf,
+        /// Why not.
+        source: crate::CheckpointError,
+    },
     /// The worker threads could not be started.
     #[error("worker threads could not be started: {reason}")]
     Threads {
         /// What the system says.
         reason: String,
     },
+}
+
+/// Bytes for people.
+pub(crate) fn mebibytes(bytes: u64) -> String {
+    format!("{:.0} MiB", (bytes as f64 / f64::from(1 << 20)).ceil())
 }

@@ -36,7 +36,10 @@
 
 mod apply;
 mod bake;
+mod checkpoint;
+mod content_hash;
 mod error;
+mod memory;
 mod options;
 mod pages;
 mod probes;
@@ -48,10 +51,12 @@ mod texels;
 mod transport;
 
 pub use apply::LightmapError;
-pub use bake::bake;
+pub use bake::{bake, bake_with};
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use content_hash::{ContentHash, content_hash};
 pub use error::BakeError;
 pub use options::{BakeOptions, Density, Probes, Quality};
 pub use progress::Progress;
-pub use report::{BakeReport, ProbeReport, StageTime};
+pub use report::{BakeReport, Ended, ProbeReport, StageTime};
 pub use texels::seams::SeamReport;
 pub use transport::solver::Solver;

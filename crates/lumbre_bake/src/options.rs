@@ -50,7 +50,8 @@ pub struct BakeOptions {
     /// Relative RMSE that sampling may leave in the lightmap (0.01 is one per cent of the mean); positive.
     /// Gathering stops there, or at the quality's largest number of rays.
     pub error: f64,
-    /// Wall-clock time after which no further round of samples begins. Bits then depend on the machine's speed.
+    /// Wall-clock time after which no more samples are taken: the map is complete, with what there was time for. Bits then depend on
+    /// the machine's speed.
     pub time: Option<Duration>,
     /// How much work the sampling may take.
     pub quality: Quality,
@@ -74,6 +75,8 @@ pub struct BakeOptions {
     pub probes: Probes,
     /// Metres between probes at most, positive and finite; by the scene's size, for up to 4096 of them, if absent.
     pub probe_spacing: Option<f64>,
+    /// Bytes that the bake may take beside the World: fewer patches and rays where more would not fit.
+    pub memory: Option<u64>,
 }
 
 impl Default for BakeOptions {
@@ -92,6 +95,7 @@ impl Default for BakeOptions {
             seams: true,
             probes: Probes::default(),
             probe_spacing: None,
+            memory: None,
         }
     }
 }

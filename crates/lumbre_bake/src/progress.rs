@@ -1,8 +1,10 @@
-//! How far a bake has come, and the way to end it. Not a drawing of a bar.
+//! How far a bake has come, the time it may take, and the way to end it. Not a drawing of a bar.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use crate::checkpoint::tape::Place;
+use crate::checkpoint::{Record, Tape};
 use crate::{BakeError, BakeReport, StageTime};
 
 /// How far a bake has come.
@@ -29,21 +31,49 @@ const STAGES: [(&str, f32); 9] = [
     ("seams", 0.02),
 ];
 
-/// Reports to the caller, and notes the time of each stage.
+/// The time that a bake has taken and may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Clock {
+    begun: Instant,
+    /// Seconds of the bakes that this one continues.
+    before: f64,
+    limit: Option<Duration>,
+}
+
+impl Clock {
+    /// Seconds since the bake began, those of bakes that it continues included.
+    pub fn seconds(&self) -> f64 {
+        self.before + self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Whether the time is up.
+    pub fn late(&self) -> bool {
+        self.limit.is_some_and(|limit| self.seconds() >= limit.as_secs_f64())
+    }
+}
+
+/// Reports to the caller, notes the time of each stage, and keeps what was computed.
 pub(crate) struct Watch<'a> {
     callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
-    begun: Instant,
+    clock: Clock,
     stage: Option<(&'static str, Instant)>,
+    pub tape: Tape,
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>) -> Self {
-        Self { callback, begun: Instant::now(), stage: None }
+    pub fn new(callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>, limit: Option<Duration>) -> Self {
+        let clock = Clock { begun: Instant::now(), before: 0.0, limit };
+        Self { callback, clock, stage: None, tape: Tape::default() }
+    }
+
+    /// The time as it is, to be asked from other threads.
+    pub fn clock(&self) -> Clock {
+        self.clock
     }
 
     /// Seconds since the bake began.
     pub fn seconds(&self) -> f64 {
-        self.begun.elapsed().as_secs_f64()
+        self.clock.seconds()
     }
 
     /// Ends the stage before and begins another.
@@ -65,18 +95,38 @@ impl<'a> Watch<'a> {
     /// # Errors
     /// [`BakeError::Cancelled`] if the caller wants no more.
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
-        let stage = self.stage.map_or("layout", |(stage, _)| stage);
-        let mut fraction = 0.0;
-        for (name, share) in STAGES {
-            if name == stage {
-                fraction += share * stage_fraction.clamp(0.0, 1.0);
-                break;
-            }
-            fraction += share;
-        }
+        let (index, stage) = self.running();
+        let before: f32 = STAGES[..index].iter().map(|(_, share)| share).sum();
+        let fraction = before + STAGES[index].1 * stage_fraction.clamp(0.0, 1.0);
         match (self.callback)(Progress { stage, stage_fraction, fraction: fraction.min(1.0) }) {
             ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(BakeError::Cancelled { stage }),
+            ControlFlow::Break(()) => {
+                self.tape.flush();
+                Err(BakeError::Cancelled { stage })
+            }
         }
+    }
+
+    /// The running stage and its place in the order.
+    fn running(&self) -> (usize, &'static str) {
+        let stage = self.stage.map_or("layout", |(stage, _)| stage);
+        (STAGES.iter().position(|(name, _)| *name == stage).unwrap_or(STAGES.len() - 1), stage)
+    }
+
+    fn place(&self, start: usize, of: usize) -> Place {
+        Place { stage: self.running().0 as u8, of, start }
+    }
+
+    /// The values from `start` on, if an interrupted bake has computed them. None of them: it had no more time for the rest.
+    pub fn recall<T: Record>(&mut self, start: usize, of: usize) -> Option<Vec<T>> {
+        let (values, seconds) = self.tape.next(self.place(start, of))?;
+        self.clock = Clock { begun: Instant::now(), before: seconds, ..self.clock };
+        Some(values)
+    }
+
+    /// Keeps values, against an interruption.
+    pub fn keep<T: Record>(&mut self, start: usize, of: usize, values: &[T]) {
+        let (place, seconds) = (self.place(start, of), self.seconds());
+        self.tape.record(place, values, seconds);
     }
 }

@@ -26,9 +26,52 @@ pub struct ProbeReport {
     pub estimated_error: f64,
 }
 
+/// Why a bake took no more samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Ended {
+    /// The estimated error is at most the one asked for.
+    #[default]
+    #[serde(rename = "reached")]
+    Reached,
+    /// The time was up.
+    #[serde(rename = "time")]
+    Time,
+    /// The quality's most rays were cast.
+    #[serde(rename = "most rays")]
+    MostRays,
+    /// What is left of the error is not made smaller by rays.
+    #[serde(rename = "no further gain")]
+    NoFurtherGain,
+}
+
+impl Ended {
+    /// By the first of these that holds.
+    pub(crate) fn after(reached: bool, late: bool, most_rays: bool) -> Self {
+        match (reached, late, most_rays) {
+            (true, ..) => Self::Reached,
+            (_, true, _) => Self::Time,
+            (.., true) => Self::MostRays,
+            _ => Self::NoFurtherGain,
+        }
+    }
+}
+
+impl std::fmt::Display for Ended {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Reached => "reached",
+            Self::Time => "not reached: the time ran out",
+            Self::MostRays => "not reached: the most rays of this quality were cast",
+            Self::NoFurtherGain => "not reached: more rays would not make what is left smaller",
+        })
+    }
+}
+
 /// What a bake did, what it cost and how good it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BakeReport {
+    /// The [`content_hash`](crate::content_hash) of what was baked, in hexadecimal digits.
+    pub content_hash: String,
     /// Wall-clock time of each stage that ran, in order.
     pub stages: Vec<StageTime>,
     /// Wall-clock seconds of the whole.
@@ -74,6 +117,12 @@ pub struct BakeReport {
     pub error_reached: bool,
     /// Light for what moves.
     pub probes: ProbeReport,
+    /// Why the bake took no more samples.
+    pub ended: Ended,
+    /// Bytes that the bake was estimated to need at most, beside the World, before its long stages began.
+    pub memory_bytes: u64,
+    /// Seconds of `seconds` that an interrupted bake had spent and this one was spared.
+    pub resumed_seconds: f64,
     /// Share of the patches' mutual exchange that was cut so that no row of form factors exceeds 1.
     pub energy_lost: f64,
     /// What closing the seams did; zeros where there were none.
@@ -86,7 +135,6 @@ pub struct BakeReport {
 
 impl std::fmt::Display for BakeReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let reached = if self.error_reached { "reached" } else { "not reached" };
         writeln!(
             f,
             "{} maps, {} texels ({:.0} % covered, {} partly hidden) in {:.2} s on {} threads",
@@ -99,8 +147,9 @@ impl std::fmt::Display for BakeReport {
         )?;
         writeln!(
             f,
-            "estimated error {:.2} % of the mean irradiance: {reached}",
-            100.0 * self.estimated_error
+            "estimated error {:.2} % of the mean irradiance: {}",
+            100.0 * self.estimated_error,
+            self.ended
         )?;
         writeln!(
             f,

@@ -23,8 +23,8 @@ use self::grid::Grid;
 use crate::options::Probes;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Object, under_a_dynamic_object, world_points};
+use crate::texels::chunks::in_chunks_anew;
 use crate::texels::gather::Outgoing;
-use crate::texels::in_chunks;
 use crate::transport::direct::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
 
@@ -99,7 +99,7 @@ impl Wanted {
         let grid = Grid::new(scene, &self.moving, options.probe_spacing, &mut report.warnings);
         let light =
             light::ProbeLight { scene, emitters: &emitters, outgoing, effort: effort(options.quality) };
-        let seen: Vec<Seen> = in_chunks(grid.count(), watch, |index| {
+        let seen: Vec<Seen> = in_chunks_anew(grid.count(), watch, |index| {
             light.at(grid.position(index), options.seed, index as u32)
         })?;
         report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();

@@ -1,8 +1,8 @@
 //! Direct light of every covered texel, in two passes: a few shadow rays everywhere, many where the first pass, there or
 //! next to it, saw a source partly or differently. A penumbra's faint ends are found by their neighbours.
 
+use super::chunks::{in_chunks, in_chunks_in_time};
 use super::footprint::{Texel, receiver};
-use super::in_chunks;
 use crate::progress::Watch;
 use crate::sampling::Sequence;
 use crate::scene::{BakeScene, LightmapLayout};
@@ -31,9 +31,13 @@ pub(crate) fn direct_light(
             texel.point(scene, x, y).map(|point| receiver(scene, &point))
         })
     };
-    let mut direct = in_chunks(texels.len(), watch, |index| light(&texels[index], few))?;
+    // A complete map first, whatever time it takes.
+    let clock = watch.clock();
+    let mut direct = in_chunks(texels.len(), watch, |index| {
+        light(&texels[index], if clock.late() { few.min(LATE) } else { few })
+    })?;
     let again = in_doubt(layout, texels, &direct);
-    let better = in_chunks(again.len(), watch, |place| light(&texels[again[place] as usize], many))?;
+    let better = in_chunks_in_time(again.len(), watch, |place| light(&texels[again[place] as usize], many))?;
     replace(&mut direct, &again, better);
     // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
@@ -50,7 +54,8 @@ pub(crate) fn direct_light(
         if again.is_empty() {
             break;
         }
-        let better = in_chunks(again.len(), watch, |place| light(&texels[again[place] as usize], samples))?;
+        let better =
+            in_chunks_in_time(again.len(), watch, |place| light(&texels[again[place] as usize], samples))?;
         replace(&mut direct, &again, better);
     }
     Ok(direct)
@@ -61,6 +66,10 @@ pub(crate) fn direct_light(
 const OWN_SHARE: f64 = 0.2;
 const MOST_OF_ONE: f64 = 9.0;
 
+/// Shadow rays of a texel when the time is up: their spread still tells the error.
+const LATE: u32 = 4;
+
+/// Those that there was time for.
 fn replace(direct: &mut [Direct], at: &[u32], better: Vec<Direct>) {
     for (&index, better) in at.iter().zip(better) {
         let first = &mut direct[index as usize];

@@ -3,14 +3,15 @@
 
 use glam::Vec3;
 
+use super::chunks::in_chunks_in_time;
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
-use super::in_chunks;
+use super::late::from_patches;
 use super::smooth::{Estimates, Surroundings, mean, smooth};
 use crate::progress::Watch;
 use crate::transport::direct::Direct;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions, BakeReport, Ended};
 
 /// Share of the squared error below which the gather's own noise is not worth more rays.
 const WORTH_RAYS: f64 = 0.1;
@@ -38,14 +39,18 @@ pub(crate) fn gather(
     let mut samples = first;
     let mut helped_before = f64::INFINITY;
     let (estimates, variances) = loop {
-        let round = in_chunks(wanted.len(), watch, |place| {
+        let round = in_chunks_in_time(wanted.len(), watch, |place| {
             let index = wanted[place] as usize;
             let mut own = gathered[index];
             outgoing.gather(&texels[index], &mut own, samples, options.seed);
             own
         })?;
+        let in_time = round.len() == wanted.len();
         for (&index, own) in wanted.iter().zip(round) {
             gathered[index as usize] = own;
+        }
+        if !in_time && samples == first {
+            from_patches(outgoing, texels, &mut gathered);
         }
         let raw: Vec<Estimates> = gathered.iter().map(Gathered::estimates).collect();
         let (estimates, smoothing_bias) = match options.denoise {
@@ -70,7 +75,7 @@ pub(crate) fn gather(
         let sum: f64 = open_variances(texels, &variances).sum();
         report.estimated_error = if total > 0.0 { (sum / open).sqrt() / total } else { 0.0 };
         report.error_reached = report.estimated_error <= options.error;
-        let late = options.time.is_some_and(|time| watch.seconds() >= time.as_secs_f64());
+        let late = !in_time || watch.clock().late();
         // Of the error, the part that more rays make smaller: what the patches leave stays.
         let by_rays = errors.by_rays();
         let helped: f64 = open_variances(texels, &by_rays).sum();
@@ -125,6 +130,7 @@ pub(crate) fn gather(
             }
         }
         helped_before = helped;
+        report.ended = Ended::after(report.error_reached, late, samples >= most);
         if report.error_reached || samples >= most || late || helpless {
             break (corrected(&estimates, &patch_bias), variances);
         }
@@ -136,7 +142,9 @@ pub(crate) fn gather(
         }
     };
     report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
-    let cast: u64 = gathered.iter().map(|own| u64::from(own.samples) * SCRAMBLES as u64).sum();
+    // Without rays: the patches' light, for want of time.
+    let cast = gathered.iter().filter(|own| own.rays > 0);
+    let cast: u64 = cast.map(|own| u64::from(own.samples) * SCRAMBLES as u64).sum();
     report.gather_rays = cast as f64 / open;
     Ok((estimates, variances))
 }

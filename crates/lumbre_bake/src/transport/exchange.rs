@@ -9,10 +9,12 @@ use super::form_factors::FormFactors;
 use super::guide::Guide;
 use super::patches::{Patch, Patches};
 use super::solver::{self, Solver};
+use crate::memory::Plan;
 use crate::progress::Watch;
 use crate::sampling::{Sequence, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
+use crate::texels::chunks::in_chunks;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The solution that the final gather reads.
@@ -42,13 +44,11 @@ impl Exchange {
         scene: &BakeScene,
         sources: &Sources<'_>,
         options: &BakeOptions,
-        texel_side: f32,
+        plan: &Plan,
         watch: &mut Watch<'_>,
         report: &mut BakeReport,
     ) -> Result<Option<Self>, BakeError> {
-        let effort = options.quality.effort();
-        let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-        let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
+        let side = plan.patch_side;
         watch.stage("form factors", report)?;
         let patches = Patches::new(scene, side);
         report.patches = patches.list.len();
@@ -62,23 +62,22 @@ impl Exchange {
             report.skipped.push(skipped.into());
             return Ok(sources.has_sky().then(|| Self::black(scene, patches, side)));
         }
-        let (factors, halves) = FormFactors::sample(scene, &patches, effort.form_factor_rays, options.seed);
+        let (factors, halves) =
+            FormFactors::sample(scene, &patches, plan.form_factor_rays, options.seed, watch)?;
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
         report.energy_lost = factors.energy_lost;
 
         watch.stage("radiosity", report)?;
-        let direct_halves = [5, 6].map(|purpose| {
-            let half: Vec<(Vec3, u32)> = (0..patches.list.len())
-                .into_par_iter()
-                .map(|index| {
-                    let sequence = Sequence::new(options.seed, purpose, index as u32);
-                    patch_direct(scene, sources, &patches, index, factors.open[index], sequence)
-                })
-                .collect();
+        let mut direct_halves = [Vec::new(), Vec::new()];
+        for (purpose, of_half) in [5, 6].into_iter().zip(&mut direct_halves) {
+            let half: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |index| {
+                let sequence = Sequence::new(options.seed, purpose, index as u32);
+                patch_direct(scene, sources, &patches, index, factors.open[index], sequence)
+            })?;
             report.rays += half.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-            half.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>()
-        });
+            *of_half = half.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
+        }
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();
         let dark = |(direct, patch): (&Vec3, &Patch)| *direct * patch.reflectance == Vec3::ZERO;

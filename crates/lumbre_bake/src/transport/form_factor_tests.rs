@@ -1,5 +1,6 @@
 //! Form factors against their closed forms: within 5 sigma, sigma = sqrt(F (1 - F) / N).
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
@@ -9,8 +10,13 @@ use lumbre_optics::Material;
 
 use super::form_factors::FormFactors;
 use super::patches::Patches;
+use crate::progress::{Progress, Watch};
 use crate::scene::{BakeScene, Canonical, Object, Part, lay_out};
 use crate::{BakeOptions, Density};
+
+fn carry_on(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
 
 fn mesh(triangles: &[[Vec3; 3]]) -> Arc<TriangleMesh> {
     let positions: Vec<Vec3> = triangles.iter().flatten().copied().collect();
@@ -50,7 +56,9 @@ fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
 fn factor(objects: &[&[[Vec3; 3]]], side: f32) -> (f64, f64) {
     let scene = scene(objects);
     let patches = Patches::new(&scene, side * scene.space.scale as f32);
-    let (factors, _) = FormFactors::sample(&scene, &patches, 200_000, 7);
+    let mut carry_on = carry_on;
+    let watch = &mut Watch::new(&mut carry_on, None);
+    let (factors, _) = FormFactors::sample(&scene, &patches, 200_000, 7, watch).unwrap();
     let object = |patch: usize| scene.triangles[patches.list[patch].triangle as usize].object;
     let (mut exchange, mut area) = (0.0, 0.0);
     for i in (0..factors.len()).filter(|&i| object(i) == 0) {
@@ -122,7 +130,9 @@ fn room() -> Vec<[Vec3; 3]> {
 fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
     let scene = scene(&[&room()]);
     let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
-    let (factors, _) = FormFactors::sample(&scene, &patches, 100_000, 3);
+    let mut carry_on = carry_on;
+    let watch = &mut Watch::new(&mut carry_on, None);
+    let (factors, _) = FormFactors::sample(&scene, &patches, 100_000, 3, watch).unwrap();
     for i in 0..factors.len() {
         // Twelve rounds of scaling leave what f32 and their own convergence leave.
         assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "row {i}: {}", factors.row_sum(i));

@@ -6,8 +6,11 @@
 use rayon::prelude::*;
 
 use super::patches::Patches;
+use crate::BakeError;
+use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
+use crate::texels::chunks::in_chunks;
 
 /// The symmetric matrix of exchange areas, row by row, sparse.
 #[derive(Clone, Debug, Default)]
@@ -35,17 +38,28 @@ const RAYS: (f64, f64) = (32.0, 65_536.0);
 impl FormFactors {
     /// Casts about `rays` rays, in proportion to the patches' areas. Beside the estimate from all rays come those of the even and of
     /// the odd ones: half their difference is the standard error of the whole.
-    pub fn sample(scene: &BakeScene, patches: &Patches, rays: usize, seed: u32) -> (Self, [Self; 2]) {
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
+    pub fn sample(
+        scene: &BakeScene,
+        patches: &Patches,
+        rays: usize,
+        seed: u32,
+        watch: &mut Watch<'_>,
+    ) -> Result<(Self, [Self; 2]), BakeError> {
         let total: f64 = patches.list.iter().map(|patch| f64::from(patch.area)).sum();
         let counts: Vec<u32> = patches
             .list
             .iter()
             .map(|patch| (rays as f64 * f64::from(patch.area) / total).round().clamp(RAYS.0, RAYS.1) as u32)
             .collect();
-        let cast: Vec<Cast> = (0..patches.list.len())
-            .into_par_iter()
-            .map(|index| cast(scene, patches, index as u32, counts[index], seed))
-            .collect();
+        let clock = watch.clock();
+        let cast = in_chunks(patches.list.len(), watch, |index| {
+            let count = if clock.late() { RAYS.0 as u32 } else { counts[index] };
+            cast(scene, patches, index as u32, count, seed)
+        })?;
+        let counts: Vec<u32> = cast.iter().map(|cast| cast.count).collect();
         let whole = Self::pooled(&cast, patches, &counts, |cast| {
             (cast.whole(), [cast.inside[0] + cast.inside[1], cast.missed[0] + cast.missed[1]])
         });
@@ -56,7 +70,7 @@ impl FormFactors {
                 (cast.met[half].clone(), [cast.inside[half], cast.missed[half]])
             })
         });
-        (whole, halves)
+        Ok((whole, halves))
     }
 
     /// Of patches that exchange nothing.
@@ -158,10 +172,12 @@ impl FormFactors {
 }
 
 /// Rays of one patch, the even and the odd ones: how many met each other patch, by index, began inside other geometry, met nothing.
-struct Cast {
-    met: [Vec<(u32, u32)>; 2],
-    inside: [u32; 2],
-    missed: [u32; 2],
+pub(crate) struct Cast {
+    pub met: [Vec<(u32, u32)>; 2],
+    pub inside: [u32; 2],
+    pub missed: [u32; 2],
+    /// How many they were.
+    pub count: u32,
 }
 
 impl Cast {
@@ -202,7 +218,7 @@ fn cast(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32)
             SurfaceHit::Back => {}
         }
     }
-    Cast { met: met.map(counted), inside, missed }
+    Cast { met: met.map(counted), inside, missed, count }
 }
 
 /// How often each number occurs, in order.

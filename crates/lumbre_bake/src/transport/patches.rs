@@ -3,8 +3,8 @@
 
 use glam::Vec3;
 
-use crate::scene::BakeScene;
 use crate::scene::material::Side;
+use crate::scene::{BakeScene, SceneTriangle};
 
 /// One side of one piece of a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +49,12 @@ impl Patches {
         if area > 0.0 { (sum / area).clamp(0.0, 0.999) } else { 0.0 }
     }
 
+    /// How many [`Patches::new`] would make.
+    pub fn count(scene: &BakeScene, side: f32) -> u64 {
+        let met = scene.triangles.iter().filter(|triangle| !triangle.superseded);
+        met.map(|t| u64::from(divisions(t, side)).pow(2) * (1 + u64::from(t.two_sided))).sum()
+    }
+
     /// Cuts every triangle into patches of about `side` canonical units.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
         let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
@@ -57,11 +63,7 @@ impl Patches {
                 cuts.push(Cut { divisions: 0, front: 0, back: None });
                 continue;
             }
-            let [a, b, c] = triangle.corners;
-            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-            // As many as the area asks for; a sliver is cut until its pieces are four sides long.
-            let by_area = (triangle.area / (0.5 * side * side)).sqrt();
-            let divisions = by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32;
+            let divisions = divisions(triangle, side);
             let mut add = |face: Side| {
                 let first = list.len() as u32;
                 for cell in 0..divisions * divisions {
@@ -110,6 +112,15 @@ impl Patches {
             triangle.position(u, v)
         })
     }
+}
+
+/// Pieces along each edge of a triangle.
+fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
+    let [a, b, c] = triangle.corners;
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    // As many as the area asks for; a sliver is cut until its pieces are four sides long.
+    let by_area = (triangle.area / (0.5 * side * side)).sqrt();
+    by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32
 }
 
 fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, divisions: u32, cell: u32) -> Vec3 {

@@ -1,7 +1,7 @@
 //! Loading: from a file or bytes to entities in a World.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
 
@@ -27,6 +27,8 @@ pub struct LoadReport {
     pub meshes: usize,
     /// Triangles of all entities.
     pub triangles: usize,
+    /// The files beside the glTF file that its buffers and images are in, if a folder was given.
+    pub files: Vec<PathBuf>,
 }
 
 /// Loads a .glb or .gltf file into a World, beside what is there.
@@ -117,11 +119,20 @@ fn read(
     let decoded_bytes =
         limits.decoded_bytes.unwrap_or_else(|| total.saturating_mul(64).saturating_add(64 << 20));
     let buffers = Buffers { document: &document, bytes: contents };
-    prepare(&document, &buffers, base, limits, Budget::new(decoded_bytes), notes)
+    let mut prepared = prepare(&document, &buffers, base, limits, Budget::new(decoded_bytes), notes)?;
+    prepared.files = files_beside(&document, base);
+    Ok(prepared)
+}
+
+fn files_beside(document: &Document, base: Option<&Path>) -> Vec<PathBuf> {
+    let uris = document.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+    let uris = uris.chain(document.images.iter().filter_map(|image| image.uri.as_deref()));
+    let files = uris.filter(|uri| !uri.starts_with("data:")).filter_map(|uri| uri::relative(uri).ok());
+    base.map_or(Vec::new(), |base| files.map(|file| base.join(file)).collect())
 }
 
 fn spawn(world: &mut World, prepared: Prepared, notes: Notes) -> LoadReport {
-    let mut report = LoadReport { notes: notes.0, ..LoadReport::default() };
+    let mut report = LoadReport { notes: notes.0, files: prepared.files, ..LoadReport::default() };
     report.nodes = vec![Entity::PLACEHOLDER; prepared.node_count];
     report.meshes = prepared.meshes.values().map(Vec::len).sum();
     // Entities in the order of the file, then children in the order of their parent's list.

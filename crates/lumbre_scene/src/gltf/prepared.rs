@@ -2,7 +2,7 @@
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lumbre_mesh::TriangleMesh;
@@ -62,6 +62,8 @@ pub(crate) struct Prepared {
     pub settings: SceneSettings,
     /// Length of the file's list of nodes.
     pub node_count: usize,
+    /// Files beside the glTF file.
+    pub files: Vec<PathBuf>,
 }
 
 /// Decodes a document.
@@ -188,7 +190,7 @@ pub(crate) fn prepare(
             extras: node.extras.clone(),
         });
     }
-    Ok(Prepared { nodes, meshes, settings, node_count: document.nodes.len() })
+    Ok(Prepared { nodes, meshes, settings, node_count: document.nodes.len(), files: Vec::new() })
 }
 
 /// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.

@@ -1,0 +1,120 @@
+//! What lies beside a baked level: of which scene and options it is, which files belong to it, how good it is. By it an unchanged
+//! level is not baked again. Not the baking.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use lumbre::bake::{BakeReport, Ended};
+use serde::{Deserialize, Serialize};
+
+use crate::lightmap_report::FileLine;
+use crate::output::write_file;
+
+/// The version of this file; another is not read.
+const VERSION: u32 = 1;
+
+/// A finished bake.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct BakeRecord {
+    version: u32,
+    /// The hash of everything that the light depends on.
+    content: String,
+    /// BLAKE3 of the input, with what the light does not depend on.
+    input: String,
+    /// Seconds that it was allowed to take.
+    time: Option<f64>,
+    /// How the lightmaps were to be written.
+    encodings: String,
+    /// What was written, beside this.
+    files: Vec<FileRecord>,
+    /// What the lightmaps among them hold.
+    pub lightmaps: Vec<FileLine>,
+    /// How it went.
+    pub report: BakeReport,
+}
+
+/// A file that was written.
+#[derive(Debug, Serialize, Deserialize)]
+struct FileRecord {
+    name: String,
+    bytes: u64,
+    blake3: String,
+}
+
+/// What is asked for, to be compared with what is there.
+pub struct Asked {
+    /// The hash of everything that the light depends on.
+    pub content: String,
+    /// How the lightmaps are to be written.
+    pub files: String,
+    /// BLAKE3 of the input.
+    pub input: String,
+    /// Seconds that the bake may take.
+    pub time: Option<f64>,
+}
+
+/// BLAKE3 of the bytes of several files.
+pub fn hash_of_files<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    for path in paths {
+        let bytes = std::fs::read(path)?;
+        hasher.update(&(bytes.len() as u64).to_le_bytes());
+        hasher.update(&bytes);
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// `room.baked.glb` has its record in `room.baked.bake.json`.
+fn place(output: &Path) -> PathBuf {
+    output.with_extension("bake.json")
+}
+
+impl BakeRecord {
+    /// The record of a level that is just what is asked for, with all its files whole.
+    pub fn unchanged(output: &Path, asked: &Asked) -> Option<Self> {
+        let record: Self = serde_json::from_slice(&std::fs::read(place(output)).ok()?).ok()?;
+        let same = record.version == VERSION
+            && record.content == asked.content
+            && record.encodings == asked.files
+            && record.input == asked.input;
+        // A bake for which the time ran out is only as good as one that has no more of it.
+        let enough = record.report.ended != Ended::Time
+            || asked.time.is_some_and(|asked| record.time.is_some_and(|time| asked <= time));
+        let named =
+            record.files.iter().any(|file| output.file_name().is_some_and(|name| *name == *file.name));
+        let whole = |file: &FileRecord| {
+            let path = output.with_file_name(&file.name);
+            let about = std::fs::metadata(&path);
+            about.is_ok_and(|about| about.is_file() && about.len() == file.bytes)
+                && hash_of_files([&path]).is_ok_and(|hash| hash == file.blake3)
+        };
+        (same && enough && named && record.files.iter().all(whole)).then_some(record)
+    }
+
+    /// Writes the record of what was just written.
+    pub fn write(
+        output: &Path,
+        asked: Asked,
+        written: &[PathBuf],
+        lightmaps: &[FileLine],
+        report: &BakeReport,
+    ) -> anyhow::Result<()> {
+        let mut files = Vec::with_capacity(written.len());
+        for path in written {
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            files.push(FileRecord {
+                name,
+                bytes: std::fs::metadata(path)?.len(),
+                blake3: hash_of_files([path])?,
+            });
+        }
+        let Asked { content, files: encodings, input, time } = asked;
+        let (lightmaps, report) = (lightmaps.to_vec(), report.clone());
+        let record = Self { version: VERSION, content, input, time, encodings, files, lightmaps, report };
+        write_file(&place(output), |path| {
+            let mut text = serde_json::to_vec_pretty(&record)?;
+            text.push(b'\n');
+            Ok(std::fs::write(path, text)?)
+        })
+    }
+}

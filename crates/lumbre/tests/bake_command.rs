@@ -1,0 +1,234 @@
+//! `lumbre bake` as a tool to trust: killed, interrupted, out of disk, out of time, asked twice. Not the light.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre::optics::{Material, Surface};
+use lumbre::scene::{Camera, Mesh, StaticObject, Transform};
+
+const LUMBRE: &str = env!("CARGO_BIN_EXE_lumbre");
+
+/// A floor, a box and a lamp panel.
+fn level(path: &Path, camera: f64) {
+    let mut world = World::new();
+    let mut add = |size: Vec3, height: f64, material: Material| {
+        let mesh = Mesh(Arc::new(lumbre::mesh::shapes::cuboid(size, 1)));
+        world.spawn((mesh, material, StaticObject, Transform::from_xyz(0.0, height, 0.0)));
+    };
+    add(Vec3::new(4.0, 0.2, 4.0), -0.1, Material::matt(Vec3::new(0.6, 0.5, 0.4)));
+    add(Vec3::new(0.8, 1.0, 0.8), 0.5, Material::matt(Vec3::new(0.8, 0.2, 0.2)));
+    let glow = Surface { emission: Vec3::splat(8.0), ..Surface::default() };
+    add(Vec3::new(1.0, 0.1, 1.0), 3.0, Material { front: glow, ..Material::default() });
+    let eye = Transform::from_xyz(0.0, 2.5, camera).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Camera::default(), eye));
+    lumbre::scene::save(&mut world, path).unwrap();
+}
+
+/// A folder of its own with the level in it.
+struct Place {
+    folder: tempfile::TempDir,
+    level: PathBuf,
+    output: PathBuf,
+}
+
+fn place() -> Place {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("level.glb"), folder.path().join("baked").join("level.glb"));
+    fs::create_dir(output.parent().unwrap()).unwrap();
+    level(&input, 6.0);
+    Place { folder, level: input, output }
+}
+
+impl Place {
+    /// The command, with two threads and a map of 48 texels.
+    fn bake(&self, more: &[&str]) -> Command {
+        let mut command = Command::new(LUMBRE);
+        command.arg("bake").arg(&self.level).arg("-o").arg(&self.output);
+        command.args(["--map-size", "48", "--error", "0.003", "--threads", "2"]).args(more);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    fn checkpoint(&self) -> PathBuf {
+        self.output.with_file_name("level.glb.checkpoint")
+    }
+
+    /// Name and content of everything beside the output, the record aside: it holds times.
+    fn files(&self) -> BTreeMap<String, Vec<u8>> {
+        let entries = fs::read_dir(self.output.parent().unwrap()).unwrap().map(|entry| entry.unwrap());
+        let files =
+            entries.map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()));
+        files.filter(|(name, _)| name != "level.bake.json").collect()
+    }
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn done(command: &mut Command) -> Output {
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    output
+}
+
+/// What an undisturbed bake writes.
+fn expected() -> BTreeMap<String, Vec<u8>> {
+    let place = place();
+    done(&mut place.bake(&[]));
+    let files = place.files();
+    assert!(files.len() == 4 && files.contains_key("level.glb"), "{:?}", files.keys());
+    files
+}
+
+#[test]
+fn killed_again_and_again_it_ends_with_the_same_bytes() {
+    let (expected, place) = (expected(), place());
+    let length = || fs::metadata(place.checkpoint()).map_or(0, |about| about.len());
+    let mut kills = 0;
+    let last = loop {
+        let before = length();
+        let mut child = place.bake(&["--resume", "--checkpoint-every", "0.001"]).spawn().unwrap();
+        // As soon as it has kept something more.
+        let ended = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break Some(status);
+            }
+            // The first time at the very beginning.
+            if (kills == 0 && place.checkpoint().exists()) || length() > before + 60_000 {
+                break None;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        if ended.is_some() {
+            break child.wait_with_output().unwrap();
+        }
+        // SIGKILL: nothing is cleaned up.
+        child.kill().unwrap();
+        child.wait().unwrap();
+        kills += 1;
+        assert!(!place.output.exists(), "half a result under the final name");
+    };
+    assert!(last.status.success(), "{}", stderr(&last));
+    assert!(kills >= 4, "only {kills} times was there a chance to kill it");
+    assert!(place.files() == expected, "other bytes after {kills} kills: {:?}", place.files().keys());
+}
+
+#[test]
+fn an_interruption_keeps_the_work_and_says_how_to_go_on() {
+    let (expected, place) = (expected(), place());
+    let child = place.bake(&["--checkpoint-every", "3600"]).spawn().unwrap();
+    while !place.checkpoint().exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let interrupt = ["-INT".to_owned(), child.id().to_string()];
+    assert!(Command::new("kill").args(interrupt).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(
+        said.contains("interrupted") && said.contains("--resume") && said.contains("level.glb.checkpoint"),
+        "{said}"
+    );
+    assert!(output.stdout.is_empty() && !place.output.exists());
+    assert_eq!(place.files().len(), 1, "the checkpoint and nothing else");
+    done(&mut place.bake(&["--resume"]));
+    assert!(place.files() == expected);
+}
+
+#[test]
+fn an_unchanged_level_is_left_as_it_is() {
+    let place = place();
+    let first = done(&mut place.bake(&["--json"]));
+    let written = || fs::metadata(&place.output).unwrap().modified().unwrap();
+    let (files, time) = (place.files(), written());
+    let again = |more: &[&str]| {
+        let mut arguments = vec!["--json"];
+        arguments.extend(more);
+        let output = done(&mut place.bake(&arguments));
+        (stderr(&output).contains("unchanged"), output)
+    };
+    let (unchanged, second) = again(&[]);
+    assert!(unchanged && second.stdout == first.stdout, "{}", stderr(&second));
+    assert!(place.files() == files && written() == time);
+    assert!(again(&["--resume"]).0 && again(&["--time", "1000"]).0);
+
+    // A map that is cut short, or gone, is baked again.
+    let map = files.keys().find(|name| name.ends_with(".exr")).unwrap();
+    let map = place.output.with_file_name(map);
+    let whole = fs::read(&map).unwrap();
+    fs::write(&map, &whole[..whole.len() / 2]).unwrap();
+    assert!(!again(&[]).0 && place.files() == files);
+    fs::remove_file(&map).unwrap();
+    assert!(!again(&[]).0 && place.files() == files);
+    // Rubbish for a record.
+    fs::write(place.output.with_file_name("level.bake.json"), "{").unwrap();
+    assert!(!again(&[]).0 && again(&[]).0);
+    // What the light does not depend on is in the baked file, too.
+    level(&place.level, 7.0);
+    assert!(!again(&[]).0 && place.files() != files);
+    assert!(!again(&["--quality", "draft"]).0, "other options");
+}
+
+#[test]
+fn what_cannot_work_is_said_before_the_bake() {
+    let place = place();
+    let refused = |output: &Path, more: &[&str]| {
+        let mut command = Command::new(LUMBRE);
+        let output = command.arg("bake").arg(&place.level).arg("-o").arg(output).args(more).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let folder = place.folder.path().join("folder.glb");
+    fs::create_dir(&folder).unwrap();
+    assert!(refused(&folder, &[]).contains("this is a folder"));
+    let missing = refused(&place.folder.path().join("no/such/level.glb"), &[]);
+    assert!(missing.contains("there is no folder") && missing.contains("no/such"), "{missing}");
+    let memory = refused(&place.output, &["--memory", "1MiB"]);
+    assert!(memory.contains("would need") && memory.contains("lower the density"), "{memory}");
+    assert!(place.files().is_empty(), "{:?}", place.files().keys());
+    fs::write(place.checkpoint(), "mine").unwrap();
+    assert!(refused(&place.output, &[]).contains("no checkpoint of Lumbre"));
+    assert_eq!(fs::read(place.checkpoint()).unwrap(), b"mine");
+}
+
+#[test]
+fn a_full_disk_leaves_nothing_half_written() {
+    let (expected, place) = (expected(), place());
+    let mut limited = Command::new("sh");
+    // Writes beyond 4 or 8 KiB of a file fail as on a full disk.
+    limited.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\"", LUMBRE, "bake"]);
+    limited.arg(&place.level).arg("-o").arg(&place.output);
+    limited.args(["--map-size", "48", "--error", "0.003", "--checkpoint-every", "0.001"]);
+    let output = limited.output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("cannot write") && said.contains("--resume"), "{said}");
+    let left = place.files();
+    assert!(left.keys().all(|name| name == "level.glb.checkpoint"), "{:?}", left.keys());
+    done(&mut place.bake(&["--resume"]));
+    assert!(place.files() == expected);
+}
+
+#[test]
+fn when_the_time_is_up_there_is_a_map_and_the_reason() {
+    let place = place();
+    let output = done(&mut place.bake(&["--time", "0.001", "--json"]));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&report["ended"], &report["error_reached"]), (&"time".into(), &false.into()));
+    assert_eq!(place.files().len(), 4);
+    // With as little time it would not be better; with more it would.
+    assert!(stderr(&done(&mut place.bake(&["--time", "0.0005"]))).contains("unchanged"));
+    let more = done(&mut place.bake(&[]));
+    assert!(!stderr(&more).contains("unchanged"));
+    assert!(!String::from_utf8_lossy(&more.stdout).contains("the time ran out"));
+}

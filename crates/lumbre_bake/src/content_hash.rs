@@ -1,0 +1,353 @@
+//! One number for everything that a bake depends on, so that an unchanged scene need not be baked again and no checkpoint of another
+//! bake is continued. Not what it does not depend on: cameras, dynamic objects, highlights, threads.
+//!
+//! Everything is taken apart field by field, without `..`: whoever adds a field decides here whether the bake reads it.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
+use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
+
+use crate::scene::{Object, Part, PlacedLight, collect, lights, sky};
+use crate::{BakeError, BakeOptions, Density};
+
+/// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
+pub(crate) const BAKER: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("LUMBRE_BAKE_SOURCES"));
+
+/// A BLAKE3 hash of a bake's input; 64 hexadecimal digits when displayed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ContentHash([u8; 32]);
+
+impl ContentHash {
+    /// Its bytes.
+    pub fn bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+}
+
+impl fmt::Display for ContentHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// The hash of everything that [`bake`](crate::bake) reads of a world and its options, and of the baker itself: static meshes in their
+/// places, what their materials reflect, emit and let through with the pixels of their textures, the lights that are baked and the sky, all in
+/// the order in which they are baked. Take it before the bake, which gives meshes new coordinates.
+///
+/// Equal hashes mean equal bits, unless [`BakeOptions::time`] cuts a bake short: the hash leaves it out, like the number of threads.
+/// Only global transforms of the world are brought up to date.
+///
+/// # Errors
+/// [`BakeError`] as of a bake: an option out of its range, or a mesh that cannot be read.
+pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentHash, BakeError> {
+    options.check()?;
+    let objects = collect(world)?;
+    let placed = lights(world);
+    Ok(hash_of(&objects, &placed, sky(world), options))
+}
+
+/// The hash of what was collected already.
+pub(crate) fn hash_of(
+    objects: &[Object],
+    lights: &[PlacedLight],
+    sky: Vec3,
+    options: &BakeOptions,
+) -> ContentHash {
+    let mut images = Images::default();
+    let mut hasher = Hasher::new("lumbre bake");
+    hasher.options(options);
+    hasher.number(objects.len() as u64);
+    for object in objects {
+        hasher.hashes(&[object_hash(object, &mut images)]);
+    }
+    // Objects that share their meshes share their unwrap.
+    let mut numbers: HashMap<*const TriangleMesh, u64> = HashMap::new();
+    for part in objects.iter().flat_map(|object| &object.parts) {
+        let next = numbers.len() as u64;
+        hasher.number(*numbers.entry(Arc::as_ptr(&part.mesh)).or_insert(next));
+    }
+    hasher.hashes(&lights.iter().map(light_hash).collect::<Vec<_>>());
+    hasher.color(&sky);
+    hasher.finish()
+}
+
+/// The hash of an object in its place.
+fn object_hash(object: &Object, images: &mut Images) -> ContentHash {
+    let mut hasher = Hasher::new("object");
+    // The map is named after the object.
+    let Object { name, parts } = object;
+    hasher.bytes(name.as_bytes());
+    hasher.number(parts.len() as u64);
+    for part in parts {
+        let Part { entity: _, mesh, material, textures, transform } = part;
+        hasher.mesh(mesh);
+        hasher.material(material);
+        hasher.textures(textures.as_ref().unwrap_or(&MaterialTextures::default()), images);
+        hasher.doubles(&transform.to_cols_array());
+    }
+    hasher.finish()
+}
+
+fn light_hash(placed: &PlacedLight) -> ContentHash {
+    let PlacedLight { light, position, axis } = placed;
+    // Lights that are off are not baked at all; highlights, ambient terms and shadow maps are the frame's.
+    let Light {
+        kind,
+        ambient: _,
+        diffuse,
+        specular: _,
+        attenuation,
+        spot,
+        enabled: _,
+        shadow: _,
+        bake,
+        radius,
+        angle,
+    } = light;
+    let Attenuation { constant, linear, quadratic, clamp, range } = *attenuation;
+    let mut hasher = Hasher::new("light");
+    hasher.number(match kind {
+        LightKind::Ambient => 0,
+        LightKind::Directional => 1,
+        LightKind::Point => 2,
+    });
+    hasher.number(match bake {
+        BakeMode::Dynamic => 0,
+        BakeMode::Mixed => 1,
+        BakeMode::Static => 2,
+    });
+    hasher.color(diffuse);
+    hasher.floats(&[constant, linear, quadratic, range, *radius, *angle]);
+    hasher.number(clamp.into());
+    match *spot {
+        None => hasher.number(0),
+        Some(SpotCone::Exponent { cutoff, exponent }) => {
+            hasher.number(1);
+            hasher.floats(&[cutoff, exponent]);
+        }
+        Some(SpotCone::Smooth { inner, outer }) => {
+            hasher.number(2);
+            hasher.floats(&[inner, outer]);
+        }
+    }
+    for place in [position, axis] {
+        let DVec3 { x, y, z } = *place;
+        hasher.doubles(&[x, y, z]);
+    }
+    hasher.finish()
+}
+
+/// Hashes of pixels that were read already.
+#[derive(Default)]
+struct Images(HashMap<*const Image, ContentHash>);
+
+impl Images {
+    fn hash(&mut self, image: &Arc<Image>) -> ContentHash {
+        *self.0.entry(Arc::as_ptr(image)).or_insert_with(|| {
+            let Image { name: _, width, height, rgba } = &**image;
+            let mut hasher = Hasher::new("image");
+            hasher.number((*width).into());
+            hasher.number((*height).into());
+            hasher.bytes(rgba);
+            hasher.finish()
+        })
+    }
+}
+
+/// Every list is preceded by its length, every choice by its number: different inputs are different bytes.
+struct Hasher(blake3::Hasher);
+
+impl Hasher {
+    fn new(of: &str) -> Self {
+        let mut hasher = Self(blake3::Hasher::new());
+        hasher.bytes(of.as_bytes());
+        hasher.bytes(BAKER.as_bytes());
+        hasher
+    }
+
+    fn finish(&self) -> ContentHash {
+        ContentHash(*self.0.finalize().as_bytes())
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.number(bytes.len() as u64);
+        self.0.update(bytes);
+    }
+
+    fn number(&mut self, value: u64) {
+        self.0.update(&value.to_le_bytes());
+    }
+
+    fn floats(&mut self, values: &[f32]) {
+        self.list(values.len(), values.iter().copied());
+    }
+
+    fn doubles(&mut self, values: &[f64]) {
+        self.number(values.len() as u64);
+        values.iter().for_each(|value| self.number(value.to_bits()));
+    }
+
+    fn color(&mut self, color: &Vec3) {
+        self.floats(&color.to_array());
+    }
+
+    fn hashes(&mut self, hashes: &[ContentHash]) {
+        self.number(hashes.len() as u64);
+        hashes.iter().for_each(|hash| {
+            self.0.update(hash.bytes());
+        });
+    }
+
+    /// `count` of something, each some floats.
+    fn list(&mut self, count: usize, floats: impl Iterator<Item = f32>) {
+        self.words(count, floats.map(f32::to_le_bytes));
+    }
+
+    /// In blocks: BLAKE3 is fast on long runs only.
+    fn words(&mut self, count: usize, words: impl Iterator<Item = [u8; 4]>) {
+        self.number(count as u64);
+        let mut block = Vec::with_capacity(1 << 14);
+        for word in words {
+            block.extend_from_slice(&word);
+            if block.len() >= 1 << 14 {
+                self.0.update(&block);
+                block.clear();
+            }
+        }
+        self.0.update(&block);
+    }
+
+    fn options(&mut self, options: &BakeOptions) {
+        // The bits are the same on any number of threads, and in any time that is enough.
+        let BakeOptions {
+            density,
+            atlas_size,
+            error,
+            time: _,
+            quality,
+            gap,
+            seed,
+            threads: _,
+            solver,
+            denoise,
+            seams,
+            probes,
+            probe_spacing,
+            memory,
+        } = options;
+        match density {
+            Density::Automatic => self.number(0),
+            Density::TexelsPerMeter(density) => {
+                self.number(1);
+                self.doubles(&[*density]);
+            }
+            Density::MapSize(side) => {
+                self.number(2);
+                self.number((*side).into());
+            }
+        }
+        self.doubles(&[*error]);
+        self.number(*quality as u64);
+        self.number((*gap).into());
+        self.number((*seed).into());
+        self.number(*solver as u64);
+        self.number((*denoise).into());
+        self.number(memory.unwrap_or(u64::MAX));
+        self.number(atlas_size.map_or(0, u64::from));
+        self.number((*seams).into());
+        self.number(*probes as u64);
+        self.doubles(&[probe_spacing.unwrap_or(0.0)]);
+    }
+
+    fn mesh(&mut self, mesh: &TriangleMesh) {
+        let TriangleMesh { positions, normals, uv0, uv1, colors, indices } = mesh;
+        self.list(positions.len(), positions.iter().flat_map(|v| v.to_array()));
+        self.list(normals.len(), normals.iter().flat_map(|v| v.to_array()));
+        self.list(uv0.len(), uv0.iter().flat_map(|v| v.to_array()));
+        self.list(uv1.len(), uv1.iter().flat_map(|v| v.to_array()));
+        self.list(colors.len(), colors.iter().flat_map(|v| v.to_array()));
+        self.words(indices.len(), indices.iter().map(|index| index.to_le_bytes()));
+    }
+
+    fn material(&mut self, material: &Material) {
+        // Diffuse reflection, emission and coverage are baked; what shines, mirrors or refracts is not.
+        let Material {
+            front,
+            back,
+            alpha,
+            alpha_mode,
+            double_sided,
+            unlit,
+            mirror: _,
+            transmission: _,
+            ior: _,
+            distribution: _,
+            fresnel: _,
+        } = material;
+        self.surface(front);
+        self.number(back.is_some().into());
+        if let Some(back) = back {
+            self.surface(back);
+        }
+        match *alpha_mode {
+            // Alpha is ignored.
+            AlphaMode::Opaque => self.number(0),
+            AlphaMode::Mask { cutoff } => {
+                self.number(1);
+                self.floats(&[*alpha, cutoff]);
+            }
+            AlphaMode::Blend => {
+                self.number(2);
+                self.floats(&[*alpha]);
+            }
+        }
+        self.number((*double_sided).into());
+        self.number((*unlit).into());
+    }
+
+    fn surface(&mut self, surface: &Surface) {
+        let Surface { ambient: _, diffuse, specular: _, emission, shininess: _ } = surface;
+        self.color(diffuse);
+        self.color(emission);
+    }
+
+    fn textures(&mut self, textures: &MaterialTextures, images: &mut Images) {
+        let MaterialTextures { base_color, emissive, metallic_roughness } = textures;
+        for texture in [base_color, emissive] {
+            self.number(texture.is_some().into());
+            if let Some(texture) = texture {
+                self.texture(texture, images);
+            }
+        }
+        self.number(metallic_roughness.is_some().into());
+        if let Some(MetallicRoughnessTexture { texture, base_color, metallic, roughness: _ }) =
+            metallic_roughness
+        {
+            self.texture(texture, images);
+            self.color(base_color);
+            self.floats(&[*metallic]);
+        }
+    }
+
+    fn texture(&mut self, texture: &TextureReference, images: &mut Images) {
+        let TextureReference { image, sampler, tex_coord, offset, rotation, scale } = texture;
+        let hash = images.hash(image);
+        self.hashes(&[hash]);
+        // The baker always reads bilinearly: of the sampler only the wrapping counts.
+        for wrap in [sampler.wrap_u, sampler.wrap_v] {
+            self.number(match wrap {
+                Wrap::Repeat => 0,
+                Wrap::MirroredRepeat => 1,
+                Wrap::ClampToEdge => 2,
+            });
+        }
+        self.number((*tex_coord).into());
+        self.floats(&[offset.x, offset.y, *rotation, scale.x, scale.y]);
+    }
+}

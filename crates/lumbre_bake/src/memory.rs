@@ -1,0 +1,131 @@
+//! What a bake will need, told before it needs it, and kept within what it may take: fewer patches and rays where more would not fit.
+//! Not a measurement: a bound that a test holds against the measured peak.
+
+use std::mem::size_of;
+
+use crate::error::mebibytes;
+use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
+use crate::texels::footprint::{Footprint, FootprintPoint, Texel};
+use crate::texels::gather::Gathered;
+use crate::texels::smooth::Estimates;
+use crate::transport::direct::Direct;
+use crate::transport::patches::{Patch, Patches};
+use crate::{BakeError, BakeOptions, BakeReport};
+
+/// How finely the exchange of light is computed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plan {
+    /// Side of a patch, canonical units.
+    pub patch_side: f32,
+    /// Rays for all form factors together.
+    pub form_factor_rays: usize,
+}
+
+/// Of a triangle: itself, its corners for the hierarchy, the hierarchy's copy of them, two nodes.
+const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 48 + 2 * 64) as u64;
+
+/// Of a texel that shows a surface: what it has gathered before and after a round, raw and smoothed estimates with their guides, and
+/// eight lists of one number each for the errors.
+const COVERED: u64 = (size_of::<Texel>()
+    + size_of::<Direct>()
+    + 2 * size_of::<Gathered>()
+    + 2 * size_of::<Estimates>()
+    + 24
+    + 8 * 4) as u64;
+
+/// Of a texel of a map: its light, direct and filled, the fill's two lists, its error, its place in the neighbourhoods.
+const MAPPED: u64 = 5 * 12 + 4 + 8;
+
+/// Of a patch: itself, its direct light in two halves and together, its rows' heads, and sixteen lists of the solver for each channel.
+const PATCH: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8) as u64;
+
+/// Of a ray for form factors that meets a patch of its own: the count of it in the rays' half (a list may have grown to twice its
+/// length), in the row and in the column, and both entries of the pair in the matrix and in a half's.
+const RAY: u64 = 2 * 8 + 8 + 2 * 8 + 2 * 8 + 8;
+
+/// What nothing counts: threads, buffers, the checkpoint's block.
+const REST: u64 = 32 << 20;
+
+/// Refuses what cannot fit before its texels are listed.
+///
+/// # Errors
+/// [`BakeError::Memory`].
+pub(crate) fn check_texels(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    options: &BakeOptions,
+) -> Result<(), BakeError> {
+    let Some(limit) = options.memory else { return Ok(()) };
+    let area = |t: &SceneTriangle| f64::from((t.uv[1] - t.uv[0]).perp_dot(t.uv[2] - t.uv[0]).abs()) / 2.0;
+    let covered = scene.triangles.iter().map(area).sum::<f64>().min(layout.texels as f64) as u64;
+    let texels = covered * COVERED + layout.texels as u64 * MAPPED;
+    let needed = texels + scene.triangles.len() as u64 * TRIANGLE + REST;
+    if needed > limit {
+        return Err(BakeError::Memory { needed, texels, covered, limit });
+    }
+    Ok(())
+}
+
+impl Plan {
+    /// As fine as the quality asks for and the memory allows. States what will be needed.
+    ///
+    /// # Errors
+    /// [`BakeError::Memory`] if the coarsest does not fit.
+    pub fn new(
+        scene: &BakeScene,
+        layout: &LightmapLayout,
+        texels: &[Texel],
+        texel_side: f32,
+        options: &BakeOptions,
+        report: &mut BakeReport,
+    ) -> Result<Self, BakeError> {
+        let effort = options.quality.effort();
+        let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+        let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
+        let mut plan = Self { patch_side: side, form_factor_rays: effort.form_factor_rays };
+        let triangles = scene.triangles.len() as u64;
+        let covered = texels.len() as u64;
+        let listed = texels.iter().map(|texel| match &texel.footprint {
+            Footprint::Points(points) => points.capacity() as u64,
+            Footprint::Whole(_) | Footprint::Hidden => 0,
+        });
+        let points = listed.sum::<u64>();
+        let for_texels =
+            covered * COVERED + points * size_of::<FootprintPoint>() as u64 + layout.texels as u64 * MAPPED;
+        let asked = Patches::count(scene, side);
+        let (mut patches, mut fewest) = (asked, false);
+        loop {
+            let needed = for_texels + triangles * TRIANGLE + REST + plan.exchange_bytes(patches);
+            report.memory_bytes = needed;
+            let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
+            if fewest {
+                return Err(BakeError::Memory { needed, texels: for_texels, covered, limit });
+            }
+            plan.patch_side *= std::f32::consts::SQRT_2;
+            plan.form_factor_rays /= 2;
+            let fewer = Patches::count(scene, plan.patch_side);
+            fewest = fewer == patches && plan.form_factor_rays == 0;
+            patches = fewer;
+        }
+        if plan.patch_side > side {
+            report.warnings.push(format!(
+                "{patches} patches instead of {asked}, and {} form factor rays instead of {}, so that the bake stays within {}",
+                plan.form_factor_rays,
+                effort.form_factor_rays,
+                mebibytes(options.memory.unwrap_or_default())
+            ));
+        }
+        tracing::info!(
+            "this bake needs about {} at most: {covered} texels, {triangles} triangles, {patches} patches",
+            mebibytes(report.memory_bytes)
+        );
+        Ok(plan)
+    }
+
+    /// Of the patches and their form factors.
+    fn exchange_bytes(&self, patches: u64) -> u64 {
+        // Every patch casts some, however small it is; no patch meets more others than there are.
+        let rays = (self.form_factor_rays as u64 + 32 * patches).min(patches.saturating_mul(patches));
+        patches * PATCH + rays * RAY
+    }
+}

@@ -1,0 +1,90 @@
+//! Lists that take long, in chunks: between them the caller may cancel, the clock is looked at, and what is done is kept in the
+//! checkpoint. Not what is computed: a value depends on its index alone, so the chunks' borders show nowhere.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::BakeError;
+use crate::checkpoint::Record;
+use crate::progress::Watch;
+
+/// Seconds that a chunk should take: a prompt answer, and long enough to keep the threads busy.
+const PACE: f64 = 0.1;
+/// Values of the first chunk, and of any.
+const FIRST: usize = 1024;
+const LEAST: usize = 64;
+const MOST: usize = 1 << 16;
+
+/// Computes one value per index, in order.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn in_chunks<T: Send + Record>(
+    count: usize,
+    watch: &mut Watch<'_>,
+    compute: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, BakeError> {
+    chunks(count, watch, false, compute)
+}
+
+/// As [`in_chunks`], but it ends when the time is up: the values are then those of the first indices only.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn in_chunks_in_time<T: Send + Record>(
+    count: usize,
+    watch: &mut Watch<'_>,
+    compute: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, BakeError> {
+    chunks(count, watch, true, compute)
+}
+
+/// As [`in_chunks`], of a list that is quick to make anew and so not kept in the checkpoint.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn in_chunks_anew<T: Send>(
+    count: usize,
+    watch: &mut Watch<'_>,
+    compute: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, BakeError> {
+    let mut values = Vec::with_capacity(count);
+    while values.len() < count {
+        let end = (values.len() + LEAST).min(count);
+        values.par_extend((values.len()..end).into_par_iter().map(&compute));
+        watch.advance(values.len() as f32 / count as f32)?;
+    }
+    Ok(values)
+}
+
+fn chunks<T: Send + Record>(
+    count: usize,
+    watch: &mut Watch<'_>,
+    may_end: bool,
+    compute: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, BakeError> {
+    let mut values = Vec::with_capacity(count);
+    let mut size = FIRST;
+    while values.len() < count {
+        let start = values.len();
+        if let Some(kept) = watch.recall(start, count) {
+            if kept.is_empty() && may_end {
+                break;
+            }
+            values.extend(kept);
+        } else if may_end && watch.clock().late() {
+            watch.keep::<T>(start, count, &[]);
+            break;
+        } else {
+            let begun = Instant::now();
+            let end = (start + size).min(count);
+            values.par_extend((start..end).into_par_iter().map(&compute));
+            watch.keep(start, count, &values[start..]);
+            let wanted = size as f64 * PACE / begun.elapsed().as_secs_f64().max(1e-6);
+            size = (wanted as usize).min(4 * size).clamp(LEAST, MOST);
+        }
+        watch.advance(values.len() as f32 / count as f32)?;
+    }
+    Ok(values)
+}

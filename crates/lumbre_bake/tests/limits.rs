@@ -1,0 +1,133 @@
+//! What a bake may take: time and memory. Not how long anything takes on this machine.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use bevy_ecs::world::World;
+use lumbre_bake::{
+    BakeError, BakeOptions, BakeReport, Density, Ended, LightmapError, Progress, Quality, bake,
+};
+use lumbre_scene::Lightmap;
+
+#[path = "common/corner.rs"]
+mod corner;
+
+use corner::corner;
+
+fn options() -> BakeOptions {
+    BakeOptions { density: Density::MapSize(48), quality: Quality::Final, ..BakeOptions::default() }
+}
+
+fn baked(
+    options: &BakeOptions,
+    progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+) -> (World, BakeReport) {
+    let mut world = corner();
+    let report = bake(&mut world, options, progress).unwrap();
+    (world, report)
+}
+
+/// Light and stated error of every texel that shows a surface, mean of the channels.
+fn texels(world: &mut World) -> Vec<(f32, f32)> {
+    let mut maps = world.query::<(&Lightmap, &LightmapError)>();
+    let mut found: Vec<_> = maps.iter(world).collect();
+    found.sort_by(|a, b| a.0.image.name.cmp(&b.0.image.name));
+    let texels = found.iter().flat_map(|(map, errors)| map.image.texels.iter().zip(errors.0.iter()));
+    texels.filter(|(_, error)| !error.is_nan()).map(|(e, error)| (e.element_sum() / 3.0, *error)).collect()
+}
+
+/// A map for which the time ran out is complete, and honest about what it is worth.
+fn complete_and_honest(world: &mut World, report: &BakeReport, what: &str) {
+    assert_eq!((report.ended, report.error_reached), (Ended::Time, false), "{what}");
+    let (mut better, _) = baked(&options(), &mut |_| ControlFlow::Continue(()));
+    let (found, expected) = (texels(world), texels(&mut better));
+    assert_eq!(found.len(), expected.len(), "{what}");
+    let mean = expected.iter().map(|(e, _)| f64::from(*e)).sum::<f64>() / expected.len() as f64;
+    // Outer faces see a sliver of the floor, which the few rays of a patch may all miss.
+    let lit = |e: f32| f64::from(e) > 0.05 * mean;
+    let dark =
+        found.iter().zip(&expected).filter(|(found, expected)| found.0 <= 0.0 && lit(expected.0)).count();
+    assert_eq!(dark, 0, "{what}: texels without light that have some");
+    // The better bake's own error is far below: 1 % of the mean.
+    let square = |(a, b): (&(f32, f32), &(f32, f32))| f64::from(a.0 - b.0).powi(2);
+    let error = (found.iter().zip(&expected).map(square).sum::<f64>() / found.len() as f64).sqrt() / mean;
+    assert!(error <= 2.0 * report.estimated_error, "{what}: {error} of {}", report.estimated_error);
+    assert!(report.estimated_error > options().error, "{what}: {}", report.estimated_error);
+}
+
+#[test]
+fn without_any_time_there_is_a_complete_map() {
+    let options = BakeOptions { time: Some(Duration::from_nanos(1)), ..options() };
+    let (mut world, report) = baked(&options, &mut |_| ControlFlow::Continue(()));
+    complete_and_honest(&mut world, &report, "no time");
+}
+
+#[test]
+fn wherever_the_time_runs_out_the_map_is_complete() {
+    let time = Duration::from_millis(400);
+    for stage in ["direct light", "form factors", "radiosity", "final gather"] {
+        let begun = Instant::now();
+        // Makes the time run out there, on a machine of any speed.
+        let mut waiting = |progress: Progress| {
+            if progress.stage == stage && progress.stage_fraction > 0.0 {
+                std::thread::sleep(time.saturating_sub(begun.elapsed()));
+            }
+            ControlFlow::Continue(())
+        };
+        let (mut world, report) = baked(&BakeOptions { time: Some(time), ..options() }, &mut waiting);
+        complete_and_honest(&mut world, &report, stage);
+    }
+}
+
+#[test]
+fn the_end_is_named() {
+    let end = |options: BakeOptions| baked(&options, &mut |_| ControlFlow::Continue(())).1;
+    let reached = end(BakeOptions { error: 0.1, time: Some(Duration::from_secs(3600)), ..options() });
+    assert_eq!((reached.ended, reached.error_reached), (Ended::Reached, true));
+    let most = end(BakeOptions { error: 1e-6, quality: Quality::Draft, ..options() });
+    assert_eq!((most.ended, most.error_reached), (Ended::MostRays, false));
+    assert!(most.to_string().contains("most rays"), "{most}");
+    let json =
+        serde_json::to_value([Ended::Reached, Ended::Time, Ended::MostRays, Ended::NoFurtherGain]).unwrap();
+    assert_eq!(json, serde_json::json!(["reached", "time", "most rays", "no further gain"]));
+}
+
+#[test]
+fn less_memory_means_fewer_patches_and_none_an_error_that_says_what_to_do() {
+    let within = |memory| {
+        let mut world = corner();
+        bake(&mut world, &BakeOptions { memory, ..options() }, &mut |_| ControlFlow::Continue(()))
+    };
+    let free = within(None).unwrap();
+    let enough = within(Some(free.memory_bytes)).unwrap();
+    assert_eq!((enough.patches, enough.memory_bytes), (free.patches, free.memory_bytes));
+    assert!(enough.warnings.is_empty());
+    // Half of what is beyond the texels and what is fixed.
+    let least = match within(Some(1 << 20)) {
+        Err(error @ BakeError::Memory { needed, texels, limit, .. }) => {
+            assert!(limit == 1 << 20 && needed > texels && texels > 0);
+            let text = error.to_string();
+            assert!(text.contains("1 MiB") && text.contains("lower the density"), "{text}");
+            needed
+        }
+        other => panic!("{other:?}"),
+    };
+    let limit = u64::midpoint(least, free.memory_bytes);
+    let tight = within(Some(limit)).unwrap();
+    assert!(
+        tight.patches < free.patches && tight.memory_bytes <= limit,
+        "{} of {}",
+        tight.patches,
+        free.patches
+    );
+    assert!(
+        tight.warnings.iter().any(|warning| warning.contains("patches instead of")),
+        "{:?}",
+        tight.warnings
+    );
+    // As many patches as there are: no limit is no loss of light, only of detail.
+    let apart = (tight.mean_irradiance[1] / free.mean_irradiance[1] - 1.0).abs();
+    assert!(apart < 3.0 * (tight.estimated_error + free.estimated_error), "{apart}");
+}
