@@ -24,7 +24,7 @@
 //! - Free of scale: no absolute epsilon. Multiplying a scene by 2^k changes no hit.
 //! - Deterministic: the same triangles give the same tree; ties go to the lower index. AVX2 is used where the machine
 //!   has it, the target's baseline elsewhere, and no product is fused with a sum: both compute the same bits.
-//! - Fast: no question in no scene is answered faster by another crate. Millions of rays per second on one thread of
+//! - Fast: in no scene measured does another crate answer a question faster. Millions of rays per second on one thread of
 //!   a Xeon (Sapphire Rapids, 2 shared cores), and our rate over that of obvhs 0.4's `CwBvh` (slow build), the fastest
 //!   other hierarchy, which is not watertight. `cargo bench -p lumbre_rays --bench ratios` prints them with quartiles
 //!   and the other crates; `--bench throughput` prints divan's table.
