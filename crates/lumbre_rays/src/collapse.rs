@@ -80,11 +80,11 @@ fn combine(area: f32, left: &Plan, right: &Plan) -> Plan {
     let mut plan = Plan { count, block: false, left: [0; 8], cost: [f32::INFINITY; 7] };
     // Shared out among i + 1 children, both sides having at least one.
     let mut shared = [f32::INFINITY; 8];
-    for i in 1..8 {
+    for (i, best) in shared.iter_mut().enumerate().skip(1) {
         for of_left in 1..=i {
             let cost = left.cost[of_left - 1] + right.cost[i - of_left];
-            if cost < shared[i] {
-                shared[i] = cost;
+            if cost < *best {
+                *best = cost;
                 plan.left[i] = of_left as u8;
             }
         }
@@ -92,10 +92,10 @@ fn combine(area: f32, left: &Plan, right: &Plan) -> Plan {
     let node = shared[7] + area * NODE_COST;
     plan.block = count as usize <= TriangleBlock::SIZE && area <= node;
     plan.cost[0] = if plan.block { area } else { node };
-    for i in 1..7 {
+    for (i, &cost) in shared.iter().enumerate().take(7).skip(1) {
         plan.cost[i] = plan.cost[i - 1];
-        if shared[i] < plan.cost[i] {
-            plan.cost[i] = shared[i];
+        if cost < plan.cost[i] {
+            plan.cost[i] = cost;
         } else {
             plan.left[i] = 0;
         }
