@@ -123,6 +123,11 @@ impl PathTracer {
                 places.push((position, triangle.normal));
             }
         }
+        self.at(&places, batches, side, seed)
+    }
+
+    /// Irradiance at places with their normals.
+    pub fn at(&self, places: &[(DVec3, DVec3)], batches: usize, side: usize, seed: u64) -> Vec<Irradiance> {
         let irradiance = |(index, &(position, normal)): (usize, &(DVec3, DVec3))| {
             let mut random = Random::new(seed ^ ((index as u64 + 1) << 20));
             let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
