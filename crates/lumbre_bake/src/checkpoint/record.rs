@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::texels::gather::{Gathered, SCRAMBLES};
+use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
 use crate::transport::direct::{Direct, Seen};
 use crate::transport::form_factors::Cast;
 
@@ -85,6 +85,7 @@ fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, seen: Seen 
 fields!(Seen { partly: bool, signature: u32 });
 fields!(Gathered {
     sums: [Vec3; SCRAMBLES],
+    weights: [Weights; SCRAMBLES],
     patch_errors: f32,
     checks: u32,
     differences: Vec3,
@@ -93,6 +94,7 @@ fields!(Gathered {
     samples: u32,
     rays: u64,
 });
+fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
 fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: u32 });
 
 impl Record for bool {

@@ -74,6 +74,9 @@ struct Met {
     distance: f32,
 }
 
+/// No light and no weight: what the guide named is not to be seen.
+const NOTHING: (Vec3, f32) = (Vec3::ZERO, 0.0);
+
 /// What a ray meets: a surface that reflects, or else what arrives all the same, times π as all light is here: the sky's, or none.
 type Meeting<T> = Result<T, Vec3>;
 
@@ -83,11 +86,35 @@ fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
     (direction.dot(receiver.normal).max(0.0) + below.dot(receiver.normal).max(0.0)) * FRAC_1_PI
 }
 
+/// The weights of a scramble's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
+/// gathered (regression; Owen and Zhou, "Safe and Effective Importance Sampling", 2000). Under light that is the same all around nothing
+/// else differs.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Weights {
+    pub sum: f32,
+    pub squares: f32,
+    /// Of each weight with the light that it brought.
+    pub products: Vec3,
+    /// And of that light, mean of the channels, with itself.
+    pub light_squares: f32,
+}
+
+impl Weights {
+    fn add(&mut self, weight: f32, light: Vec3) {
+        self.sum += weight;
+        self.squares += weight * weight;
+        self.products += weight * light;
+        self.light_squares += (light.element_sum() / 3.0).powi(2);
+    }
+}
+
 /// What a texel has gathered: irradiance by bounces.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Gathered {
     /// Sum of the samples of each scramble.
     pub sums: [Vec3; SCRAMBLES],
+    /// What tells how far their weights alone made them so.
+    pub weights: [Weights; SCRAMBLES],
     /// Sum over all samples of what the patches' errors add.
     pub patch_errors: f32,
     /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
@@ -102,10 +129,40 @@ pub(crate) struct Gathered {
     pub rays: u64,
 }
 
+/// Variance of weights below which they are all the same.
+const LEAST_SPREAD: f32 = 1e-4;
+/// Share of the light's variance that goes with the weights where they are taken out.
+const EXPLAINED: f32 = 0.6;
+
 impl Gathered {
     /// The estimate of each scramble.
     pub fn estimates(&self) -> [Vec3; SCRAMBLES] {
-        self.sums.map(|sum| if self.samples > 0 { sum / self.samples as f32 } else { Vec3::ZERO })
+        if self.samples == 0 {
+            return [Vec3::ZERO; SCRAMBLES];
+        }
+        let count = self.samples as f32;
+        std::array::from_fn(|own| {
+            // How light goes with weight is taken from the other scrambles: so the mean stays what it is.
+            let (mut light, mut weights) = (Vec3::ZERO, Weights::default());
+            for other in (0..SCRAMBLES).filter(|&other| other != own) {
+                light += self.sums[other];
+                weights.sum += self.weights[other].sum;
+                weights.squares += self.weights[other].squares;
+                weights.products += self.weights[other].products;
+                weights.light_squares += self.weights[other].light_squares;
+            }
+            let all = count * (SCRAMBLES - 1) as f32;
+            let spread = weights.squares - weights.sum * weights.sum / all;
+            let together = weights.products - light * (weights.sum / all);
+            let grey = |light: Vec3| light.element_sum() / 3.0;
+            let light_spread = weights.light_squares - grey(light).powi(2) / all;
+            // From few samples the slope is noise itself: it has to explain most of what differs.
+            let explained = grey(together).powi(2) > EXPLAINED * spread * light_spread;
+            let slope = together / spread;
+            let known = spread > LEAST_SPREAD * all && explained && slope.is_finite();
+            let slope = if known { slope } else { Vec3::ZERO };
+            self.sums[own] / count - slope * (self.weights[own].sum / count - 1.0)
+        })
     }
 
     /// Mean of 1 / distance to what light comes from: the irradiance changes over lengths of its inverse (Ward, Rubinstein and Clear,
@@ -133,8 +190,9 @@ impl Outgoing<'_> {
                 let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
                 let met = match self.sample(&receiver, region, u, v) {
                     Ok(met) => met,
-                    Err(light) => {
+                    Err((light, weight)) => {
                         *sum += light;
+                        gathered.weights[scramble].add(weight, light);
                         continue;
                     }
                 };
@@ -143,8 +201,10 @@ impl Outgoing<'_> {
                     (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
                 let checked = turn.is_multiple_of(CHECKED);
                 gathered.inverse_distances += met.1 / met.0.distance.max(f32::MIN_POSITIVE);
+                let weight = met.1;
                 let found = self.read(met, sequence, sample, checked);
                 *sum += found.light;
+                gathered.weights[scramble].add(weight, found.light);
                 gathered.rays += u64::from(found.rays);
                 gathered.patch_errors += found.error;
                 gathered.checks += u32::from(found.checked);
@@ -155,22 +215,31 @@ impl Outgoing<'_> {
         gathered.samples = gathered.samples.max(samples);
     }
 
-    /// A point that a receiver's light by bounces comes from, with its weight: some of the samples, if the guide
+    /// A point that a receiver's light by bounces comes from, with its weight, or else light that needs no point, with its weight: some of the samples, if the guide
     /// knows the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
     /// (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
-    fn sample(&self, receiver: &Receiver, region: Option<u32>, u: f32, v: f32) -> Meeting<(Met, f32)> {
+    fn sample(
+        &self,
+        receiver: &Receiver,
+        region: Option<u32>,
+        u: f32,
+        v: f32,
+    ) -> Result<(Met, f32), (Vec3, f32)> {
         let Some(region) = region.filter(|&region| self.guide.knows(region)) else {
-            return self.meet_about(receiver, u, v).map(|met| (met, 1.0));
+            return match self.meet_about(receiver, u, v) {
+                Ok(met) => Ok((met, 1.0)),
+                Err(light) => Err((light, 1.0)),
+            };
         };
         let share = self.guide.share(region);
         let (met, other, probability) = if u < share {
-            let (other, u, probability) = self.guide.pick(region, u / share).ok_or(Vec3::ZERO)?;
-            (self.point_of(receiver, other, u, v).ok_or(Vec3::ZERO)?, other, probability)
+            let (other, u, probability) = self.guide.pick(region, u / share).ok_or(NOTHING)?;
+            (self.point_of(receiver, other, u, v).ok_or(NOTHING)?, other, probability)
         } else {
             // The sky is found by these alone.
             let met = self.meet_about(receiver, (u - share) / (1.0 - share), v);
-            let met = met.map_err(|light| light / (1.0 - share))?;
-            let other = self.guide.regions.at(met.triangle, met.side, met.at).ok_or(Vec3::ZERO)?;
+            let met = met.map_err(|light| (light / (1.0 - share), 1.0 / (1.0 - share)))?;
+            let other = self.guide.regions.at(met.triangle, met.side, met.at).ok_or(NOTHING)?;
             (met, other, self.guide.probability(region, other))
         };
         // Densities over the surfaces' area.
@@ -179,7 +248,7 @@ impl Outgoing<'_> {
         let cosine = -met.direction.dot(normal);
         let by_cosine = kernel(receiver, met.direction) * cosine / (met.distance * met.distance);
         let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
-        if cosine > 0.0 && weight.is_finite() { Ok((met, weight)) } else { Err(Vec3::ZERO) }
+        if cosine > 0.0 && weight.is_finite() { Ok((met, weight)) } else { Err(NOTHING) }
     }
 
     /// What a ray about a receiver's normal meets.
@@ -221,14 +290,14 @@ impl Outgoing<'_> {
         let (mut light, mut last) = (weight * met.direct, met);
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
-            if last.distance >= self.near {
+            if last.distance >= self.near || weight == Vec3::ZERO {
                 break;
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
-            let (met, chance) = match self.bounce(&last, u, v) {
+            let (met, chance) = match self.bounce(&last, None, u, v) {
                 Ok(met) => met,
-                Err(arriving) => {
+                Err((arriving, _)) => {
                     reading.light = light + weight * arriving;
                     return reading;
                 }
@@ -242,8 +311,9 @@ impl Outgoing<'_> {
         if checked {
             let [u, v, ..] = sequence.point(sample, 1);
             reading.rays += 1;
-            let real = self.bounce(&last, u, v).map_or_else(
-                |light| light,
+            let region = self.guide.regions.at(last.triangle, last.side, last.at);
+            let real = self.bounce(&last, region, u, v).map_or_else(
+                |(light, _)| light,
                 |(met, chance)| {
                     chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
                 },
@@ -265,18 +335,17 @@ impl Outgoing<'_> {
         let patch = self.patches.at(triangle, side, at).ok_or(Vec3::ZERO)?;
         let reflectance = self.reflectance(triangle, side, at, patch);
         let direct = self.direct_at(triangle, side, at, patch);
-        let met = Met { triangle, side, at, patch, reflectance, direct, direction, distance };
-        if reflectance == Vec3::ZERO { Err(Vec3::ZERO) } else { Ok(met) }
+        Ok(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
     }
 
-    /// What a surface's own light by bounces comes from: one sample, with its weight.
-    fn bounce(&self, from: &Met, u: f32, v: f32) -> Meeting<(Met, f32)> {
+    /// What a surface's own light by bounces comes from: one sample, with its weight, placed by the guide for a region or by the cosine.
+    fn bounce(&self, from: &Met, region: Option<u32>, u: f32, v: f32) -> Result<(Met, f32), (Vec3, f32)> {
         let surface = &self.scene.triangles[from.triangle as usize];
         let position = surface.position(from.at.0, from.at.1);
         let origin = self.scene.off_surface(from.triangle, from.side, position);
         let normal = surface.side_normal(from.side);
         let receiver = Receiver { position, origin, geometric_normal: normal, normal };
-        self.sample(&receiver, self.guide.regions.at(from.triangle, from.side, from.at), u, v)
+        self.sample(&receiver, region, u, v)
     }
 
     /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.

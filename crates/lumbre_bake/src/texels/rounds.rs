@@ -81,6 +81,18 @@ pub(crate) fn gather(
         let helped: f64 = open_variances(texels, &by_rays).sum();
         let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
         if std::env::var_os("LUMBRE_DEBUG").is_some() {
+            let weights: f64 = gathered.iter().flat_map(|g| g.weights).map(|w| f64::from(w.sum)).sum();
+            let counts: f64 = gathered.iter().map(|g| f64::from(g.samples) * 4.0).sum();
+            let meanraw: f64 =
+                gathered.iter().flat_map(|g| g.sums).map(|w| f64::from(w.element_sum()) / 3.0).sum::<f64>()
+                    / counts;
+            let meanest: f64 = raw.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
+            let meansm: f64 = estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
+            let corr: f64 = patch_bias.iter().map(|p| channel_mean(p.correction)).sum::<f64>() / open;
+            eprintln!(
+                "mean weight {} raw {meanraw} est {meanest} smoothed {meansm} correction {corr}",
+                weights / counts
+            );
             let share = |values: &mut dyn Iterator<Item = f32>| {
                 (values.map(f64::from).sum::<f64>() / open).sqrt() / total * 100.0
             };
