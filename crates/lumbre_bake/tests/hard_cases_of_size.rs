@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
@@ -14,8 +14,7 @@ use lumbre_scene::{Mesh, StaticObject, Transform};
 mod common;
 
 fn run(world: &mut World, side: u32) -> BakeReport {
-    let options =
-        BakeOptions { density: Density::MapSize(side), quality: Quality::Draft, ..BakeOptions::default() };
+    let options = BakeOptions { density: Density::MapSize(side), ..BakeOptions::default() };
     bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
 }
 

@@ -64,7 +64,7 @@ pub(crate) fn direct_light(
 /// Of the squared error asked for, what direct light may have for itself, over all texels; and a single one of those that a penumbra
 /// crosses, which are few.
 const OWN_SHARE: f64 = 0.2;
-const MOST_OF_ONE: f64 = 9.0;
+const MOST_OF_ONE: f64 = 4.0;
 
 /// Shadow rays of a texel when the time is up: their spread still tells the error.
 const LATE: u32 = 4;
