@@ -130,7 +130,7 @@ impl Quality {
                 form_factor_rays: 1_500_000,
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
-                gather: [32, 1024],
+                gather: [16, 1024],
             },
             Self::Reference => Effort {
                 patches: 40_000,

@@ -239,7 +239,7 @@ fn another_reader_accepts_the_files() {
     save(&mut world, &path).unwrap();
     let file = gltf::Gltf::open(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(file.meshes().count(), 2);
-    assert_eq!(file.nodes().filter(|node| node.light().is_some()).count(), 7);
+    assert_eq!(file.nodes().filter(|node| node.light().is_some()).count(), 8);
     assert_eq!(file.materials().count(), 4);
     let used: Vec<&str> = file.extensions_used().collect();
     for name in [

@@ -16,7 +16,8 @@ use rayon::prelude::*;
 
 use super::footprint::Texel;
 use super::gather::{Gathered, SCRAMBLES};
-use super::smooth::{Estimates, Surroundings, mean, variance};
+use super::smooth::{Estimates, mean, variance};
+use super::surroundings::Surroundings;
 use crate::transport::direct::Direct;
 
 /// What the gather leaves of each kind, squared, mean of the channels, per covered texel.
@@ -41,10 +42,10 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimate
     let own: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum() / 3.0).collect();
     let around = |texel: &Texel| {
         let (mut sum, mut count) = (0.0, 0u32);
-        for (_, _, other) in surroundings.every(texel, SPREAD_STEPS, SPREAD_STEP) {
+        surroundings.every(texel, SPREAD_STEPS, SPREAD_STEP).for_each(|(.., other)| {
             sum += own[other];
             count += 1;
-        }
+        });
         sum / count.max(1) as f32
     };
     texels.par_iter().zip(&own).map(|(texel, own)| own.max(around(texel))).collect()
@@ -89,6 +90,8 @@ pub(crate) struct PatchBias {
     pub correction: Vec3,
     /// Square of what is left, mean of the channels.
     pub rest: f32,
+    /// As `rest`, and below zero where chance alone would make more: of a single texel that says nothing, but the mean of many is right.
+    pub expected: f32,
 }
 
 /// Checks put together.
@@ -151,9 +154,9 @@ pub(crate) fn patch_bias(
         .collect();
     let around = |texel: &Texel| {
         let mut checks = Checks::default();
-        for (_, _, other) in surroundings.of(texel, CHECK_RADIUS) {
+        surroundings.of(texel, CHECK_RADIUS).for_each(|(.., other)| {
             checks.add(&gathered[other]);
-        }
+        });
         if checks.count < 2.0 {
             return PatchBias::default();
         }
@@ -161,9 +164,11 @@ pub(crate) fn patch_bias(
         let (beyond, known, by_chance) = checks.known(of_map);
         let correction = of_map + known * beyond;
         let square = |v: DVec3| (v.element_sum() / 3.0).powi(2);
-        let unknown = ((1.0 - known).powi(2) * square(beyond) - by_chance).max(0.0);
+        let unknown = (1.0 - known).powi(2) * square(beyond) - by_chance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
-        PatchBias { correction: correction.as_vec3(), rest: (unknown + later * square(correction)) as f32 }
+        let later = later * square(correction);
+        let (rest, expected) = ((unknown.max(0.0) + later) as f32, (unknown + later) as f32);
+        PatchBias { correction: correction.as_vec3(), rest, expected }
     };
     texels.par_iter().map(around).collect()
 }

@@ -42,7 +42,7 @@ pub(crate) struct Outgoing<'a> {
 }
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
-pub(crate) const CHECKED: u32 = 8;
+pub(crate) const CHECKED: u32 = 4;
 
 /// Most real bounces that one ray makes between surfaces too near for patches.
 const NEAR_BOUNCES: u32 = 6;

@@ -1,6 +1,7 @@
 //! The texels of the lightmaps: which surface they show, the light that arrives there, and what stands in the texels
 //! that show none. Not the transport between patches that the gather reads.
 
+pub(crate) mod allocation;
 pub(crate) mod charts;
 pub(crate) mod chunks;
 pub(crate) mod error_estimate;
@@ -10,7 +11,10 @@ pub(crate) mod gather;
 pub(crate) mod hidden;
 pub(crate) mod late;
 pub(crate) mod lighting;
+pub(crate) mod plane;
 pub(crate) mod rounds;
 pub(crate) mod seams;
 pub(crate) mod smooth;
+pub(crate) mod smoothing_bias;
+pub(crate) mod surroundings;
 pub(crate) mod tile_sequence;

@@ -3,18 +3,26 @@
 
 use glam::Vec3;
 
+use super::allocation::{Allotment, allot};
 use super::chunks::in_chunks_in_time;
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
 use super::late::from_patches;
-use super::smooth::{Estimates, Surroundings, mean, smooth};
+use super::smooth::{Estimates, mean, smooth};
+use super::surroundings::Surroundings;
 use crate::progress::Watch;
 use crate::transport::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport, Ended};
 
 /// Share of the squared error below which the gather's own noise is not worth more rays.
 const WORTH_RAYS: f64 = 0.1;
+/// Of the squared error asked for, what a round aims at.
+const AIM: f64 = 0.95;
+/// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
+const ORDER: f64 = 1.25;
+/// And by how much it lowers the part that rays leave: the first estimates are rough.
+const MOST_OF_A_ROUND: f64 = 8.0;
 /// And a round that leaves more than this of the squared error that it was to lower was the last.
 const STALLED: f64 = 0.95;
 
@@ -30,28 +38,30 @@ pub(crate) fn gather(
 ) -> Result<(Vec<Vec3>, Vec<f32>), BakeError> {
     let [first, most] = options.quality.effort().gather.map(|samples| samples / SCRAMBLES as u32);
     let mut gathered = vec![Gathered::default(); texels.len()];
-    let mut wanted: Vec<u32> =
-        (0..texels.len() as u32).filter(|&i| !texels[i as usize].is_hidden()).collect();
-    let open = wanted.len().max(1) as f64;
+    let open_texels = (0..texels.len() as u32).filter(|&index| !texels[index as usize].is_hidden());
+    let open = open_texels.clone().count().max(1) as f64;
     let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
     let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
     let surroundings = Surroundings::new(outgoing.scene, outgoing.layout, texels, charts);
-    let mut samples = first;
+    let mut wanted: Vec<Allotment> =
+        open_texels.clone().map(|index| Allotment { index, samples: first }).collect();
     let mut helped_before = f64::INFINITY;
+    let mut round = 0;
     let (estimates, variances) = loop {
-        let round = in_chunks_in_time(wanted.len(), watch, |place| {
-            let index = wanted[place] as usize;
-            let mut own = gathered[index];
-            outgoing.gather(&texels[index], &mut own, samples, options.seed);
+        let found = in_chunks_in_time(wanted.len(), watch, |place| {
+            let Allotment { index, samples } = wanted[place];
+            let mut own = gathered[index as usize];
+            outgoing.gather(&texels[index as usize], &mut own, samples, options.seed);
             own
         })?;
-        let in_time = round.len() == wanted.len();
-        for (&index, own) in wanted.iter().zip(round) {
-            gathered[index as usize] = own;
+        let in_time = found.len() == wanted.len();
+        for (allotted, own) in wanted.iter().zip(found) {
+            gathered[allotted.index as usize] = own;
         }
-        if !in_time && samples == first {
+        if !in_time && round == 0 {
             from_patches(outgoing, texels, &mut gathered);
         }
+        round += 1;
         let raw: Vec<Estimates> = gathered.iter().map(Gathered::estimates).collect();
         let (estimates, smoothing_bias) = match options.denoise {
             true => {
@@ -72,7 +82,13 @@ pub(crate) fn gather(
         };
         let variances = variances(direct, Some(&errors));
         let total = mean_direct + estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
-        let sum: f64 = open_variances(texels, &variances).sum();
+        let of_patches = |part: fn(&PatchBias) -> f32| -> f64 {
+            let open = texels.iter().zip(&patch_bias).filter(|(texel, _)| !texel.is_hidden());
+            open.map(|(_, bias)| f64::from(part(bias))).sum()
+        };
+        // What chance leaves in single texels falls out of their mean.
+        let by_chance = of_patches(|bias| bias.rest) - of_patches(|bias| bias.expected).max(0.0);
+        let sum: f64 = open_variances(texels, &variances).sum::<f64>() - by_chance;
         report.estimated_error = if total > 0.0 { (sum / open).sqrt() / total } else { 0.0 };
         report.error_reached = report.estimated_error <= options.error;
         let late = !in_time || watch.clock().late();
@@ -80,76 +96,15 @@ pub(crate) fn gather(
         let by_rays = errors.by_rays();
         let helped: f64 = open_variances(texels, &by_rays).sum();
         let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
-        if std::env::var_os("LUMBRE_DEBUG").is_some() {
-            let weights: f64 = gathered.iter().flat_map(|g| g.weights).map(|w| f64::from(w.sum)).sum();
-            let counts: f64 = gathered.iter().map(|g| f64::from(g.samples) * 4.0).sum();
-            let meanraw: f64 =
-                gathered.iter().flat_map(|g| g.sums).map(|w| f64::from(w.element_sum()) / 3.0).sum::<f64>()
-                    / counts;
-            let meanest: f64 = raw.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
-            let meansm: f64 = estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
-            let corr: f64 = patch_bias.iter().map(|p| channel_mean(p.correction)).sum::<f64>() / open;
-            eprintln!(
-                "mean weight {} raw {meanraw} est {meanest} smoothed {meansm} correction {corr}",
-                weights / counts
-            );
-            let share = |values: &mut dyn Iterator<Item = f32>| {
-                (values.map(f64::from).sum::<f64>() / open).sqrt() / total * 100.0
-            };
-            eprintln!(
-                "samples {samples} wanted {} est {:.3}: direct {:.3} noise {:.3} smoothing {:.3} factors {:.3} patches {:.3}",
-                wanted.len(),
-                report.estimated_error * 100.0,
-                share(&mut direct.iter().map(|d| d.variance)),
-                share(&mut spread.iter().copied()),
-                share(&mut smoothing_bias.iter().copied()),
-                share(&mut gathered.iter().map(|g| g.patch_error().powi(2))),
-                share(&mut patch_bias.iter().map(|p| p.rest))
-            );
-        }
-        if std::env::var_os("LUMBRE_DEBUG").is_some_and(|v| v == "2") {
-            let mut order: Vec<usize> = (0..texels.len()).filter(|&i| !texels[i].is_hidden()).collect();
-            order.sort_by(|&a, &b| variances[b].total_cmp(&variances[a]));
-            let mut cumulative = 0.0;
-            for (rank, &i) in order.iter().enumerate() {
-                cumulative += f64::from(variances[i]);
-                if rank < 40 || rank % 2000 == 0 {
-                    let t = &texels[i];
-                    let f = match &t.footprint {
-                        super::footprint::Footprint::Points(p) => p.len(),
-                        _ => 99,
-                    };
-                    eprintln!(
-                        "{rank} share {:.3} obj {} at {} {} points {f}: sd {:.3} value {:.3} direct {:.4} noise {:.4} raw {:.4} smoothing {:.4} factors {:.4} patches {:.4} samples {}",
-                        cumulative / sum,
-                        t.object,
-                        t.x,
-                        t.y,
-                        f64::from(variances[i]).sqrt() / total,
-                        (f64::from(direct[i].baked.element_sum())
-                            + f64::from(mean(&estimates[i]).element_sum()))
-                            / 3.0
-                            / total,
-                        f64::from(direct[i].variance).sqrt() / total,
-                        f64::from(super::smooth::variance(&estimates[i]).element_sum() / 3.0).sqrt() / total,
-                        f64::from(super::smooth::variance(&raw[i]).element_sum() / 3.0).sqrt() / total,
-                        f64::from(smoothing_bias[i]).sqrt() / total,
-                        f64::from(gathered[i].patch_error()) / total,
-                        f64::from(patch_bias[i].rest).sqrt() / total,
-                        gathered[i].samples
-                    );
-                }
-            }
-        }
         helped_before = helped;
-        report.ended = Ended::after(report.error_reached, late, samples >= most);
-        if report.error_reached || samples >= most || late || helpless {
-            break (corrected(&estimates, &patch_bias), variances);
-        }
-        samples = (samples * 2).min(most);
-        let limit = (0.7 * options.error * total).powi(2);
-        wanted.retain(|&index| f64::from(by_rays[index as usize]) > limit);
-        if wanted.is_empty() {
+        // The part that rays may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
+        let rest = sum - helped;
+        let asked = open * (options.error * total).powi(2);
+        let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
+        let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
+        wanted = allot(open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
+        report.ended = Ended::after(report.error_reached, late, wanted.is_empty());
+        if report.error_reached || late || helpless || wanted.is_empty() {
             break (corrected(&estimates, &patch_bias), variances);
         }
     };
