@@ -57,13 +57,15 @@ pub(crate) struct Watch<'a> {
     callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
     clock: Clock,
     stage: Option<(&'static str, Instant)>,
+    /// From where to where in the running stage the work that reports now leads.
+    part: (f32, f32),
     pub tape: Tape,
 }
 
 impl<'a> Watch<'a> {
     pub fn new(callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>, limit: Option<Duration>) -> Self {
         let clock = Clock { begun: Instant::now(), before: 0.0, limit };
-        Self { callback, clock, stage: None, tape: Tape::default() }
+        Self { callback, clock, stage: None, part: (0.0, 1.0), tape: Tape::default() }
     }
 
     /// The time as it is, to be asked from other threads.
@@ -80,7 +82,14 @@ impl<'a> Watch<'a> {
     pub fn stage(&mut self, stage: &'static str, report: &mut BakeReport) -> Result<(), BakeError> {
         self.end_stage(report);
         self.stage = Some((stage, Instant::now()));
+        self.part = (0.0, 1.0);
         self.advance(0.0)
+    }
+
+    /// What comes now is one of several passes of the running stage: it takes so much, in [0, 1], of what is left of the stage.
+    pub fn pass(&mut self, share: f32) {
+        let begun = if self.part.1 < 1.0 { self.part.1 } else { 0.0 };
+        self.part = (begun, begun + (1.0 - begun) * share);
     }
 
     /// Notes the time of the running stage.
@@ -90,14 +99,16 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Reports a fraction of the running stage.
+    /// Reports a fraction of the running stage, or of its pass.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`] if the caller wants no more.
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
         let (index, stage) = self.running();
         let before: f32 = STAGES[..index].iter().map(|(_, share)| share).sum();
-        let fraction = before + STAGES[index].1 * stage_fraction.clamp(0.0, 1.0);
+        let (from, to) = self.part;
+        let stage_fraction = from + (to - from) * stage_fraction.clamp(0.0, 1.0);
+        let fraction = before + STAGES[index].1 * stage_fraction;
         match (self.callback)(Progress { stage, stage_fraction, fraction: fraction.min(1.0) }) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => {

@@ -118,7 +118,8 @@ fn the_floor_of_a_trench() {
         black.double_sided = true;
         world.spawn((wall, black, StaticObject));
     }
-    let report = run(&mut world, &options(64, Quality::Final));
+    // Nine points are few: their RMSE alone may be a third above that of all. Half a per cent is asked for one.
+    let report = run(&mut world, &BakeOptions { error: 0.005, ..options(64, Quality::Final) });
     let points: Vec<_> = (0..9)
         .map(|i| {
             let x = 0.2 * f64::from(i) - 0.8;

@@ -34,10 +34,12 @@ pub(crate) fn direct_light(
     };
     // A complete map first, whatever time it takes.
     let clock = watch.clock();
+    watch.pass(PASS);
     let mut direct = in_chunks(texels.len(), watch, |index| {
         light(&texels[index], if clock.late() { few.min(LATE) } else { few })
     })?;
     let again = in_doubt(layout, texels, &direct);
+    watch.pass(PASS);
     let better = in_chunks_in_time(again.len(), watch, |place| light(&texels[again[place] as usize], many))?;
     replace(&mut direct, &again, better);
     // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
@@ -52,6 +54,7 @@ pub(crate) fn direct_light(
             break;
         }
         let wanted = allot(again.iter().copied(), &variances, &samples, most, ORDER, goal);
+        watch.pass(PASS);
         let better = in_chunks_in_time(wanted.len(), watch, |place| {
             light(&texels[wanted[place].index as usize], wanted[place].samples)
         })?;
@@ -71,6 +74,9 @@ pub(crate) fn direct_light(
 const OWN_SHARE: f64 = 0.25;
 /// Order of the variance's fall with the samples at straight edges of shadows, as measured.
 const ORDER: f64 = 1.5;
+
+/// A pass's usual share of the time that this one and those after it take.
+const PASS: f32 = 0.5;
 
 /// Shadow rays of a texel when the time is up: their spread still tells the error.
 const LATE: u32 = 4;

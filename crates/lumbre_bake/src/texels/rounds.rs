@@ -17,6 +17,8 @@ use crate::{BakeError, BakeOptions, BakeReport, Ended};
 
 /// Share of the squared error below which the gather's own noise is not worth more rays.
 const WORTH_RAYS: f64 = 0.1;
+/// A round's usual share of the time that this one and those after it take.
+const PASS: f32 = 0.7;
 /// Of the squared error asked for, what a round aims at.
 const AIM: f64 = 0.95;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
@@ -48,6 +50,7 @@ pub(crate) fn gather(
     let mut helped_before = f64::INFINITY;
     let mut round = 0;
     let (estimates, variances) = loop {
+        watch.pass(PASS);
         let found = in_chunks_in_time(wanted.len(), watch, |place| {
             let Allotment { index, samples } = wanted[place];
             let mut own = gathered[index as usize];
