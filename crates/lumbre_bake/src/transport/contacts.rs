@@ -1,5 +1,7 @@
-//! Contact lines: where other surfaces stand on a triangle or pass through it. Light differs from one side of such a line to the other,
-//! however small a patch is. Not the cutting of patches along them: that is `cuts`.
+//! Contact lines: where other surfaces stand on a triangle or pass through it, and the outlines of what lies on it. Light differs from
+//! one side of such a line to the other, however small a patch is. Not the cutting of patches along them: that is `cuts`.
+
+use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -34,10 +36,10 @@ impl PlaneFrame {
     }
 }
 
-/// What hovers above a patch by less than this share of its side stands on it.
-const REACH: f64 = 0.02;
+/// What hovers above a patch by less than this share of its side stands or lies on it.
+const REACH: f64 = 0.1;
 /// The height at which what stands on a triangle is cut, as a share of that: above the rounding of its corners.
-const LEVEL: f64 = 1.0 / 16.0;
+const LEVEL: f64 = 1.0 / 64.0;
 /// Cosine between the normals of surfaces above which one lies on the other instead of standing on it.
 const LYING: f64 = 0.98;
 
@@ -55,15 +57,43 @@ pub(crate) fn contacts(
     let margin = Vec3::splat(reach as f32);
     let (low, high) = (a.min(b).min(c) - margin, a.max(b).max(c) + margin);
     let mut found = Vec::new();
+    let mut outlines: HashMap<[[u32; 3]; 2], Option<[DVec2; 2]>> = HashMap::new();
     tree.near(low, high, |other| {
         let other_triangle = &scene.triangles[other as usize];
-        if other == index || other_triangle.normal.dot(triangle.normal).abs() > LYING as f32 {
+        if other == index {
             return;
         }
         let corners = other_triangle.corners.map(|corner| corner.as_dvec3());
-        found.extend(contact(frame, &corners, reach, triangle.two_sided));
+        let cosine = f64::from(other_triangle.normal.dot(triangle.normal));
+        if cosine.abs() <= LYING {
+            found.extend(contact(frame, &corners, reach, triangle.two_sided));
+        } else if lies_on(frame, &corners, reach, cosine, triangle.two_sided) {
+            for i in 0..3 {
+                let (a, b) = (i, (i + 1) % 3);
+                let mut ends = [other_triangle.corners[a], other_triangle.corners[b]]
+                    .map(|p| p.to_array().map(f32::to_bits));
+                ends.sort_unstable();
+                // An edge that two share is not on the outline.
+                let line = [frame.flat(corners[a]), frame.flat(corners[b])];
+                outlines.entry(ends).and_modify(|line| *line = None).or_insert(Some(line));
+            }
+        }
     });
+    let mut outlines: Vec<_> = outlines.into_iter().filter_map(|(ends, line)| Some((ends, line?))).collect();
+    outlines.sort_unstable_by_key(|(ends, _)| *ends);
+    found.extend(outlines.into_iter().map(|(_, line)| line));
     found
+}
+
+/// Whether a triangle about parallel to a plane lies on it, and is no part of the same surface.
+fn lies_on(frame: &PlaneFrame, corners: &[DVec3; 3], reach: f64, cosine: f64, both_sides: bool) -> bool {
+    let mut heights = corners.map(|corner| frame.height(corner));
+    if both_sides && heights.iter().sum::<f64>() < 0.0 {
+        heights = heights.map(|height| -height);
+    }
+    let margin = reach * LEVEL;
+    let coplanar = heights.iter().all(|height| height.abs() <= margin);
+    heights.iter().all(|&height| (-margin..=reach).contains(&height)) && (cosine < 0.0 || !coplanar)
 }
 
 /// Where a triangle is cut at the height of a plane, or just above its lowest point if that is at most `reach` over the plane.
