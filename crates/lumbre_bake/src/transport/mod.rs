@@ -2,6 +2,7 @@
 //! Not the texels that show it.
 
 pub(crate) mod box_tree;
+pub(crate) mod components;
 pub(crate) mod contacts;
 #[cfg(test)]
 mod contour;
