@@ -19,6 +19,7 @@ use crate::texels::footprint::{Texel, footprints};
 use crate::texels::gather::{Outgoing, SCRAMBLES};
 use crate::texels::hidden::remove_hidden;
 use crate::texels::seams::{Maps, close_seams};
+use crate::texels::straddling::straddling;
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::{Direct, Sources};
 use crate::transport::exchange::Exchange;
@@ -131,7 +132,10 @@ fn run(
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
             let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
-            let total = fill(&layout, &texels, &charts, &total, 1);
+            let mut total = fill(&layout, &texels, &charts, &total, 1);
+            for index in straddling(&scene, &layout, &texels) {
+                total[index] = Vec3::NAN;
+            }
             let outgoing = Outgoing {
                 scene: &scene,
                 layout: &layout,

@@ -288,8 +288,10 @@ fn a_floor_that_runs_through_under_the_wall_leaks_a_texel_at_most() {
         assert!(direct[5..].iter().all(|&leak| leak == 0.0) && walls == 0.0, "{direct:?} {walls}");
         let (all, walls) = under_a_wall(thickness, 0.6, &steps);
         println!("{thickness}, with bounces: {all:.4?}; walls {walls:.4}");
-        // Texels and patches that straddle the wall are lit on one side of it and shine on both; a strip half a texel wide at half
-        // the light beside it, seen from three texels and more, and its bounces.
-        assert!(all[5..].iter().all(|&leak| leak < 0.02) && all[7] < 0.002, "{all:?} {walls}");
+        // Patches are cut along the wall, and a texel that straddles it hands nothing on: what is left is the value that such a texel
+        // shows, read by filtering, and by the texels beside it where they are smoothed together.
+        assert!(all[5..].iter().all(|&leak| leak < 0.002) && all[7] < 1e-4, "{all:?} {walls}");
+        // Only in the corner itself, in the texel where wall and floor meet.
+        assert!(walls < 0.04, "{walls}");
     }
 }

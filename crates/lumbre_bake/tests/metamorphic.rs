@@ -25,17 +25,17 @@ fn draft() -> BakeOptions {
 }
 
 #[test]
-fn rooms_and_hall_have_the_same_bits_on_1_2_and_8_threads() {
-    for scene in [scenes::rooms as fn(u64, f64) -> World, scenes::hall] {
-        let baked = |threads: usize| {
-            let mut world = scene(1, 1.0);
+fn rooms_and_hall_have_the_same_bits_at_every_scale_of_two_and_on_1_2_and_8_threads() {
+    for (name, scene) in [("rooms", scenes::rooms as fn(u64, f64) -> World), ("hall", scenes::hall)] {
+        let baked = |scale: f64, threads: usize| {
+            let mut world = scene(1, scale);
             run(&mut world, &BakeOptions { threads: Some(threads), ..draft() });
             common::bits(&mut world)
         };
-        let plain = baked(1);
+        let plain = baked(1.0, 1);
         assert!(plain.iter().any(|&bits| bits != 0));
-        for threads in [2, 8] {
-            assert!(plain == baked(threads), "{threads} threads");
+        for (scale, threads) in [(1.0, 2), (1.0, 8), (1.0 / 128.0, 2), (1024.0, 8)] {
+            assert!(plain == baked(scale, threads), "{name}, scale {scale}, {threads} threads");
         }
     }
 }

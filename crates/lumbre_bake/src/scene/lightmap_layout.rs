@@ -182,6 +182,12 @@ fn lay_out_object(
             Err(error) => warnings.push(format!("{}: {error}; it was unwrapped anew", object.name)),
         }
     }
+    if placed.uv_area == Some(0.0) && placed.area > 0.0 {
+        warnings.push(format!(
+            "{}: its TEXCOORD_1 covers no area, or is not finite; it was unwrapped anew",
+            object.name
+        ));
+    }
     let (object, moved) = free_second(object)?;
     if moved.contains(&true) {
         warnings.push(format!(

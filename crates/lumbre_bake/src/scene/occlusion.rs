@@ -80,6 +80,14 @@ impl BakeScene {
         offset_ray_origin(position, triangle.side_normal(side), triangle.extent)
     }
 
+    /// A point just off a side of a triangle, as the end of a segment from `from`: what rounds there is as large as the coordinates of
+    /// both ends, and a small lamp near the origin would shade itself.
+    pub fn off_surface_seen_from(&self, triangle: u32, side: Side, position: Vec3, from: Vec3) -> Vec3 {
+        let triangle = &self.triangles[triangle as usize];
+        let extent = triangle.extent.max(from.abs().max_element());
+        offset_ray_origin(position, triangle.side_normal(side), extent)
+    }
+
     fn closest(&self, ray: &Ray, accept: impl Fn(u32) -> bool) -> Option<Hit> {
         if self.masked {
             self.bvh.closest_hit_filtered(ray, |index, u, v| accept(index) && self.is_solid(index, u, v))

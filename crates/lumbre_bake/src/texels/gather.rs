@@ -274,7 +274,8 @@ impl Outgoing<'_> {
         let direction = apart / distance;
         let faces =
             direction.dot(surface.side_normal(side)) < 0.0 && direction.dot(receiver.geometric_normal) > 0.0;
-        if !faces || self.scene.blocked(receiver.origin, self.scene.off_surface(triangle, side, position)) {
+        let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
+        if !faces || self.scene.blocked(receiver.origin, end) {
             return None;
         }
         let patch = self.patches.at(triangle, side, at)?;

@@ -16,5 +16,6 @@ pub(crate) mod rounds;
 pub(crate) mod seams;
 pub(crate) mod smooth;
 pub(crate) mod smoothing_bias;
+pub(crate) mod straddling;
 pub(crate) mod surroundings;
 pub(crate) mod tile_sequence;

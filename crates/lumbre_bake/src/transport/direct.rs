@@ -204,13 +204,17 @@ impl<'a> Sources<'a> {
         for (place, (&group, weight)) in groups.iter().zip(weights).enumerate() {
             let own = allotted(samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
-            let share = self.seen_share(group, &anchor, sequence, (own, set), point, direct);
-            if share.mean == Vec3::ZERO {
+            let mut share = self.seen_share(group, &anchor, sequence, (own, set), point, direct);
+            if share.mean == Vec3::ZERO && share.asked > 0 {
                 continue;
             }
             let (light, uneven) = Unoccluded::mean(|x, y| {
                 point(x, y).map(|receiver| self.tree.unoccluded(&self.emitters, group, &receiver))
             });
+            if share.asked == 0 && light != Vec3::ZERO {
+                // Of few samples all may be of sides that look away.
+                share = self.seen_share(group, &anchor, sequence, (AGAIN * own, set), point, direct);
+            }
             irradiance += light * share.mean;
             direct.variance += grey(light).powi(2) * share.variance + uneven * grey(share.mean).powi(2);
             direct.variance += (self.tree.error() * grey(light * share.mean)).powi(2);
@@ -254,7 +258,8 @@ impl<'a> Sources<'a> {
             }
             all += light;
             group_all[at] += light.element_sum() / 3.0;
-            let target = self.scene.off_surface(emitter.triangle, emitter.side, target);
+            let target =
+                self.scene.off_surface_seen_from(emitter.triangle, emitter.side, target, receiver.origin);
             if self.scene.blocked(receiver.origin, target) {
                 hidden += 1;
             } else {
@@ -271,7 +276,7 @@ impl<'a> Sources<'a> {
             true => group_seen[at] / group_all[at],
             false => mean.element_sum() / 3.0,
         });
-        Share { mean, variance: variance_of_mean(shares) }
+        Share { mean, variance: variance_of_mean(shares), asked: visible + hidden }
     }
 }
 
@@ -279,7 +284,12 @@ impl<'a> Sources<'a> {
 struct Share {
     mean: Vec3,
     variance: f32,
+    /// Samples that could bring light.
+    asked: u32,
 }
+
+/// So many times the samples where none of them could bring light, though there is some.
+const AGAIN: u32 = 16;
 
 /// The dimension sets of groups begin here: before it are the punctual lights'.
 const FIRST_SET: u32 = 34;

@@ -1,8 +1,12 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
+pub(crate) mod box_tree;
+pub(crate) mod components;
+pub(crate) mod contacts;
 #[cfg(test)]
 mod contour;
+pub(crate) mod cuts;
 pub(crate) mod direct;
 pub(crate) mod emitter_tree;
 pub(crate) mod emitters;

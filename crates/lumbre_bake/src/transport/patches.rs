@@ -1,7 +1,12 @@
-//! Patches: the pieces of surface over which radiosity is constant. Each triangle is cut into n² equal ones, so that a
-//! ray's hit finds its patch by arithmetic. Not their light: that is `form_factors` and `solver`.
+//! Patches: the pieces of surface over which radiosity is constant. Each triangle is cut into n² equal cells, so that a
+//! ray's hit finds its own by arithmetic; cells that other surfaces stand on or pass through are cut further along those.
+//! Not their light: that is `form_factors` and `solver`.
 
-use glam::Vec3;
+use glam::{DMat2, DVec2, Vec3};
+
+use super::box_tree::BoxTree;
+use super::contacts::{PlaneFrame, contacts};
+use super::cuts::{Corners, CutCell, Cuts};
 
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, SceneTriangle};
@@ -11,8 +16,8 @@ use crate::scene::{BakeScene, SceneTriangle};
 pub(crate) struct Patch {
     pub triangle: u32,
     pub side: Side,
-    /// Which piece of its triangle.
-    pub cell: u32,
+    /// Which piece of its triangle: a cell, or with the highest bit a piece of one.
+    cell: u32,
     /// Square canonical units.
     pub area: f32,
     /// Mean diffuse reflectance.
@@ -26,13 +31,23 @@ struct Cut {
     divisions: u32,
     front: u32,
     back: Option<u32>,
+    /// Where the trees of its cells are listed; [`UNCUT`] if none is cut.
+    roots: u32,
 }
+
+/// Of a cell, or of all of a triangle's: no line goes through.
+const UNCUT: u32 = u32::MAX;
+/// Marks a piece of a cell.
+const PIECE: u32 = 1 << 31;
 
 /// All patches, and the way from a point to its patch.
 #[derive(Clone, Debug)]
 pub(crate) struct Patches {
     pub list: Vec<Patch>,
     cuts: Vec<Cut>,
+    /// Of each cell of each triangle that has some cut: its tree, or [`UNCUT`].
+    roots: Vec<u32>,
+    lines: Cuts,
 }
 
 /// Points of a patch at which textures are averaged.
@@ -51,37 +66,63 @@ impl Patches {
 
     /// How many [`Patches::new`] would make.
     pub fn count(scene: &BakeScene, side: f32) -> u64 {
-        let met = scene.triangles.iter().filter(|triangle| !triangle.superseded);
-        met.map(|t| u64::from(divisions(t, side)).pow(2) * (1 + u64::from(t.two_sided))).sum()
+        let (tree, mut lines) = (BoxTree::new(&scene.triangles), Cuts::default());
+        let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.superseded);
+        met.map(|(index, triangle)| {
+            let divisions = divisions(triangle, side);
+            let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
+            let more: u64 = cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum();
+            (u64::from(divisions).pow(2) + more) * (1 + u64::from(triangle.two_sided))
+        })
+        .sum()
     }
 
     /// Cuts every triangle into patches of about `side` canonical units.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
+        let (tree, mut lines) = (BoxTree::new(&scene.triangles), Cuts::default());
         let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
+        let mut roots = Vec::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
             if triangle.superseded {
-                cuts.push(Cut { divisions: 0, front: 0, back: None });
+                cuts.push(Cut { divisions: 0, front: 0, back: None, roots: UNCUT });
                 continue;
             }
             let divisions = divisions(triangle, side);
-            let mut add = |face: Side| {
+            let cells = divisions * divisions;
+            let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
+            let own_roots = if cut.is_empty() { UNCUT } else { roots.len() as u32 };
+            if !cut.is_empty() {
+                roots.resize(roots.len() + cells as usize, UNCUT);
+                for (cell, cut) in &cut {
+                    roots[(own_roots + cell) as usize] = cut.root;
+                }
+            }
+            let mut add = |side: Side| {
                 let first = list.len() as u32;
-                for cell in 0..divisions * divisions {
-                    list.push(Patch {
-                        triangle: index as u32,
-                        side: face,
-                        cell,
-                        area: triangle.area / (divisions * divisions) as f32,
-                        reflectance: mean_reflectance(scene, index, face, divisions, cell),
-                    });
+                let patch = |cell: u32| {
+                    let corners = corners_of(&lines, divisions, cell);
+                    let area = match cell & PIECE {
+                        0 => triangle.area / cells as f32,
+                        _ => triangle.area * share(&corners),
+                    };
+                    let reflectance = mean_reflectance(scene, index, side, &corners);
+                    Patch { triangle: index as u32, side, cell, area, reflectance }
+                };
+                list.extend((0..cells).map(patch));
+                for (cell, cut) in &cut {
+                    let mut pieces = (cut.first..cut.first + cut.count).map(|piece| patch(PIECE | piece));
+                    if let Some(own) = pieces.next() {
+                        list[(first + cell) as usize] = own;
+                    }
+                    list.extend(pieces);
                 }
                 first
             };
             let front = add(Side::Front);
             let back = triangle.two_sided.then(|| add(Side::Back));
-            cuts.push(Cut { divisions, front, back });
+            cuts.push(Cut { divisions, front, back, roots: own_roots });
         }
-        Self { list, cuts }
+        Self { list, cuts, roots, lines }
     }
 
     /// The patch at a point of a triangle's side; none where light does not arrive.
@@ -94,12 +135,23 @@ impl Patches {
             Side::Front => cut.front,
             Side::Back => cut.back?,
         };
-        Some(first + cell_at(cut.divisions, u, v))
+        let cell = cell_at(cut.divisions, u, v);
+        if cut.roots != UNCUT {
+            let root = self.roots[(cut.roots + cell) as usize];
+            if root != UNCUT {
+                return Some(first + self.lines.find(root, u, v));
+            }
+        }
+        Some(first + cell)
     }
 
     /// Barycentric weights (second, third vertex) of a point of a patch given by weights of its own.
     pub fn point(&self, patch: &Patch, (u, v): (f32, f32)) -> (f32, f32) {
-        point_of_cell(self.cuts[patch.triangle as usize].divisions.max(1), patch.cell, u, v)
+        if patch.cell & PIECE == 0 {
+            let divisions = self.cuts[patch.triangle as usize].divisions.max(1);
+            return point_of_cell(divisions, patch.cell, u, v);
+        }
+        point_between(&self.lines.pieces[(patch.cell & !PIECE) as usize], u, v)
     }
 }
 
@@ -107,7 +159,7 @@ impl Patches {
     /// The patch's corners, canonical units.
     pub fn corners(&self, scene: &BakeScene, patch: &Patch) -> [Vec3; 3] {
         let triangle = &scene.triangles[patch.triangle as usize];
-        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|at| {
+        CORNERS.map(|at| {
             let (u, v) = self.point(patch, at);
             triangle.position(u, v)
         })
@@ -123,14 +175,107 @@ fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
     by_area.max(longest / (4.0 * side)).ceil().clamp(1.0, 1024.0) as u32
 }
 
-fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, divisions: u32, cell: u32) -> Vec3 {
+/// A cell is cut where it is not much smaller than what `side` asks for.
+const WORTH_CUTTING: f32 = 0.125;
+
+/// Cuts the cells of a triangle along what stands on it; returns which.
+fn cut_cells(
+    scene: &BakeScene,
+    tree: &BoxTree,
+    index: usize,
+    divisions: u32,
+    side: f32,
+    lines: &mut Cuts,
+) -> Vec<(u32, CutCell)> {
+    let triangle = &scene.triangles[index];
+    let cells = divisions * divisions;
+    if triangle.area < WORTH_CUTTING * 0.5 * side * side * cells as f32 {
+        return Vec::new();
+    }
+    let frame = PlaneFrame::new(triangle);
+    let segments = contacts(scene, tree, index as u32, &frame, side);
+    let [a, b, c] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
+    let weights = DMat2::from_cols(b - a, c - a).inverse();
+    if segments.is_empty() || !weights.is_finite() {
+        return Vec::new();
+    }
+    let mut crossed: Vec<(u32, u32)> = Vec::new();
+    for (number, segment) in segments.iter().enumerate() {
+        cells_along(divisions, segment.map(|p| weights * (p - a)), |cell| {
+            crossed.push((cell, number as u32))
+        });
+    }
+    crossed.sort_unstable();
+    let mut free = cells;
+    crossed
+        .chunk_by(|x, y| x.0 == y.0)
+        .filter_map(|own| {
+            let cell = own[0].0;
+            let corners = CORNERS.map(|(u, v)| {
+                let (u, v) = point_of_cell(divisions, cell, u, v);
+                a + (b - a) * f64::from(u) + (c - a) * f64::from(v)
+            });
+            let segments: Vec<[DVec2; 2]> =
+                own.iter().map(|&(_, number)| segments[number as usize]).collect();
+            let cut = lines.cut(corners, &segments, weights, (cell, free))?;
+            free += cut.count - 1;
+            Some((cell, cut))
+        })
+        .collect()
+}
+
+/// Calls `visit` for the cells that a segment, in barycentric weights, may cross.
+fn cells_along(divisions: u32, [p, q]: [DVec2; 2], mut visit: impl FnMut(u32)) {
+    let n = f64::from(divisions);
+    let (p, q) = if p.x <= q.x { (p * n, q * n) } else { (q * n, p * n) };
+    let row = |x: f64| (x.max(0.0) as u32).min(divisions - 1);
+    for a in row(p.x)..=row(q.x) {
+        let [from, to] = [f64::from(a), f64::from(a + 1)].map(|x| {
+            let along = if q.x > p.x { ((x - p.x) / (q.x - p.x)).clamp(0.0, 1.0) } else { 0.0 };
+            p.y + (q.y - p.y) * along
+        });
+        let (from, to) = if q.x > p.x { (from.min(to), from.max(to)) } else { (p.y.min(q.y), p.y.max(q.y)) };
+        let last = divisions - 1 - a;
+        for b in (from.max(0.0) as u32).min(last)..=(to.max(0.0) as u32).min(last) {
+            let cell = a * (2 * divisions - a) + 2 * b;
+            visit(cell);
+            if b < last {
+                visit(cell + 1);
+            }
+        }
+    }
+}
+
+/// A cell's own corners.
+const CORNERS: Corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+
+/// Of a cell or a piece of one.
+fn corners_of(lines: &Cuts, divisions: u32, cell: u32) -> Corners {
+    if cell & PIECE == 0 {
+        CORNERS.map(|(u, v)| point_of_cell(divisions, cell, u, v))
+    } else {
+        lines.pieces[(cell & !PIECE) as usize]
+    }
+}
+
+/// A piece's share of its triangle.
+fn share(corners: &Corners) -> f32 {
+    let [a, b, c] = *corners;
+    ((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1)).abs()
+}
+
+fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
+    (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
+}
+
+fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> Vec3 {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
     let points = if surface.varies() { &TEXTURE_POINTS[..] } else { &TEXTURE_POINTS[..1] };
     let sum: Vec3 = points
         .iter()
         .map(|&(u, v)| {
-            let (u, v) = point_of_cell(divisions, cell, u, v);
+            let (u, v) = point_between(corners, u, v);
             surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
         })
         .sum();

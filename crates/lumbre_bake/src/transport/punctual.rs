@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use lumbre_optics::{BakeMode, LightKind, evaluate_light};
+use lumbre_optics::{BakeMode, Light, LightKind, evaluate_light};
 
 use super::direct::{Direct, GROUPS, Receiver, Sources, allotted, group_of, variance_of_mean};
 use crate::sampling::{Sequence, cosine_direction, frame};
@@ -210,7 +210,7 @@ impl Sources<'_> {
             let arriving = evaluate_light(light, placed.position, placed.axis, position);
             let attenuation = match light.kind {
                 LightKind::Directional => 1.0,
-                _ => light.attenuation.factor((away - size).max(0.25 * away)),
+                _ => attenuation(light, (away - size).max(0.25 * away)),
             };
             // Raised by what the receiver and the light subtend, and above 0 everywhere.
             let spread = if away > 0.0 { (size + f64::from(light.radius)) / away } else { 0.0 };
@@ -223,6 +223,19 @@ impl Sources<'_> {
     }
 }
 
+/// A light's factor at a distance in metres, without the floor that a frame sets at a centimetre: a model of a few centimetres has the
+/// light of one of metres. At the light itself the floor counts.
+fn attenuation(light: &Light, distance: f64) -> f64 {
+    let law = &light.attenuation;
+    let [constant, linear, quadratic] = law.coefficients().as_dvec3().to_array();
+    let factor = 1.0 / (constant + (linear + quadratic * distance) * distance);
+    if !(factor > 0.0 && factor.is_finite() && law.range > 0.0) {
+        return law.factor(distance);
+    }
+    let window = (1.0 - (distance / f64::from(law.range)).min(1.0).powi(4)).max(0.0);
+    window * if law.clamp { factor.min(1.0) } else { factor }
+}
+
 /// What a point of a receiver gets of a light whose disc is sampled at (u, v) of the unit square; `None` where it gets nothing
 /// whatever lies between.
 ///
@@ -233,13 +246,14 @@ fn part(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver, u: f32, v:
     let light = &placed.light;
     let position = scene.space.world(receiver.position);
     let arriving = evaluate_light(light, placed.position, placed.axis, position);
-    let strength = PI * arriving.attenuation * arriving.spot;
+    let directional = light.kind == LightKind::Directional;
+    let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
+    let weakened = if directional { arriving.attenuation } else { attenuation(light, distance) };
+    let strength = PI * weakened * arriving.spot;
     if strength <= 0.0 {
         return None;
     }
     let axis = arriving.direction;
-    let directional = light.kind == LightKind::Directional;
-    let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
     let sine =
         if directional { (0.5 * f64::from(light.angle)).sin() } else { f64::from(light.radius) / distance };
     let sine = if sine > 0.0 { sine.min(LARGEST_SINE) } else { 0.0 };

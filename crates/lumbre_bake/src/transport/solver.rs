@@ -4,6 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::components::levels;
 use super::form_factors::FormFactors;
 
 /// An iterative method for the radiosity system. They agree; they differ in iterations.
@@ -44,6 +45,12 @@ impl Solver {
         if size == 0.0 || !size.is_finite() {
             return Solution { radiosity: vec![0.0; emission.len()], ..Solution::default() };
         }
+        // Parts that exchange nothing are solved as if equally bright.
+        let (levels, parts) = levels(factors, emission);
+        let leveled: Vec<f64> = emission.iter().zip(&levels).map(|(e, level)| e * level).collect();
+        let (emission, parts) = (&leveled, (parts as f64).sqrt());
+        let size = norm(factors, emission);
+        let tolerance = tolerance / parts;
         let mut solution = match self {
             Self::Jacobi => stationary(factors, reflectance, emission, tolerance, size, jacobi_sweep),
             Self::GaussSeidel => {
@@ -51,9 +58,11 @@ impl Solver {
             }
             Self::ConjugateGradients => conjugate_gradients(factors, reflectance, emission, tolerance, size),
         };
+        // Of the part that is solved worst, at most.
+        solution.residual *= parts;
         // Conjugate gradients may dip below zero by the residual.
-        for value in &mut solution.radiosity {
-            *value = value.max(0.0);
+        for (value, level) in solution.radiosity.iter_mut().zip(&levels) {
+            *value = value.max(0.0) / level;
         }
         solution
     }
@@ -304,6 +313,27 @@ mod tests {
                 assert!((a - b).abs() < 1e-10, "{solver:?}");
             }
             assert_eq!(solver.solve(&cube(), &rho, &[0.0; 6], 1e-6).iterations, 0);
+        }
+    }
+
+    #[test]
+    fn a_part_that_is_a_hundred_million_times_dimmer_is_solved_as_well() {
+        // Two cubes that do not see each other: what each has is what it has alone.
+        let cube = cube();
+        let mut two = cube.clone();
+        two.columns.extend(cube.columns.iter().map(|column| column + 6));
+        two.exchange.extend_from_slice(&cube.exchange);
+        two.areas.extend_from_slice(&cube.areas);
+        two.starts.extend(cube.starts[1..].iter().map(|start| start + cube.columns.len()));
+        let alone = [1.0, 0.0, 0.5, 0.0, 0.0, 0.0];
+        let both: Vec<f64> = alone.iter().map(|e| e * 1e8).chain(alone).collect();
+        for solver in ALL {
+            let expected = solver.solve(&cube, &[0.8; 6], &alone, 1e-12).radiosity;
+            let found = solver.solve(&two, &[0.8; 12], &both, 1e-6).radiosity;
+            for (found, expected) in found[6..].iter().zip(&expected) {
+                // The residual, amplified by 1/(1 - ρ).
+                assert!((found / expected - 1.0).abs() < 2e-5, "{solver:?}: {found} {expected}");
+            }
         }
     }
 }

@@ -1,0 +1,122 @@
+//! Texels that a wall thinner than themselves crosses, with surface in the open on both sides of it: one value for both. They show that
+//! value, but hand nothing on: what bounces is read from the patches there, which are cut along the wall. Not texels that are hidden in
+//! part: those hold the light of the part in the open.
+
+use glam::{DMat2, DVec2};
+use rayon::prelude::*;
+
+use super::footprint::{Footprint, Texel};
+use crate::scene::{BakeScene, LightmapLayout};
+use crate::transport::box_tree::BoxTree;
+use crate::transport::contacts::{PlaneFrame, contacts};
+
+/// Texels of a contact line below which it divides nothing.
+const SHORTEST: f64 = 0.25;
+/// Texels beside a line that do not count as beyond it.
+const MARGIN: f64 = 0.05;
+
+/// Places, in the row of all maps, of the texels that a contact line divides.
+pub(crate) fn straddling(scene: &BakeScene, layout: &LightmapLayout, texels: &[Texel]) -> Vec<usize> {
+    let tree = BoxTree::new(&scene.triangles);
+    let mut lines: Vec<(usize, [DVec2; 2])> = (0..scene.triangles.len())
+        .into_par_iter()
+        .flat_map_iter(|index| divisions(scene, layout, &tree, index))
+        .collect();
+    lines.sort_by_key(|(place, _)| *place);
+    let mut place = vec![u32::MAX; layout.texels];
+    for (number, texel) in texels.iter().enumerate() {
+        place[texel.index as usize] = number as u32;
+    }
+    let divided = lines.iter().filter(|(index, line)| {
+        texels.get(place[*index] as usize).is_some_and(|texel| is_divided(texel, *line))
+    });
+    let mut found: Vec<usize> = divided.map(|(index, _)| *index).collect();
+    found.dedup();
+    found
+}
+
+/// The texels that contact lines of a triangle cross, with the lines' parts in their unit squares.
+fn divisions(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    tree: &BoxTree,
+    index: usize,
+) -> Vec<(usize, [DVec2; 2])> {
+    let triangle = &scene.triangles[index];
+    let map = &layout.maps[triangle.object as usize];
+    let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
+    let texels = (b - a).perp_dot(c - a).abs();
+    if triangle.superseded || !(texels.is_finite() && texels > 2.0) {
+        return Vec::new();
+    }
+    let side = (2.0 * f64::from(triangle.area) / texels).sqrt();
+    let frame = PlaneFrame::new(triangle);
+    let [p, q, r] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
+    let to_texels = DMat2::from_cols(b - a, c - a) * DMat2::from_cols(q - p, r - p).inverse();
+    if !to_texels.is_finite() {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for segment in contacts(scene, tree, index as u32, &frame, side as f32) {
+        let [start, end] = segment.map(|point| a + to_texels * (point - p));
+        let Some((from, to)) =
+            within(start, end, DVec2::ZERO, DVec2::new(map.width.into(), map.height.into()))
+        else {
+            continue;
+        };
+        // Places along the line where it goes from one texel to another.
+        let mut stops = vec![from, to];
+        for axis in 0..2 {
+            let (s, e) = (start[axis], end[axis]);
+            let (low, high) = (s + (e - s) * from, s + (e - s) * to);
+            let whole = low.min(high).ceil() as i64..=low.max(high).floor() as i64;
+            stops.extend(whole.map(|x| (x as f64 - s) / (e - s)).filter(|t| *t > from && *t < to));
+        }
+        stops.sort_by(f64::total_cmp);
+        for pair in stops.windows(2) {
+            let middle = start.lerp(end, 0.5 * (pair[0] + pair[1]));
+            let (x, y) = (middle.x as u32, middle.y as u32);
+            if x < map.width && y < map.height {
+                let corner = DVec2::new(x.into(), y.into());
+                let part = [pair[0], pair[1]].map(|t| start.lerp(end, t) - corner);
+                found.push((map.first + (y * map.width + x) as usize, part));
+            }
+        }
+    }
+    found
+}
+
+/// The part of a line's parameter, in [0, 1], within a box.
+fn within(start: DVec2, end: DVec2, low: DVec2, high: DVec2) -> Option<(f64, f64)> {
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for axis in 0..2 {
+        let (s, d) = (start[axis], end[axis] - start[axis]);
+        if d == 0.0 {
+            if !(low[axis]..=high[axis]).contains(&s) {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((low[axis] - s) / d, (high[axis] - s) / d);
+        from = from.max(a.min(b));
+        to = to.min(a.max(b));
+    }
+    (from < to).then_some((from, to))
+}
+
+/// Whether a texel shows something on both sides of a line through it.
+fn is_divided(texel: &Texel, [from, to]: [DVec2; 2]) -> bool {
+    let along = to - from;
+    if along.length() < SHORTEST {
+        return false;
+    }
+    let normal = along.normalize().perp();
+    let beyond = |p: DVec2, sign: f64| sign * normal.dot(p - from) > MARGIN;
+    [1.0, -1.0].into_iter().all(|sign| match &texel.footprint {
+        Footprint::Whole(_) => {
+            [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].into_iter().any(|corner| beyond(corner, sign))
+        }
+        Footprint::Points(points) => points.iter().any(|point| beyond(point.offset.as_dvec2(), sign)),
+        Footprint::Hidden => false,
+    })
+}
