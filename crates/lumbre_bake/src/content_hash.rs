@@ -234,6 +234,7 @@ impl Hasher {
             gap,
             seed,
             threads: _,
+            form_factors,
             solver,
             denoise,
             seams,
@@ -256,6 +257,7 @@ impl Hasher {
         self.number(*quality as u64);
         self.number((*gap).into());
         self.number((*seed).into());
+        self.number(*form_factors as u64);
         self.number(*solver as u64);
         self.number((*denoise).into());
         self.number(memory.unwrap_or(u64::MAX));

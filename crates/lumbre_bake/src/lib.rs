@@ -59,4 +59,6 @@ pub use options::{BakeOptions, Density, Probes, Quality};
 pub use progress::Progress;
 pub use report::{BakeReport, Ended, ProbeReport, StageTime};
 pub use texels::seams::SeamReport;
+pub use transport::form_factors::FormFactorMethod;
+pub use transport::method_study::{FormFactorErrors, form_factor_errors};
 pub use transport::solver::Solver;

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::transport::form_factors::FormFactorMethod;
 use crate::transport::solver::Solver;
 
 /// How many texels a surface gets.
@@ -65,6 +66,8 @@ pub struct BakeOptions {
     pub seed: u32,
     /// Worker threads; as many as the machine has if absent.
     pub threads: Option<usize>,
+    /// How form factors are counted.
+    pub form_factors: FormFactorMethod,
     /// How the radiosity system is solved.
     pub solver: Solver,
     /// Smooths the gathered light within charts where it is noisy.
@@ -90,6 +93,7 @@ impl Default for BakeOptions {
             atlas_size: None,
             seed: 0,
             threads: None,
+            form_factors: FormFactorMethod::default(),
             solver: Solver::default(),
             denoise: true,
             seams: true,

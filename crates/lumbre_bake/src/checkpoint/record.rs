@@ -95,7 +95,7 @@ fields!(Gathered {
     rays: u64,
 });
 fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
-fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: u32 });
+fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: [u32; 2] });
 
 impl Record for bool {
     const LEAST: usize = 1;
@@ -177,7 +177,7 @@ mod tests {
             rays: 7,
             seen: Seen { partly: true, signature: 0xdead_beef },
         };
-        let cast = Cast { met: [vec![(1, 2), (3, 4)], vec![]], inside: [5, 6], missed: [7, 8], count: 9 };
+        let cast = Cast { met: [vec![(1, 2), (3, 4)], vec![]], inside: [5, 6], missed: [7, 8], count: [9, 10] };
         let mut bytes = Vec::new();
         direct.write(&mut bytes);
         assert_eq!(bytes.len(), Direct::LEAST);

@@ -62,10 +62,11 @@ impl Exchange {
             report.skipped.push(skipped.into());
             return Ok(sources.has_sky().then(|| Self::black(scene, patches, side)));
         }
-        let (factors, halves) =
-            FormFactors::sample(scene, &patches, plan.form_factor_rays, options.seed, watch)?;
+        let (method, rays) = (options.form_factors, plan.form_factor_rays);
+        let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, watch)?;
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
+        report.exact_form_factors = 2 * factors.exact;
         report.energy_lost = factors.energy_lost;
 
         watch.stage("radiosity", report)?;
@@ -116,7 +117,7 @@ impl Exchange {
 }
 
 /// Direct irradiance of a patch. What other geometry covers receives nothing: the rest has it all.
-fn patch_direct(
+pub(super) fn patch_direct(
     scene: &BakeScene,
     sources: &Sources<'_>,
     patches: &Patches,

@@ -1,8 +1,8 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
-#[cfg(test)]
 mod contour;
+mod cosine_rays;
 pub(crate) mod direct;
 pub(crate) mod emitter_tree;
 pub(crate) mod emitters;
@@ -10,7 +10,12 @@ pub(crate) mod exchange;
 #[cfg(test)]
 mod form_factor_tests;
 pub(crate) mod form_factors;
+mod global_lines;
 pub(crate) mod guide;
+pub(crate) mod method_study;
+#[cfg(test)]
+mod lambert_integral;
+mod near_pairs;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;
