@@ -25,7 +25,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => paths.push(PathBuf::from(&argument)),
         }
     }
-    let [input] = &paths[..] else { return Err("give an input file, or the name of a held-out scene".into()) };
+    let [input] = &paths[..] else {
+        return Err("give an input file, or the name of a held-out scene".into());
+    };
     let held_out = scenes::all().into_iter().find(|(name, ..)| input.as_os_str() == *name);
     let mut world = match held_out {
         Some((_, scene, layout)) => scene(layout, 1.0),

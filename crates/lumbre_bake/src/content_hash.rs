@@ -238,6 +238,7 @@ impl Hasher {
             solver,
             denoise,
             seams,
+            resolution_error,
             probes,
             probe_spacing,
             memory,
@@ -263,6 +264,8 @@ impl Hasher {
         self.number(memory.unwrap_or(u64::MAX));
         self.number(atlas_size.map_or(0, u64::from));
         self.number((*seams).into());
+        // Not in the map, but in the report that stands for it.
+        self.number((*resolution_error).into());
         self.number(*probes as u64);
         self.doubles(&[probe_spacing.unwrap_or(0.0)]);
     }

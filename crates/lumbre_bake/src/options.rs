@@ -74,6 +74,8 @@ pub struct BakeOptions {
     pub denoise: bool,
     /// Closes seams: where charts meet smoothly, both sides show the same light.
     pub seams: bool,
+    /// Estimates what error the map's resolution leaves, by points baked on their own: about a twentieth of the rays.
+    pub resolution_error: bool,
     /// Whether light is baked for what moves.
     pub probes: Probes,
     /// Metres between probes at most, positive and finite; by the scene's size, for up to 4096 of them, if absent.
@@ -97,6 +99,7 @@ impl Default for BakeOptions {
             solver: Solver::default(),
             denoise: true,
             seams: true,
+            resolution_error: true,
             probes: Probes::default(),
             probe_spacing: None,
             memory: None,

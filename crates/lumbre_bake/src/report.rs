@@ -26,6 +26,17 @@ pub struct ProbeReport {
     pub estimated_error: f64,
 }
 
+/// How far a bilinear look-up in the map is from what arrives at points of the surfaces, sampling apart; zeros where it was not measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ResolutionReport {
+    /// Points at which it was measured, spread evenly over the surfaces.
+    pub points: usize,
+    /// RMSE relative to the points' mean irradiance.
+    pub error: f64,
+    /// Standard error of that, for so few points.
+    pub standard_error: f64,
+}
+
 /// Why a bake took no more samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ended {
@@ -117,6 +128,8 @@ pub struct BakeReport {
     pub estimated_error: f64,
     /// Whether the estimated error is at most the one asked for.
     pub error_reached: bool,
+    /// The error that the map's resolution leaves, estimated apart.
+    pub resolution: ResolutionReport,
     /// Light for what moves.
     pub probes: ProbeReport,
     /// Why the bake took no more samples.
@@ -153,6 +166,15 @@ impl std::fmt::Display for BakeReport {
             100.0 * self.estimated_error,
             self.ended
         )?;
+        if self.resolution.points > 0 {
+            let ResolutionReport { points, error, standard_error } = self.resolution;
+            writeln!(
+                f,
+                "resolution error {:.2} % ± {:.2} %, by {points} points between texels",
+                100.0 * error,
+                100.0 * standard_error
+            )?;
+        }
         writeln!(
             f,
             "{} rays ({:.2} million a second), {:.0} gathered per texel, {} leaked",

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
+use crate::texels::resolution_error::DensePoint;
 use crate::transport::direct::{Direct, Seen};
 use crate::transport::form_factors::Cast;
 
@@ -97,6 +98,17 @@ fields!(Gathered {
 fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
 fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: [u32; 2] });
 
+fields!(DensePoint {
+    triangle: u32,
+    at: (f32, f32),
+    counts: bool,
+    direct: [Vec3; 2],
+    indirect: [Vec3; 2],
+    checks: u32,
+    differences: Vec3,
+    rays: u64,
+});
+
 impl Record for bool {
     const LEAST: usize = 1;
 
@@ -177,7 +189,8 @@ mod tests {
             rays: 7,
             seen: Seen { partly: true, signature: 0xdead_beef },
         };
-        let cast = Cast { met: [vec![(1, 2), (3, 4)], vec![]], inside: [5, 6], missed: [7, 8], count: [9, 10] };
+        let cast =
+            Cast { met: [vec![(1, 2), (3, 4)], vec![]], inside: [5, 6], missed: [7, 8], count: [9, 10] };
         let mut bytes = Vec::new();
         direct.write(&mut bytes);
         assert_eq!(bytes.len(), Direct::LEAST);

@@ -68,7 +68,10 @@ impl BakeScene {
             (b.along - a.along) * a.cosine.abs().min(b.cosine.abs()).max(1.0 / 1024.0) <= slack
         };
         met.chunk_by(together)
-            .map(|place| Crossing { before: self.face(place.iter(), -1.0), beyond: self.face(place.iter().rev(), 1.0) })
+            .map(|place| Crossing {
+                before: self.face(place.iter(), -1.0),
+                beyond: self.face(place.iter().rev(), 1.0),
+            })
             .collect()
     }
 
@@ -78,7 +81,11 @@ impl BakeScene {
             let triangle = &self.triangles[meeting.triangle as usize];
             let front = meeting.cosine * sign > 0.0;
             let side = if front { Side::Front } else { Side::Back };
-            (front || triangle.two_sided).then_some(Face::Lit { triangle: meeting.triangle, side, at: meeting.at })
+            (front || triangle.two_sided).then_some(Face::Lit {
+                triangle: meeting.triangle,
+                side,
+                at: meeting.at,
+            })
         });
         let mut place = place;
         lit.unwrap_or_else(|| match place.next() {

@@ -163,7 +163,10 @@ mod tests {
         for (name, other) in [
             ("edge", [base[1], base[0], DVec3::new(0.4, 0.8, 0.3)]),
             ("corner", [DVec3::ZERO, DVec3::new(0.3, 0.7, 0.4), DVec3::new(0.9, 0.8, 0.5)]),
-            ("part of an edge", [DVec3::new(1.5, 0.0, 0.0), DVec3::new(0.25, 0.0, 0.0), DVec3::new(0.8, 0.9, 0.1)]),
+            (
+                "part of an edge",
+                [DVec3::new(1.5, 0.0, 0.0), DVec3::new(0.25, 0.0, 0.0), DVec3::new(0.8, 0.9, 0.1)],
+            ),
             ("general", [DVec3::new(0.9, 0.6, -0.5), DVec3::new(0.1, 0.5, -0.4), DVec3::new(0.5, 1.1, -0.3)]),
         ] {
             for other in [other, [other[0], other[2], other[1]]] {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::Material;
 
@@ -159,6 +159,58 @@ fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
             }
         }
         assert!(factors.energy_lost < 2e-3, "{method:?}: {}", factors.energy_lost);
+    }
+}
+
+#[test]
+fn pairs_that_share_an_edge_are_exact_in_both_halves() {
+    let scene = scene(&[&room()]);
+    let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
+    let corners: Vec<[DVec3; 3]> =
+        patches.list.iter().map(|p| patches.corners(&scene, p).map(|corner| corner.as_dvec3())).collect();
+    for method in METHODS {
+        let mut carry_on = carry_on;
+        let watch = &mut Watch::new(&mut carry_on, None);
+        let (factors, halves) = FormFactors::sample(&scene, &patches, method, 50_000, 3, watch).unwrap();
+        let mut checked = 0;
+        for i in 0..factors.len() {
+            for (j, g) in factors.row(i) {
+                let shared = corners[i].iter().filter(|corner| corners[j].contains(corner)).count();
+                let expected = super::lambert_integral::triangle_to_triangle(&corners[i], &corners[j]);
+                if shared < 2 || expected < 0.05 {
+                    continue;
+                }
+                checked += 1;
+                let area = f64::from(patches.list[i].area);
+                // Some 200 rays would leave .02.
+                assert!((g / area - expected).abs() < 1e-4, "{method:?} {i} {j}: {} {expected}", g / area);
+                for half in &halves {
+                    assert_eq!(half.row(i).find(|&(k, _)| k == j).map(|(_, g)| g), Some(g));
+                }
+            }
+        }
+        assert!(checked > 50, "{checked}");
+        assert_eq!(
+            factors.row(0).map(|(_, g)| g).sum::<f64>(),
+            factors.row_sum(0) * f64::from(factors.areas[0])
+        );
+    }
+}
+
+#[test]
+fn what_stands_between_near_patches_counts() {
+    let lower = square([0.0; 3], Vec3::Z, Vec3::X);
+    let upper = square([0.0, 0.1, 0.0], Vec3::X, Vec3::Z);
+    let all = square([-9.0, 0.05, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
+    // Over x < .5, so low that it parts both squares in two: .8 by half, with what passes the rim.
+    let half = square([-9.0, 0.05, -9.0], Vec3::X * 9.5, Vec3::Z * 20.0);
+    for method in METHODS {
+        assert_eq!(factor(&[&lower, &upper, &all], 0.1, method).0, 0.0);
+        let [fine, coarse] = [0.1, 4.0].map(|side| factor(&[&lower, &upper, &half], side, method));
+        let sigma = |(found, rays): (f64, f64)| (found * (1.0 - found) / rays).sqrt();
+        let apart = (fine.0 - coarse.0).abs();
+        assert!(apart < 5.0 * sigma(fine).hypot(sigma(coarse)), "{method:?}: {fine:?} {coarse:?}");
+        assert!(fine.0 > 0.35 && fine.0 < 0.5, "{fine:?}");
     }
 }
 

@@ -178,7 +178,8 @@ impl FormFactors {
     fn multiply(&mut self, factor: impl Fn(usize, usize, usize) -> f64) {
         for i in 0..self.areas.len() {
             for k in self.starts[i]..self.starts[i + 1] {
-                self.exchange[k] = (f64::from(self.exchange[k]) * factor(k, i, self.columns[k] as usize)) as f32;
+                self.exchange[k] =
+                    (f64::from(self.exchange[k]) * factor(k, i, self.columns[k] as usize)) as f32;
             }
         }
     }

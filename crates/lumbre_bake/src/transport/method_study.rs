@@ -100,8 +100,7 @@ fn solution(factors: &FormFactors, patches: &Patches, direct: &[Vec3], sky: Vec3
     let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
     let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
     let sky: Vec<f64> = factors.sky.iter().map(|&share| f64::from(share) * grey(sky)).collect();
-    let emission: Vec<f64> =
-        (0..direct.len()).map(|i| reflectance[i] * (grey(direct[i]) + sky[i])).collect();
+    let emission: Vec<f64> = (0..direct.len()).map(|i| reflectance[i] * (grey(direct[i]) + sky[i])).collect();
     let solved = Solver::default().solve(factors, &reflectance, &emission, 1e-8);
     gather(factors, &solved.radiosity).iter().zip(sky).map(|(bounced, sky)| bounced + sky).collect()
 }

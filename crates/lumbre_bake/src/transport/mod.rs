@@ -8,13 +8,15 @@ pub(crate) mod emitter_tree;
 pub(crate) mod emitters;
 pub(crate) mod exchange;
 #[cfg(test)]
+mod exchange_tests;
+#[cfg(test)]
 mod form_factor_tests;
 pub(crate) mod form_factors;
 mod global_lines;
 pub(crate) mod guide;
-pub(crate) mod method_study;
 #[cfg(test)]
 mod lambert_integral;
+pub(crate) mod method_study;
 mod near_pairs;
 pub(crate) mod patches;
 pub(crate) mod polygon;
