@@ -1,6 +1,6 @@
-//! How honest the stated error is: `honesty IN.glb|SCENE [--map-size N] [--error X[,X…]] [--draft] [--pictures FOLDER]` bakes a file (or a
+//! How honest the stated error is: `honesty IN.glb|SCENE [--map-size N] [--error X[,X…]] [--draft] [--truth FILE] [--pictures FOLDER]` bakes a file (or a
 //! held-out scene by its name) as asked and to convergence, texel by texel the same maps, and prints the true error beside the stated one,
-//! with where they differ most. Pictures show the true error over twice the stated one: grey below 1, red above.
+//! with where they differ most. With `--truth FILE` the converged maps are kept there, or taken from there. Pictures show the true error over twice the stated one: grey below 1, red above.
 
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -19,6 +19,7 @@ mod scenes;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut options = BakeOptions { density: Density::MapSize(64), ..BakeOptions::default() };
     let (mut paths, mut pictures, mut errors) = (Vec::new(), None, vec![options.error]);
+    let mut kept = None;
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
@@ -28,6 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--error" => errors = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?,
             "--seed" => options.seed = value()?.parse()?,
             "--draft" => options.quality = Quality::Draft,
+            "--truth" => kept = Some(PathBuf::from(value()?)),
             "--pictures" => pictures = Some(PathBuf::from(value()?)),
             _ => paths.push(PathBuf::from(&argument)),
         }
@@ -35,8 +37,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input] = &paths[..] else { return Err("give an input file".into()) };
     let converged =
         BakeOptions { quality: Quality::Reference, error: 2e-3, seed: 99, denoise: false, ..options };
-    let (reference, truth) = baked(input, &converged)?;
-    println!("reference: {:.1} s, states {:.3} %", reference.seconds, 100.0 * reference.estimated_error);
+    let truth = match &kept {
+        Some(path) if path.exists() => read_truth(path)?,
+        _ => {
+            let (reference, truth) = baked(input, &converged)?;
+            println!(
+                "reference: {:.1} s, states {:.3} %",
+                reference.seconds,
+                100.0 * reference.estimated_error
+            );
+            if let Some(path) = &kept {
+                write_truth(path, &truth)?;
+            }
+            truth
+        }
+    };
     for error in errors {
         let (report, found) = baked(input, &BakeOptions { error, ..options })?;
         print!("{error}: ");
@@ -46,6 +61,27 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
+}
+
+fn write_truth(path: &Path, truth: &[(String, Map)]) -> Result<(), Box<dyn Error>> {
+    let rows = truth.iter().map(|(name, map)| {
+        let texels: Vec<[f32; 3]> = map.texels.iter().map(|texel| texel.to_array()).collect();
+        // JSON knows no NaN.
+        let errors: Vec<f32> =
+            map.errors.iter().map(|&error| if error.is_nan() { -1.0 } else { error }).collect();
+        (name, map.width, texels, errors)
+    });
+    Ok(std::fs::write(path, serde_json::to_vec(&rows.collect::<Vec<_>>())?)?)
+}
+
+fn read_truth(path: &Path) -> Result<Vec<(String, Map)>, Box<dyn Error>> {
+    type Row = (String, u32, Vec<[f32; 3]>, Vec<f32>);
+    let rows: Vec<Row> = serde_json::from_slice(&std::fs::read(path)?)?;
+    let map = |(name, width, texels, errors): Row| {
+        let errors = errors.into_iter().map(|error| if error < 0.0 { f32::NAN } else { error }).collect();
+        (name, Map { width, texels: texels.into_iter().map(Vec3::from).collect(), errors })
+    };
+    Ok(rows.into_iter().map(map).collect())
 }
 
 fn apart(a: Vec3, b: Vec3) -> f64 {

@@ -109,7 +109,8 @@ fn nothing_is_lost_where_light_is_the_same_everywhere() {
         BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() };
     let report = run(&mut world, &options);
     assert!(report.resolution.points > 200, "{:?}", report.resolution);
-    assert!(report.resolution.error < 3e-3, "{:?}", report.resolution);
+    let found = report.resolution;
+    assert!(found.standard_error < 5e-3 && found.error < 3.0 * found.standard_error, "{found:?}");
 }
 
 #[test]
@@ -127,5 +128,5 @@ fn it_can_be_left_out_and_costs_little() {
     );
     assert_ne!(with.resolution.points, 0);
     // A twentieth, or what the fewest points take.
-    assert!(with.rays - without.rays <= (without.rays / 15).max(256 * 64), "{} {}", with.rays, without.rays);
+    assert!(with.rays - without.rays <= (without.rays / 15).max(1 << 17), "{} {}", with.rays, without.rays);
 }

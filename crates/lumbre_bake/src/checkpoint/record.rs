@@ -1,6 +1,6 @@
 //! Values as little-endian bytes. Not the file that they are written to.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
 use crate::texels::resolution_error::DensePoint;
@@ -87,7 +87,7 @@ fields!(Seen { partly: bool, signature: u32 });
 fields!(Gathered {
     sums: [Vec3; SCRAMBLES],
     weights: [Weights; SCRAMBLES],
-    patch_errors: f32,
+    patch_errors: Vec2,
     checks: u32,
     differences: Vec3,
     squared_differences: f32,
@@ -122,6 +122,18 @@ impl Record for bool {
             1 => Some(true),
             _ => None,
         }
+    }
+}
+
+impl Record for Vec2 {
+    const LEAST: usize = 8;
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.to_array().iter().for_each(|value| value.write(out));
+    }
+
+    fn read(from: &mut Cursor<'_>) -> Option<Self> {
+        Some(Self::new(Record::read(from)?, Record::read(from)?))
     }
 }
 

@@ -5,6 +5,7 @@
 //!            + final gather: spread of four scrambles, after smoothing
 //!            + smoothing:    half of the scrambles smoothed against the other half raw, over the neighbourhood
 //!            + form factors: half the difference of two half solutions, gathered by the texel's own rays
+//!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
 //!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
 //!            + solver:       residual / (1 - rho) of the light by bounces
 //! ```

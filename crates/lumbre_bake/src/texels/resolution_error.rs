@@ -15,8 +15,9 @@ use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::transport::direct::{Receiver, Sources};
 use crate::{BakeError, BakeOptions};
 
-/// Of the rays of a bake, one part in so many.
+/// Of the rays of a bake, one part in so many; and what takes no time that anyone would notice.
 const SHARE: u64 = 20;
+const LEAST_RAYS: u64 = 1 << 16;
 /// Fewest and most points.
 const POINTS: (u64, u64) = (256, 4096);
 /// Shadow rays of a point to each source and gather rays of each scramble; two scrambles are a half.
@@ -74,7 +75,7 @@ impl Light<'_> {
             .collect();
         let of_gather = if self.outgoing.is_some() { GATHER_RAYS * SCRAMBLES as u32 } else { 0 };
         let cost = u64::from(JUDGES + 2 * SHADOW_RAYS + of_gather);
-        let count = (rays / SHARE / cost).clamp(POINTS.0, POINTS.1) as usize;
+        let count = ((rays / SHARE).max(LEAST_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
         let sequence = Sequence::new(options.seed, PURPOSE, 0);
         let points = in_chunks(count, watch, |index| {
             let [choice, u, v, _] = sequence.point(index as u32, 0);

@@ -1,9 +1,10 @@
 //! The exchange of light between patches: cuts the scene, samples form factors, finds the patches' direct light, solves
 //! each channel. Not the texels.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::coarser::size_error;
 use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
 use super::guide::Guide;
@@ -24,8 +25,9 @@ pub(crate) struct Exchange {
     pub direct: Vec<Vec3>,
     /// Irradiance by bounces, and by the sky, of each patch.
     pub indirect: Vec<Vec3>,
-    /// Standard error of that, with its sign: one sample of how the form factors' noise spreads. Mean of the channels.
-    pub indirect_error: Vec<f32>,
+    /// Errors of that, with their signs: a sample of how the form factors' noise spreads, and what the patches' size leaves. Mean of the
+    /// channels.
+    pub indirect_error: Vec<Vec2>,
     /// Below this distance patches are too coarse to read, canonical units.
     pub near: f32,
     /// Where each patch's light by bounces comes from.
@@ -95,8 +97,14 @@ impl Exchange {
         let sky_halves = halves.each_ref().map(&sky);
         let sky = sky(&factors);
         let indirect = solve(options.solver, &factors, &patches.list, &direct, &sky, report);
+        let noise = solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list);
+        let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
+        let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
+        let first: Vec<f64> = direct.iter().zip(&sky).map(|(direct, sky)| grey(*direct + *sky)).collect();
+        let light = (reflectance.as_slice(), first.as_slice());
+        let of_size = size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE));
         let indirect_error =
-            solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list);
+            noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
         let leaves = |(index, patch): (usize, &Patch)| {
             (patch.reflectance * (direct[index] + indirect[index])).element_sum()
         };
@@ -111,8 +119,9 @@ impl Exchange {
     fn black(scene: &BakeScene, patches: Patches, side: f32) -> Self {
         let none = vec![Vec3::ZERO; patches.list.len()];
         let zeros = vec![0.0; patches.list.len()];
+        let exact = vec![Vec2::ZERO; patches.list.len()];
         let guide = Guide::new(scene, &patches, side, &FormFactors::none(&patches), &zeros, &none);
-        Self { direct: none.clone(), indirect: none, indirect_error: zeros, near: 2.0 * side, patches, guide }
+        Self { direct: none.clone(), indirect: none, indirect_error: exact, near: 2.0 * side, patches, guide }
     }
 }
 

@@ -1,6 +1,7 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
+mod coarser;
 mod contour;
 mod cosine_rays;
 pub(crate) mod direct;
