@@ -103,8 +103,7 @@ impl Exchange {
         let first: Vec<f64> = direct.iter().zip(&sky).map(|(direct, sky)| grey(*direct + *sky)).collect();
         let light = (reflectance.as_slice(), first.as_slice());
         let of_size = size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE));
-        let indirect_error =
-            noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
+        let indirect_error = noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
         let leaves = |(index, patch): (usize, &Patch)| {
             (patch.reflectance * (direct[index] + indirect[index])).element_sum()
         };
