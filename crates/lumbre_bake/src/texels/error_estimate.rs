@@ -41,6 +41,7 @@ const SPREAD_STEP: i64 = 3;
 /// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts.
 pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimates: &[Estimates]) -> Vec<f32> {
     let own: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum() / 3.0).collect();
+    // The scrambles of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
         .iter()
         .map(|[a, b, c, d]| {
@@ -61,6 +62,126 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimate
         let (mean, of_halves) = (sum / count, of_halves / count);
         let by_chance = ((squares / count - mean * mean).max(0.0) / count).sqrt();
         mean.max(of_halves) + sure * by_chance
+    };
+    texels.par_iter().zip(&own).map(|(texel, own)| own.max(around(texel))).collect()
+}
+
+impl GatherErrors<'_> {
+    /// The part of each texel's variance that more rays make smaller.
+    pub fn by_rays(&self) -> Vec<f32> {
+        self.spread.iter().zip(self.smoothing_bias).map(|(noise, bias)| noise + bias).collect()
+    }
+}
+
+/// Variance of every covered texel, mean of the channels.
+pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>) -> Vec<f32> {
+    direct
+        .iter()
+        .enumerate()
+        .map(|(index, direct)| {
+            let by_bounces = gather.map_or(0.0, |gather| {
+                let estimates = &gather.estimates[index];
+                let unsolved = gather.residual_bound as f32 * mean(estimates).element_sum() / 3.0;
+                gather.spread[index]
+                    + gather.smoothing_bias[index]
+                    + gather.gathered[index].patch_error().powi(2)
+                    + unsolved * unsolved
+                    + gather.patch_bias[index].rest
+            });
+            direct.variance + by_bounces
+        })
+        .collect()
+}
+
+/// Texels around one over which checks are put together.
+const CHECK_RADIUS: i64 = 3;
+/// A difference between patches and real bounces counts as known, and is taken away, where it is this many times its own error.
+const KNOWN: f64 = 3.0;
+
+/// What reading patches instead of bouncing on has brought a texel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PatchBias {
+    /// The part that is known: to be taken away.
+    pub correction: Vec3,
+    /// Square of what is left, mean of the channels.
+    pub rest: f32,
+    /// As `rest`, and below zero where chance alone would make more: of a single texel that says nothing, but the mean of many is right.
+    pub expected: f32,
+}
+
+/// Checks put together.
+#[derive(Clone, Copy, Default)]
+struct Checks {
+    count: f64,
+    difference: DVec3,
+    square: f64,
+    /// Light by bounces of the texels that were checked, times their checks.
+    light: DVec3,
+}
+
+impl Checks {
+    fn add(&mut self, gathered: &Gathered) {
+        let samples = f64::from(gathered.samples.max(1));
+        self.count += f64::from(gathered.checks);
+        self.difference += gathered.differences.as_dvec3();
+        self.square += f64::from(gathered.squared_differences);
+        let light =
+            gathered.sums.iter().map(|sum| sum.as_dvec3()).sum::<DVec3>() / samples / SCRAMBLES as f64;
+        self.light += light * f64::from(gathered.checks);
+    }
+
+    /// The mean difference, beyond `expected` of it; how much of it is known, in [0, 1]; the square of what chance may have made of it.
+    fn known(&self, expected: DVec3) -> (DVec3, f64, f64) {
+        if self.count < 2.0 {
+            return (DVec3::ZERO, 0.0, 0.0);
+        }
+        let mean = self.difference / self.count;
+        let grey = mean.element_sum() / 3.0;
+        let by_chance = (self.square / self.count - grey * grey).max(0.0) / self.count;
+        let beyond = mean - expected;
+        let squared = (beyond.element_sum() / 3.0).powi(2).max(f64::MIN_POSITIVE);
+        (beyond, (1.0 - KNOWN * KNOWN * by_chance / squared).max(0.0), by_chance)
+    }
+}
+
+/// The mean difference between patches and real bounces: of a map, in terms of its light by bounces, where many checks tell it well;
+/// and beyond that around each texel. The real bounces read patches too, one bounce later: of a difference d about d ρ/(1 - ρ)
+/// stays, with the scene's mean reflectance ρ.
+pub(crate) fn patch_bias(
+    surroundings: &Surroundings<'_>,
+    texels: &[Texel],
+    gathered: &[Gathered],
+    reflectance: f64,
+) -> Vec<PatchBias> {
+    let later = (reflectance / (1.0 - reflectance)).powi(2);
+    let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
+    let mut of_maps = vec![Checks::default(); maps];
+    for (texel, gathered) in texels.iter().zip(gathered) {
+        of_maps[texel.object as usize].add(gathered);
+    }
+    // Per unit of light by bounces.
+    let of_maps: Vec<DVec3> = of_maps
+        .iter()
+        .map(|checks| {
+            let (mean, known, _) = checks.known(DVec3::ZERO);
+            known * mean * checks.count / checks.light.max(DVec3::splat(f64::MIN_POSITIVE))
+        })
+        .collect();
+    let around = |texel: &Texel| {
+        let mut checks = Checks::default();
+        surroundings.of(texel, CHECK_RADIUS).for_each(|(.., other)| {
+            checks.add(&gathered[other]);
+        });
+        if checks.count < 2.0 {
+            return PatchBias::default();
+        }
+        let of_map = of_maps[texel.object as usize] * checks.light / checks.count;
+        let (beyond, known, by_chance) = checks.known(of_map);
+        let correction = of_map + known * beyond;
+        let square = |v: DVec3| (v.element_sum() / 3.0).powi(2);
+        let unknown = (1.0 - known).powi(2) * square(beyond) - by_chance;
+        // What is taken away has come by chance in part.
+        let unknown = unknown + known * known * by_chance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
         let later = later * square(correction);
         let (rest, expected) = ((unknown.max(0.0) + later) as f32, (unknown + later) as f32);
