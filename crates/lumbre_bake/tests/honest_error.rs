@@ -159,15 +159,15 @@ fn cornell_box() {
 
 #[test]
 fn alcove() {
-    model("conformance/bake/alcove.glb", Density::TexelsPerMeter(8.0));
+    model("conformance/bake/alcove.glb", Density::TexelsPerMeter(10.0));
 }
 
 #[test]
 fn two_rooms_joined_by_a_doorway() {
-    judge("rooms", || held_out::scenes::rooms(0, 1.0), Density::TexelsPerMeter(5.0), &FINAL);
+    judge("rooms", || held_out::scenes::rooms(0, 1.0), Density::TexelsPerMeter(6.0), &FINAL);
 }
 
 #[test]
 fn a_hall_with_columns() {
-    judge("hall", || held_out::scenes::hall(0, 1.0), Density::TexelsPerMeter(3.0), &FINAL);
+    judge("hall", || held_out::scenes::hall(0, 1.0), Density::TexelsPerMeter(4.0), &FINAL);
 }

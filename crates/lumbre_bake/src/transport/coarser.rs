@@ -54,9 +54,8 @@ pub(super) fn size_error(
     let coarse = merged(factors, &within, &total);
     let solution = solver.solve(&coarse, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
     let found = gather(&coarse, &solution.radiosity);
-    let left: f64 = std::env::var("SIZE_SCALE").ok().and_then(|v| v.parse().ok()).unwrap_or(LEFT); // TEMP
     let expected = mean(&|i| fine[i]);
-    within.iter().map(|&large| (left * (found[large] - expected[large])) as f32).collect()
+    within.iter().map(|&large| (LEFT * (found[large] - expected[large])) as f32).collect()
 }
 
 /// The exchange between sums of patches.
