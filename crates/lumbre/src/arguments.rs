@@ -133,6 +133,15 @@ pub struct Bake {
     /// Leaves the seams between charts as they are.
     #[arg(long)]
     pub no_seams: bool,
+    /// Leaves out the estimate of the error that the map's resolution leaves.
+    #[arg(long)]
+    pub no_resolution_error: bool,
+    /// How form factors are counted.
+    #[arg(long, value_enum, default_value_t = BakeFormFactors::Cosine)]
+    pub form_factors: BakeFormFactors,
+    /// How the radiosity system is solved.
+    #[arg(long, value_enum, default_value_t = BakeSolver::ConjugateGradients)]
+    pub solver: BakeSolver,
     /// Writes each lightmap as a KTX2 image too, as Bevy reads it.
     #[arg(long, value_name = "rgb9e5|b10g11r11", value_parser = packed_format)]
     pub ktx2: Option<PackedFormat>,
@@ -161,6 +170,24 @@ pub enum BakeProbes {
     Always,
     /// Not at all.
     Never,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BakeFormFactors {
+    /// Rays by the cosine from every patch.
+    Cosine,
+    /// Lines spread evenly through the whole scene.
+    Lines,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BakeSolver {
+    /// The fewest iterations.
+    ConjugateGradients,
+    /// Each patch reads what was found before it in the same sweep.
+    GaussSeidel,
+    /// One bounce more in each sweep.
+    Jacobi,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

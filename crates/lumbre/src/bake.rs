@@ -11,11 +11,12 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use bevy_ecs::world::World;
 use lumbre::bake::{
-    BakeError, BakeOptions, BakeReport, Checkpoint, Density, Probes, Quality, bake_with, content_hash,
+    BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Solver,
+    bake_with, content_hash,
 };
 use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
-use crate::arguments::{Bake, BakeProbes, BakeQuality, ExrTexels};
+use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
 use crate::bake_record::{Asked, BakeRecord, hash_of_files};
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{extension, load_with_files};
@@ -85,6 +86,16 @@ fn options(asked: &Bake) -> BakeOptions {
         gap: asked.gap,
         atlas_size: asked.atlas_size,
         seams: !asked.no_seams,
+        resolution_error: !asked.no_resolution_error,
+        form_factors: match asked.form_factors {
+            BakeFormFactors::Cosine => FormFactorMethod::CosineRays,
+            BakeFormFactors::Lines => FormFactorMethod::GlobalLines,
+        },
+        solver: match asked.solver {
+            BakeSolver::ConjugateGradients => Solver::ConjugateGradients,
+            BakeSolver::GaussSeidel => Solver::GaussSeidel,
+            BakeSolver::Jacobi => Solver::Jacobi,
+        },
         ..BakeOptions::default()
     }
 }
@@ -215,6 +226,13 @@ fn summary(report: &BakeReport) -> String {
             "{x} x {y} x {z} probes ({} inside geometry), estimated error {:.2} %\n",
             report.probes.inside,
             100.0 * report.probes.estimated_error
+        ));
+    }
+    if report.resolution.points > 0 {
+        text.push_str(&format!(
+            "the map's resolution leaves {:.2} % ± {:.2} % beside that\n",
+            100.0 * report.resolution.error,
+            100.0 * report.resolution.standard_error
         ));
     }
     for stage in &report.stages {

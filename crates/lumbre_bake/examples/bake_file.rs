@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use bevy_ecs::world::World;
-use lumbre_bake::{BakeOptions, Density, Quality, bake};
+use lumbre_bake::{BakeOptions, Density, FormFactorMethod, Quality, bake};
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -26,6 +26,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--draft" => options.quality = Quality::Draft,
             "--no-denoise" => options.denoise = false,
             "--no-seams" => options.seams = false,
+            "--no-resolution-error" => options.resolution_error = false,
+            "--global-lines" => options.form_factors = FormFactorMethod::GlobalLines,
             "--csv" => csv = Some(PathBuf::from(value()?)),
             "--maps" => maps = Some(PathBuf::from(value()?)),
             _ => paths.push(PathBuf::from(&argument)),

@@ -18,6 +18,7 @@ use crate::texels::fill::fill;
 use crate::texels::footprint::{Texel, footprints};
 use crate::texels::gather::{Outgoing, SCRAMBLES};
 use crate::texels::hidden::remove_hidden;
+use crate::texels::resolution_error::{DensePoint, Light, compare};
 use crate::texels::seams::{Maps, close_seams};
 use crate::texels::straddling::straddling;
 use crate::texels::{lighting, rounds};
@@ -127,8 +128,12 @@ fn run(
     let baked: Vec<Vec3> = direct.iter().map(|direct| direct.baked).collect();
 
     let exchange = Exchange::new(&scene, &sources, options, &plan, &mut watch, &mut report)?;
-    let (indirect, volume) = match &exchange {
-        None => (None, wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?),
+    let (indirect, volume, points) = match &exchange {
+        None => {
+            let volume = wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?;
+            let light = Light { scene: &scene, sources: &sources, outgoing: None };
+            (None, volume, dense_points(&light, options, &mut watch, &mut report)?)
+        }
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
             let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
@@ -154,7 +159,9 @@ fn run(
                 rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
             let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
-            (Some(gathered), volume)
+            let light = Light { scene: &scene, sources: &sources, outgoing: Some(&outgoing) };
+            let points = dense_points(&light, options, &mut watch, &mut report)?;
+            (Some(gathered), volume, points)
         }
     };
 
@@ -182,6 +189,7 @@ fn run(
     let maps =
         Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
     note_seams(&maps, &mut filled, options, &mut report);
+    report.resolution = compare(&scene, &layout, &filled, &errors, &points);
     watch.advance(1.0)?;
     let pages = Pages::new(&layout, options.atlas_size, options.gap);
     apply::apply(world, &objects, &layout, &filled, &errors, &pages);
@@ -202,12 +210,31 @@ fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
         .stages
         .iter()
         .filter(|stage| {
-            ["direct light", "form factors", "final gather", "probes"].contains(&stage.stage.as_str())
+            ["direct light", "form factors", "final gather", "probes", "resolution"]
+                .contains(&stage.stage.as_str())
         })
         .map(|stage| stage.seconds)
         .sum();
     report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
     report
+}
+
+/// Points that the finished map is compared with; none if that is not asked for.
+fn dense_points(
+    light: &Light<'_>,
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<Vec<DensePoint>, BakeError> {
+    if !options.resolution_error || watch.clock().late() {
+        let why = if options.resolution_error { "the time is up" } else { "switched off" };
+        report.skipped.push(format!("resolution error: {why}"));
+        return Ok(Vec::new());
+    }
+    watch.stage("resolution", report)?;
+    let points = light.at_points(report.rays, options, watch)?;
+    report.rays += points.iter().map(|point| point.rays).sum::<u64>();
+    Ok(points)
 }
 
 fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {

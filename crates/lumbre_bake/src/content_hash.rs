@@ -234,9 +234,11 @@ impl Hasher {
             gap,
             seed,
             threads: _,
+            form_factors,
             solver,
             denoise,
             seams,
+            resolution_error,
             probes,
             probe_spacing,
             memory,
@@ -256,11 +258,14 @@ impl Hasher {
         self.number(*quality as u64);
         self.number((*gap).into());
         self.number((*seed).into());
+        self.number(*form_factors as u64);
         self.number(*solver as u64);
         self.number((*denoise).into());
         self.number(memory.unwrap_or(u64::MAX));
         self.number(atlas_size.map_or(0, u64::from));
         self.number((*seams).into());
+        // Not in the map, but in the report that stands for it.
+        self.number((*resolution_error).into());
         self.number(*probes as u64);
         self.doubles(&[probe_spacing.unwrap_or(0.0)]);
     }

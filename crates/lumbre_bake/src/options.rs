@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::transport::form_factors::FormFactorMethod;
 use crate::transport::solver::Solver;
 
 /// How many texels a surface gets.
@@ -65,12 +66,16 @@ pub struct BakeOptions {
     pub seed: u32,
     /// Worker threads; as many as the machine has if absent.
     pub threads: Option<usize>,
+    /// How form factors are counted.
+    pub form_factors: FormFactorMethod,
     /// How the radiosity system is solved.
     pub solver: Solver,
     /// Smooths the gathered light within charts where it is noisy.
     pub denoise: bool,
     /// Closes seams: where charts meet smoothly, both sides show the same light.
     pub seams: bool,
+    /// Estimates what error the map's resolution leaves, by points baked on their own: about a twentieth of the rays.
+    pub resolution_error: bool,
     /// Whether light is baked for what moves.
     pub probes: Probes,
     /// Metres between probes at most, positive and finite; by the scene's size, for up to 4096 of them, if absent.
@@ -90,9 +95,11 @@ impl Default for BakeOptions {
             atlas_size: None,
             seed: 0,
             threads: None,
+            form_factors: FormFactorMethod::default(),
             solver: Solver::default(),
             denoise: true,
             seams: true,
+            resolution_error: true,
             probes: Probes::default(),
             probe_spacing: None,
             memory: None,

@@ -19,14 +19,15 @@ pub struct Progress {
 }
 
 /// The stages in their order, with their usual share of the time.
-const STAGES: [(&str, f32); 9] = [
+const STAGES: [(&str, f32); 10] = [
     ("layout", 0.03),
     ("hierarchy", 0.02),
     ("direct light", 0.2),
     ("form factors", 0.1),
     ("radiosity", 0.05),
-    ("final gather", 0.5),
+    ("final gather", 0.48),
     ("probes", 0.05),
+    ("resolution", 0.02),
     ("texels", 0.03),
     ("seams", 0.02),
 ];

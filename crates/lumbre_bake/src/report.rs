@@ -26,6 +26,17 @@ pub struct ProbeReport {
     pub estimated_error: f64,
 }
 
+/// How far a bilinear look-up in the map is from what arrives at points of the surfaces, sampling apart; zeros where it was not measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ResolutionReport {
+    /// Points at which it was measured, spread evenly over the surfaces.
+    pub points: usize,
+    /// RMSE relative to the points' mean irradiance.
+    pub error: f64,
+    /// Standard error of that, for so few points.
+    pub standard_error: f64,
+}
+
 /// Why a bake took no more samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ended {
@@ -88,6 +99,8 @@ pub struct BakeReport {
     pub patches: usize,
     /// Pairs of patches that see each other.
     pub form_factors: usize,
+    /// Those of them that are contour integrals, of near pairs that nothing stands between.
+    pub exact_form_factors: usize,
     /// Iterations of the solver, for red, green and blue.
     pub iterations: [u32; 3],
     /// Largest relative residual of the three channels.
@@ -115,6 +128,8 @@ pub struct BakeReport {
     pub estimated_error: f64,
     /// Whether the estimated error is at most the one asked for.
     pub error_reached: bool,
+    /// The error that the map's resolution leaves, estimated apart.
+    pub resolution: ResolutionReport,
     /// Light for what moves.
     pub probes: ProbeReport,
     /// Why the bake took no more samples.
@@ -151,6 +166,15 @@ impl std::fmt::Display for BakeReport {
             100.0 * self.estimated_error,
             self.ended
         )?;
+        if self.resolution.points > 0 {
+            let ResolutionReport { points, error, standard_error } = self.resolution;
+            writeln!(
+                f,
+                "resolution error {:.2} % ± {:.2} %, by {points} points between texels",
+                100.0 * error,
+                100.0 * standard_error
+            )?;
+        }
         writeln!(
             f,
             "{} rays ({:.2} million a second), {:.0} gathered per texel, {} leaked",
@@ -158,8 +182,14 @@ impl std::fmt::Display for BakeReport {
         )?;
         writeln!(
             f,
-            "{} triangles, {} patches, {} form factors; {:?} iterations, residual {:.1e}, energy lost {:.1e}",
-            self.triangles, self.patches, self.form_factors, self.iterations, self.residual, self.energy_lost
+            "{} triangles, {} patches, {} form factors ({} exact); {:?} iterations, residual {:.1e}, energy lost {:.1e}",
+            self.triangles,
+            self.patches,
+            self.form_factors,
+            self.exact_form_factors,
+            self.iterations,
+            self.residual,
+            self.energy_lost
         )?;
         if self.seams.edges > 0 {
             writeln!(

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, ContentHash, Density, Quality, Solver, bake, content_hash};
+use lumbre_bake::{BakeOptions, ContentHash, Density, FormFactorMethod, Quality, Solver, bake, content_hash};
 use lumbre_optics::{AlphaMode, BakeMode, Light, Material};
 use lumbre_scene::{Camera, DynamicObject, Hidden, Mesh, Name, Transform};
 
@@ -119,6 +119,8 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("quality", BakeOptions { quality: Quality::Draft, ..default }),
         ("gap", BakeOptions { gap: 4, ..default }),
         ("seed", BakeOptions { seed: 1, ..default }),
+        ("form factors", BakeOptions { form_factors: FormFactorMethod::GlobalLines, ..default }),
+        ("resolution error", BakeOptions { resolution_error: false, ..default }),
         ("solver", BakeOptions { solver: Solver::Jacobi, ..default }),
         ("denoise", BakeOptions { denoise: false, ..default }),
         ("memory", BakeOptions { memory: Some(1 << 30), ..default }),

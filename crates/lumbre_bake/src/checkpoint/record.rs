@@ -1,8 +1,9 @@
 //! Values as little-endian bytes. Not the file that they are written to.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
+use crate::texels::resolution_error::DensePoint;
 use crate::transport::direct::{Direct, Seen};
 use crate::transport::form_factors::Cast;
 
@@ -86,7 +87,7 @@ fields!(Seen { partly: bool, signature: u32 });
 fields!(Gathered {
     sums: [Vec3; SCRAMBLES],
     weights: [Weights; SCRAMBLES],
-    patch_errors: f32,
+    patch_errors: Vec2,
     checks: u32,
     differences: Vec3,
     squared_differences: f32,
@@ -95,7 +96,18 @@ fields!(Gathered {
     rays: u64,
 });
 fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
-fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: u32 });
+fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: [u32; 2] });
+
+fields!(DensePoint {
+    triangle: u32,
+    at: (f32, f32),
+    counts: bool,
+    direct: [Vec3; 2],
+    indirect: [Vec3; 2],
+    checks: u32,
+    differences: Vec3,
+    rays: u64,
+});
 
 impl Record for bool {
     const LEAST: usize = 1;
@@ -110,6 +122,18 @@ impl Record for bool {
             1 => Some(true),
             _ => None,
         }
+    }
+}
+
+impl Record for Vec2 {
+    const LEAST: usize = 8;
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.to_array().iter().for_each(|value| value.write(out));
+    }
+
+    fn read(from: &mut Cursor<'_>) -> Option<Self> {
+        Some(Self::new(Record::read(from)?, Record::read(from)?))
     }
 }
 
@@ -177,7 +201,8 @@ mod tests {
             rays: 7,
             seen: Seen { partly: true, signature: 0xdead_beef },
         };
-        let cast = Cast { met: [vec![(1, 2), (3, 4)], vec![]], inside: [5, 6], missed: [7, 8], count: 9 };
+        let cast =
+            Cast { met: [vec![(1, 2), (3, 4)], vec![]], inside: [5, 6], missed: [7, 8], count: [9, 10] };
         let mut bytes = Vec::new();
         direct.write(&mut bytes);
         assert_eq!(bytes.len(), Direct::LEAST);

@@ -2,6 +2,7 @@
 //! Not the World: it is read once, before, and written once, after.
 
 mod collect;
+pub(crate) mod crossings;
 mod duplicates;
 mod hidden_side;
 mod leaks;

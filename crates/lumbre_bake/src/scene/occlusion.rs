@@ -29,7 +29,7 @@ pub(crate) enum SurfaceHit {
 }
 
 /// Two hits nearer to each other than this share of their distance and coordinates are in one place.
-const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
+pub(super) const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
 
 impl BakeScene {
     /// The first thing on a ray with a direction of unit length. Counts it among the leaks if it ended where none should.
@@ -104,7 +104,7 @@ impl BakeScene {
         }
     }
 
-    fn is_solid(&self, index: u32, u: f32, v: f32) -> bool {
+    pub(super) fn is_solid(&self, index: u32, u: f32, v: f32) -> bool {
         let triangle = &self.triangles[index as usize];
         self.surfaces[triangle.surface as usize].stops_light(triangle.vertices, [1.0 - u - v, u, v])
     }

@@ -5,6 +5,7 @@
 //!            + final gather: spread of four scrambles, after smoothing
 //!            + smoothing:    half of the scrambles smoothed against the other half raw, over the neighbourhood
 //!            + form factors: half the difference of two half solutions, gathered by the texel's own rays
+//!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
 //!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
 //!            + solver:       residual / (1 - rho) of the light by bounces
 //! ```
@@ -37,16 +38,30 @@ const SPREAD_STEPS: i64 = 2;
 const SPREAD_STEP: i64 = 3;
 
 /// Variance of every texel's mean, mean of the channels. Four scrambles alone tell it badly: in one case of seven the mean is further than
-/// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts.
+/// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts,
+/// with one standard error of the neighbours' mean, since rays end where it is small by chance.
 pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimates: &[Estimates]) -> Vec<f32> {
     let own: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum() / 3.0).collect();
+    // The scrambles of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
+    let halves: Vec<f32> = estimates
+        .iter()
+        .map(|[a, b, c, d]| {
+            let apart = 0.25 * (*a + *b - *c - *d);
+            (apart * apart).element_sum() / 3.0
+        })
+        .collect();
     let around = |texel: &Texel| {
-        let (mut sum, mut count) = (0.0, 0u32);
+        let (mut sum, mut squares, mut of_halves, mut count) = (0.0, 0.0, 0.0, 0u32);
         surroundings.every(texel, SPREAD_STEPS, SPREAD_STEP).for_each(|(.., other)| {
             sum += own[other];
+            squares += own[other] * own[other];
+            of_halves += halves[other];
             count += 1;
         });
-        sum / count.max(1) as f32
+        let count = count.max(1) as f32;
+        let (mean, of_halves) = (sum / count, of_halves / count);
+        let by_chance = ((squares / count - mean * mean).max(0.0) / count).sqrt();
+        mean.max(of_halves) + by_chance
     };
     texels.par_iter().zip(&own).map(|(texel, own)| own.max(around(texel))).collect()
 }
@@ -93,6 +108,18 @@ pub(crate) struct PatchBias {
     /// As `rest`, and below zero where chance alone would make more: of a single texel that says nothing, but the mean of many is right.
     pub expected: f32,
 }
+
+/// The same of one neighbourhood alone, its squares apart and perhaps negative.
+#[derive(Clone, Copy, Debug, Default)]
+struct Unsmoothed {
+    correction: Vec3,
+    unknown: f32,
+    later: f32,
+}
+
+/// Steps each way, and texels of a step, over which squares of what is unknown are put together.
+const WIDER_STEPS: i64 = 2;
+const WIDER_STEP: i64 = 4;
 
 /// Checks put together.
 #[derive(Clone, Copy, Default)]
@@ -158,17 +185,33 @@ pub(crate) fn patch_bias(
             checks.add(&gathered[other]);
         });
         if checks.count < 2.0 {
-            return PatchBias::default();
+            return Unsmoothed::default();
         }
         let of_map = of_maps[texel.object as usize] * checks.light / checks.count;
         let (beyond, known, by_chance) = checks.known(of_map);
         let correction = of_map + known * beyond;
         let square = |v: DVec3| (v.element_sum() / 3.0).powi(2);
         let unknown = (1.0 - known).powi(2) * square(beyond) - by_chance;
+        // What is taken away has come by chance in part.
+        let unknown = unknown + known * known * by_chance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
         let later = later * square(correction);
-        let (rest, expected) = ((unknown.max(0.0) + later) as f32, (unknown + later) as f32);
-        PatchBias { correction: correction.as_vec3(), rest, expected }
+        Unsmoothed { correction: correction.as_vec3(), unknown: unknown as f32, later: later as f32 }
     };
-    texels.par_iter().map(around).collect()
+    let alone: Vec<Unsmoothed> = texels.par_iter().map(around).collect();
+    // One neighbourhood's checks tell the square of what is unknown by a single sample, which may be as good as nothing: others' tell it too.
+    let wider = |(texel, own): (&Texel, &Unsmoothed)| {
+        let (mut sum, mut count) = (0.0, 0u32);
+        surroundings.every(texel, WIDER_STEPS, WIDER_STEP).for_each(|(.., other)| {
+            sum += alone[other].unknown;
+            count += 1;
+        });
+        let unknown = own.unknown.max(sum / count.max(1) as f32);
+        PatchBias {
+            correction: own.correction,
+            rest: unknown.max(0.0) + own.later,
+            expected: own.unknown + own.later,
+        }
+    };
+    texels.par_iter().zip(&alone).map(wider).collect()
 }

@@ -4,7 +4,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::footprint::{Texel, receiver};
 use super::tile_sequence::TileSequence;
@@ -31,8 +31,8 @@ pub(crate) struct Outgoing<'a> {
     pub patch_direct: &'a [Vec3],
     /// Per patch, irradiance by bounces and by the sky.
     pub patch_indirect: &'a [Vec3],
-    /// Per patch, the standard error of that.
-    pub patch_error: &'a [f32],
+    /// Per patch, the errors of that, with their signs: by the form factors' noise, and by the patches' size.
+    pub patch_error: &'a [Vec2],
     /// Hits nearer than this get a real bounce more, canonical units.
     pub near: f32,
     /// Where each patch's light comes from.
@@ -51,8 +51,8 @@ const NEAR_BOUNCES: u32 = 6;
 #[derive(Default)]
 struct Reading {
     light: Vec3,
-    /// What the form factors' errors leave in it.
-    error: f32,
+    /// What the patches' errors leave in it.
+    error: Vec2,
     /// Whether the patch that was read was checked, and by how much it is more than the real bounce.
     checked: bool,
     difference: Vec3,
@@ -116,7 +116,7 @@ pub(crate) struct Gathered {
     /// What tells how far their weights alone made them so.
     pub weights: [Weights; SCRAMBLES],
     /// Sum over all samples of what the patches' errors add.
-    pub patch_errors: f32,
+    pub patch_errors: Vec2,
     /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
     pub checks: u32,
     pub differences: Vec3,
@@ -173,7 +173,7 @@ impl Gathered {
 
     /// What the patches' errors add to the mean of the scrambles.
     pub fn patch_error(&self) -> f32 {
-        self.patch_errors / (self.samples.max(1) * SCRAMBLES as u32) as f32
+        self.patch_errors.length() / (self.samples.max(1) * SCRAMBLES as u32) as f32
     }
 }
 

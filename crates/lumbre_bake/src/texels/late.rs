@@ -1,6 +1,6 @@
 //! Texels for which there was no time: they show the patches' own solution, and say how little that is worth. Not the gather.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
@@ -33,7 +33,7 @@ pub(crate) fn from_patches(outgoing: &Outgoing<'_>, texels: &[Texel], gathered: 
         *own = Gathered {
             sums: [light; SCRAMBLES],
             samples: 1,
-            patch_errors: SCRAMBLES as f32 * (off * grey(light)) as f32,
+            patch_errors: Vec2::X * SCRAMBLES as f32 * (off * grey(light)) as f32,
             ..Gathered::default()
         };
     }

@@ -12,6 +12,7 @@ pub(crate) mod hidden;
 pub(crate) mod late;
 pub(crate) mod lighting;
 pub(crate) mod plane;
+pub(crate) mod resolution_error;
 pub(crate) mod rounds;
 pub(crate) mod seams;
 pub(crate) mod smooth;

@@ -25,7 +25,7 @@ impl TileSequence {
     /// `purpose` scrambles; every texel takes `run` points at first, and later as many again as it has.
     pub fn new(seed: u32, purpose: u32, texel: &Texel, run: u32) -> Self {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
-        let tile = (texel.y / SIDE) << 10 | texel.x / SIDE;
+        let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
         let sequence = Sequence::new(seed, purpose, tile).of(texel.object);
         Self { sequence, place: morton(texel.x % SIDE, texel.y % SIDE), run: run.max(1) }
     }
@@ -49,8 +49,8 @@ impl TileSequence {
 
 /// Bits of two numbers below 8, interleaved.
 fn morton(x: u32, y: u32) -> u32 {
-    let spread = |v: u32| (v & 1) | (v & 2) << 1 | (v & 4) << 2;
-    spread(x) | spread(y) << 1
+    let spread = |v: u32| (v & 1) | ((v & 2) << 1) | ((v & 4) << 2);
+    spread(x) | (spread(y) << 1)
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! The exchange of light between patches: cuts the scene, samples form factors, finds the patches' direct light, solves
 //! each channel. Not the texels.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::coarser::size_error;
 use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
 use super::guide::Guide;
@@ -24,8 +25,9 @@ pub(crate) struct Exchange {
     pub direct: Vec<Vec3>,
     /// Irradiance by bounces, and by the sky, of each patch.
     pub indirect: Vec<Vec3>,
-    /// Standard error of that, with its sign: one sample of how the form factors' noise spreads. Mean of the channels.
-    pub indirect_error: Vec<f32>,
+    /// Errors of that, with their signs: a sample of how the form factors' noise spreads, and what the patches' size leaves. Mean of the
+    /// channels.
+    pub indirect_error: Vec<Vec2>,
     /// Below this distance patches are too coarse to read, canonical units.
     pub near: f32,
     /// Where each patch's light by bounces comes from.
@@ -62,10 +64,11 @@ impl Exchange {
             report.skipped.push(skipped.into());
             return Ok(sources.has_sky().then(|| Self::black(scene, patches, side)));
         }
-        let (factors, halves) =
-            FormFactors::sample(scene, &patches, plan.form_factor_rays, options.seed, watch)?;
+        let (method, rays) = (options.form_factors, plan.form_factor_rays);
+        let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, watch)?;
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
+        report.exact_form_factors = 2 * factors.exact;
         report.energy_lost = factors.energy_lost;
 
         watch.stage("radiosity", report)?;
@@ -94,8 +97,13 @@ impl Exchange {
         let sky_halves = halves.each_ref().map(&sky);
         let sky = sky(&factors);
         let indirect = solve(options.solver, &factors, &patches.list, &direct, &sky, report);
-        let indirect_error =
-            solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list);
+        let noise = solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list);
+        let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
+        let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
+        let first: Vec<f64> = direct.iter().zip(&sky).map(|(direct, sky)| grey(*direct + *sky)).collect();
+        let light = (reflectance.as_slice(), first.as_slice());
+        let of_size = size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE));
+        let indirect_error = noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
         let leaves = |(index, patch): (usize, &Patch)| {
             (patch.reflectance * (direct[index] + indirect[index])).element_sum()
         };
@@ -110,13 +118,14 @@ impl Exchange {
     fn black(scene: &BakeScene, patches: Patches, side: f32) -> Self {
         let none = vec![Vec3::ZERO; patches.list.len()];
         let zeros = vec![0.0; patches.list.len()];
+        let exact = vec![Vec2::ZERO; patches.list.len()];
         let guide = Guide::new(scene, &patches, side, &FormFactors::none(&patches), &zeros, &none);
-        Self { direct: none.clone(), indirect: none, indirect_error: zeros, near: 2.0 * side, patches, guide }
+        Self { direct: none.clone(), indirect: none, indirect_error: exact, near: 2.0 * side, patches, guide }
     }
 }
 
 /// Direct irradiance of a patch. What other geometry covers receives nothing: the rest has it all.
-fn patch_direct(
+pub(super) fn patch_direct(
     scene: &BakeScene,
     sources: &Sources<'_>,
     patches: &Patches,

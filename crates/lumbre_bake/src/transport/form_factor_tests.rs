@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::Material;
 
-use super::form_factors::FormFactors;
+use super::form_factors::{FormFactorMethod, FormFactors};
 use super::patches::Patches;
 use crate::progress::{Progress, Watch};
 use crate::scene::{BakeScene, Canonical, Object, Part, lay_out};
@@ -52,29 +52,42 @@ fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
     BakeScene::new(&objects, &layout, space, &mut Vec::new()).unwrap()
 }
 
+const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];
+
 /// F from the first object to the second, and the rays behind it.
-fn factor(objects: &[&[[Vec3; 3]]], side: f32) -> (f64, f64) {
+fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64, f64) {
     let scene = scene(objects);
     let patches = Patches::new(&scene, side * scene.space.scale as f32);
     let mut carry_on = carry_on;
     let watch = &mut Watch::new(&mut carry_on, None);
-    let (factors, _) = FormFactors::sample(&scene, &patches, 200_000, 7, watch).unwrap();
+    let (factors, _) = FormFactors::sample(&scene, &patches, method, 200_000, 7, watch).unwrap();
     let object = |patch: usize| scene.triangles[patches.list[patch].triangle as usize].object;
     let (mut exchange, mut area) = (0.0, 0.0);
     for i in (0..factors.len()).filter(|&i| object(i) == 0) {
         area += f64::from(factors.areas[i]);
         exchange += factors.row(i).filter(|&(j, _)| object(j) == 1).map(|(_, g)| g).sum::<f64>();
     }
-    (exchange / area, factors.rays as f64)
+    let rays = match method {
+        FormFactorMethod::CosineRays => factors.rays as f64,
+        // Of all lines through the bounding sphere 2A / A_sphere cross the first object.
+        FormFactorMethod::GlobalLines => {
+            let corners: Vec<Vec3> = scene.triangles.iter().flat_map(|triangle| triangle.corners).collect();
+            let low = corners.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+            let high = corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+            let reach = corners.iter().map(|&c| (c - 0.5 * (low + high)).length()).fold(0.0, f32::max);
+            factors.rays as f64 * 2.0 * area / (4.0 * std::f64::consts::PI * f64::from(reach * reach))
+        }
+    };
+    (exchange / area, rays)
 }
 
 fn check(name: &str, objects: &[&[[Vec3; 3]]], expected: f64) {
-    for side in [4.0, 0.4] {
-        let (found, rays) = factor(objects, side);
+    for (side, method) in [4.0, 0.4].into_iter().flat_map(|side| METHODS.map(|method| (side, method))) {
+        let (found, rays) = factor(objects, side, method);
         let sigma = (expected * (1.0 - expected) / rays).sqrt();
         assert!(
             (found - expected).abs() < 5.0 * sigma,
-            "{name}, patches of {side}: {found} instead of {expected}"
+            "{name}, patches of {side}, {method:?}: {found} instead of {expected}"
         );
     }
 }
@@ -117,7 +130,9 @@ fn a_blocker_blocks() {
     let lower = square([0.0; 3], Vec3::Z, Vec3::X);
     let upper = square([0.0, 1.0, 0.0], Vec3::X, Vec3::Z);
     let blocker = square([-9.0, 0.5, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
-    assert_eq!(factor(&[&lower, &upper, &blocker], 0.4).0, 0.0);
+    for method in METHODS {
+        assert_eq!(factor(&[&lower, &upper, &blocker], 0.4, method).0, 0.0);
+    }
 }
 
 /// A cube seen from inside: turned faces of `cuboid`.
@@ -128,21 +143,75 @@ fn room() -> Vec<[Vec3; 3]> {
 
 #[test]
 fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
+    for method in METHODS {
+        let scene = scene(&[&room()]);
+        let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
+        let mut carry_on = carry_on;
+        let watch = &mut Watch::new(&mut carry_on, None);
+        let (factors, _) = FormFactors::sample(&scene, &patches, method, 100_000, 3, watch).unwrap();
+        for i in 0..factors.len() {
+            // Twelve rounds of scaling leave what f32 and their own convergence leave.
+            assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "{method:?} row {i}: {}", factors.row_sum(i));
+            assert!(factors.row_sum(i) <= 1.0 + 1e-6);
+            for (j, g) in factors.row(i) {
+                let back = factors.row(j).find(|&(k, _)| k == i).map(|(_, g)| g);
+                assert_eq!(back, Some(g), "A_i F_ij = A_j F_ji");
+            }
+        }
+        assert!(factors.energy_lost < 2e-3, "{method:?}: {}", factors.energy_lost);
+    }
+}
+
+#[test]
+fn pairs_that_share_an_edge_are_exact_in_both_halves() {
     let scene = scene(&[&room()]);
     let patches = Patches::new(&scene, 0.25 * scene.space.scale as f32);
-    let mut carry_on = carry_on;
-    let watch = &mut Watch::new(&mut carry_on, None);
-    let (factors, _) = FormFactors::sample(&scene, &patches, 100_000, 3, watch).unwrap();
-    for i in 0..factors.len() {
-        // Twelve rounds of scaling leave what f32 and their own convergence leave.
-        assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "row {i}: {}", factors.row_sum(i));
-        assert!(factors.row_sum(i) <= 1.0 + 1e-6);
-        for (j, g) in factors.row(i) {
-            let back = factors.row(j).find(|&(k, _)| k == i).map(|(_, g)| g);
-            assert_eq!(back, Some(g), "A_i F_ij = A_j F_ji");
+    let corners: Vec<[DVec3; 3]> =
+        patches.list.iter().map(|p| patches.corners(&scene, p).map(|corner| corner.as_dvec3())).collect();
+    for method in METHODS {
+        let mut carry_on = carry_on;
+        let watch = &mut Watch::new(&mut carry_on, None);
+        let (factors, halves) = FormFactors::sample(&scene, &patches, method, 50_000, 3, watch).unwrap();
+        let mut checked = 0;
+        for i in 0..factors.len() {
+            for (j, g) in factors.row(i) {
+                let shared = corners[i].iter().filter(|corner| corners[j].contains(corner)).count();
+                let expected = super::lambert_integral::triangle_to_triangle(&corners[i], &corners[j]);
+                if shared < 2 || expected < 0.05 {
+                    continue;
+                }
+                checked += 1;
+                let area = f64::from(patches.list[i].area);
+                // Some 200 rays would leave .02.
+                assert!((g / area - expected).abs() < 1e-4, "{method:?} {i} {j}: {} {expected}", g / area);
+                for half in &halves {
+                    assert_eq!(half.row(i).find(|&(k, _)| k == j).map(|(_, g)| g), Some(g));
+                }
+            }
         }
+        assert!(checked > 50, "{checked}");
+        assert_eq!(
+            factors.row(0).map(|(_, g)| g).sum::<f64>(),
+            factors.row_sum(0) * f64::from(factors.areas[0])
+        );
     }
-    assert!(factors.energy_lost < 2e-3, "{}", factors.energy_lost);
+}
+
+#[test]
+fn what_stands_between_near_patches_counts() {
+    let lower = square([0.0; 3], Vec3::Z, Vec3::X);
+    let upper = square([0.0, 0.1, 0.0], Vec3::X, Vec3::Z);
+    let all = square([-9.0, 0.05, -9.0], Vec3::X * 20.0, Vec3::Z * 20.0);
+    // Over x < .5, so low that it parts both squares in two: .8 by half, with what passes the rim.
+    let half = square([-9.0, 0.05, -9.0], Vec3::X * 9.5, Vec3::Z * 20.0);
+    for method in METHODS {
+        assert_eq!(factor(&[&lower, &upper, &all], 0.1, method).0, 0.0);
+        let [fine, coarse] = [0.1, 4.0].map(|side| factor(&[&lower, &upper, &half], side, method));
+        let sigma = |(found, rays): (f64, f64)| (found * (1.0 - found) / rays).sqrt();
+        let apart = (fine.0 - coarse.0).abs();
+        assert!(apart < 5.0 * sigma(fine).hypot(sigma(coarse)), "{method:?}: {fine:?} {coarse:?}");
+        assert!(fine.0 > 0.35 && fine.0 < 0.5, "{fine:?}");
+    }
 }
 
 #[test]
@@ -151,7 +220,7 @@ fn agrees_with_the_contour_integral_where_nothing_blocks() {
     let one = [[Vec3::ZERO, Vec3::new(0.3, 0.1, 1.0), Vec3::new(1.0, 0.0, 0.2)]];
     let two = [[Vec3::new(0.2, 0.9, 0.1), Vec3::new(1.1, 1.3, 0.2), Vec3::new(0.4, 0.8, 0.9)]];
     let f64s = |t: [Vec3; 3]| t.map(|p| p.as_dvec3());
-    let expected = super::contour::triangle_to_triangle(&f64s(one[0]), &f64s(two[0]));
+    let expected = super::lambert_integral::triangle_to_triangle(&f64s(one[0]), &f64s(two[0]));
     assert!(expected > 0.01, "the triangles must face each other: {expected}");
     check("skew triangles", &[&one, &two], expected);
 }

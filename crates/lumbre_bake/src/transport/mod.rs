@@ -2,19 +2,27 @@
 //! Not the texels that show it.
 
 pub(crate) mod box_tree;
+mod coarser;
 pub(crate) mod components;
 pub(crate) mod contacts;
-#[cfg(test)]
 mod contour;
+mod cosine_rays;
 pub(crate) mod cuts;
 pub(crate) mod direct;
 pub(crate) mod emitter_tree;
 pub(crate) mod emitters;
 pub(crate) mod exchange;
 #[cfg(test)]
+mod exchange_tests;
+#[cfg(test)]
 mod form_factor_tests;
 pub(crate) mod form_factors;
+mod global_lines;
 pub(crate) mod guide;
+#[cfg(test)]
+mod lambert_integral;
+pub(crate) mod method_study;
+mod near_pairs;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;

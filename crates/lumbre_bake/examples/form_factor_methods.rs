@@ -1,0 +1,54 @@
+//! Cosine rays against global lines: `form_factor_methods IN.glb [--draft] [--converged RAYS]` prints the error of the form factors and
+//! of the patches' light by bounces, by rays and by time, against converged ones.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use bevy_ecs::world::World;
+use lumbre_bake::{BakeOptions, Density, Quality, form_factor_errors};
+
+#[path = "../tests/held_out/random.rs"]
+mod random;
+#[path = "../tests/held_out/scenes.rs"]
+mod scenes;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut options = BakeOptions { density: Density::MapSize(64), ..BakeOptions::default() };
+    let (mut paths, mut converged) = (Vec::new(), 50_000_000);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
+        match argument.as_str() {
+            "--draft" => options.quality = Quality::Draft,
+            "--seed" => options.seed = value()?.parse()?,
+            "--converged" => converged = value()?.parse()?,
+            _ => paths.push(PathBuf::from(&argument)),
+        }
+    }
+    let [input] = &paths[..] else {
+        return Err("give an input file, or the name of a held-out scene".into());
+    };
+    let held_out = scenes::all().into_iter().find(|(name, ..)| input.as_os_str() == *name);
+    let mut world = match held_out {
+        Some((_, scene, layout)) => scene(layout, 1.0),
+        None => {
+            let mut world = World::new();
+            lumbre_scene::load(&mut world, input)?;
+            world
+        }
+    };
+    let rays = [100_000, 400_000, 1_500_000, 6_000_000];
+    println!("{}", input.display());
+    println!("{:>12} {:>12} {:>9} {:>10} {:>10}", "method", "rays", "seconds", "exchange", "irradiance");
+    for row in form_factor_errors(&mut world, &options, &rays, converged)? {
+        println!(
+            "{:>12} {:>12} {:>9.3} {:>8.2} % {:>8.3} %",
+            format!("{:?}", row.method),
+            row.rays,
+            row.seconds,
+            100.0 * row.exchange,
+            100.0 * row.irradiance
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,96 @@
+//! What the patches' size leaves in their light: the same system with patches twice as large, each the sum of those that it is made of, no
+//! ray more. The mean light of constant elements converges with the square of their size (as in Galerkin's method; Troutman and Max,
+//! "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993): by Richardson's extrapolation a third of what differs between the
+//! two is what the finer one is still off by. Not the noise of form factors: that is told by two halves of the rays.
+
+use rayon::prelude::*;
+
+use super::form_factors::FormFactors;
+use super::patches::Patches;
+use super::solver::{Solver, gather};
+use crate::scene::BakeScene;
+
+/// Times larger.
+const COARSER: f32 = 2.0;
+/// Of the difference between both, the part that the finer one is off by: 1 / (2² - 1).
+const LEFT: f64 = 1.0 / 3.0;
+
+/// The error, with its sign, of each patch's irradiance by bounces, for grey reflectances, and light that direct light and the sky have
+/// brought (`first`, W/m²); `side` is the patches' own.
+pub(super) fn size_error(
+    scene: &BakeScene,
+    patches: &Patches,
+    side: f32,
+    factors: &FormFactors,
+    (reflectance, first): (&[f64], &[f64]),
+    (solver, tolerance): (Solver, f64),
+) -> Vec<f32> {
+    let larger = Patches::new(scene, COARSER * side);
+    let count = larger.list.len();
+    let within: Vec<usize> = patches
+        .list
+        .iter()
+        .map(|patch| {
+            let middle = patches.point(patch, (1.0 / 3.0, 1.0 / 3.0));
+            larger.at(patch.triangle, patch.side, middle).unwrap_or(0) as usize
+        })
+        .collect();
+    let emission: Vec<f64> = reflectance.iter().zip(first).map(|(rho, light)| rho * light).collect();
+    let fine = gather(factors, &solver.solve(factors, reflectance, &emission, tolerance).radiosity);
+    // Means by area.
+    let areas: Vec<f64> = factors.areas.iter().map(|&area| f64::from(area)).collect();
+    let summed = |of: &dyn Fn(usize) -> f64| {
+        let mut sums = vec![0.0; count];
+        for (patch, &large) in within.iter().enumerate() {
+            sums[large] += areas[patch] * of(patch);
+        }
+        sums
+    };
+    let total = summed(&|_| 1.0);
+    let mean = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let over_area = |(sum, area): (f64, &f64)| if *area > 0.0 { sum / area } else { 0.0 };
+        summed(of).into_iter().zip(&total).map(over_area).collect()
+    };
+    let coarse = merged(factors, &within, &total);
+    let solution = solver.solve(&coarse, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
+    let found = gather(&coarse, &solution.radiosity);
+    let expected = mean(&|i| fine[i]);
+    within.iter().map(|&large| (LEFT * (found[large] - expected[large])) as f32).collect()
+}
+
+/// The exchange between sums of patches.
+fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors {
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); areas.len()];
+    for (patch, &large) in within.iter().enumerate() {
+        members[large].push(patch);
+    }
+    let rows: Vec<Vec<(u32, f32)>> = members
+        .par_iter()
+        .map_init(
+            || vec![0.0f64; areas.len()],
+            |exchange, members| {
+                let mut touched = Vec::new();
+                for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
+                    let large = within[other];
+                    if exchange[large] == 0.0 && g > 0.0 {
+                        touched.push(large as u32);
+                    }
+                    exchange[large] += g;
+                }
+                touched.sort_unstable();
+                let entry = |large: u32| (large, std::mem::take(&mut exchange[large as usize]) as f32);
+                touched.into_iter().map(entry).collect()
+            },
+        )
+        .collect();
+    let mut coarse = FormFactors { starts: vec![0], ..FormFactors::default() };
+    for row in rows {
+        for (large, g) in row {
+            coarse.columns.push(large);
+            coarse.exchange.push(g);
+        }
+        coarse.starts.push(coarse.columns.len());
+    }
+    coarse.areas = areas.iter().map(|&area| area.max(f64::from(f32::MIN_POSITIVE)) as f32).collect();
+    coarse
+}

@@ -1,0 +1,97 @@
+//! The exchange as a whole: solvers against each other, and both ways to count form factors against each other.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+
+use super::direct::Sources;
+use super::exchange::Exchange;
+use super::form_factors::FormFactorMethod;
+use super::method_study::form_factor_errors;
+use super::solver::Solver;
+use crate::memory::Plan;
+use crate::progress::Watch;
+use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::{BakeOptions, BakeReport, Density, Quality};
+
+const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
+
+/// Measured data beside the checkout; `None`, loudly, where it is missing.
+fn model(name: &str) -> Option<World> {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")).join(name);
+    if !path.exists() {
+        eprintln!("SKIPPED: {} is missing; nothing was compared", path.display());
+        return None;
+    }
+    let mut world = World::new();
+    lumbre_scene::load(&mut world, &path).unwrap();
+    Some(world)
+}
+
+/// The light by bounces of all patches, and what the report says of the solver.
+fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
+    let options = BakeOptions {
+        density: Density::MapSize(16),
+        quality: Quality::Draft,
+        solver,
+        ..BakeOptions::default()
+    };
+    let objects = collect(world).unwrap();
+    let points =
+        objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+    let space = Canonical::of(points);
+    let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
+    let scene = BakeScene::new(&objects, &layout, space, &mut Vec::new()).unwrap();
+    let sources = Sources::new(&scene, lights(world), sky(world));
+    let mut carry_on = |_| ControlFlow::Continue(());
+    let mut watch = Watch::new(&mut carry_on, None);
+    let mut report = BakeReport::default();
+    let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+    let plan = Plan { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
+    let exchange = Exchange::new(&scene, &sources, &options, &plan, &mut watch, &mut report).unwrap();
+    (exchange.expect("light bounces").indirect, report)
+}
+
+#[test]
+fn solvers_agree_on_cornell_and_alcove() {
+    for name in MODELS {
+        let Some(mut world) = model(name) else { continue };
+        let solvers = [Solver::ConjugateGradients, Solver::GaussSeidel, Solver::Jacobi];
+        let found = solvers.map(|solver| solved(&mut world, solver));
+        let (expected, first) = &found[0];
+        let largest = expected.iter().map(|light| light.max_element()).fold(0.0, f32::max);
+        assert!(largest > 0.0 && first.residual > 0.0, "{name}");
+        for ((light, report), solver) in found.iter().zip(solvers) {
+            // Both solutions are off by the residual over 1 - ρ, as a norm; a single patch by what that is of its own.
+            let bound = (100.0 * (first.residual_bound + report.residual_bound)) as f32;
+            for (a, b) in light.iter().zip(expected) {
+                assert!((*a - *b).abs().max_element() <= bound * largest, "{name} {solver:?}: {a} {b}");
+            }
+            assert!(report.residual <= 1e-5 && report.residual_bound < 1e-3, "{name} {solver:?}: {report:?}");
+            assert!(report.iterations.iter().all(|&n| n > 0), "{name} {solver:?}");
+        }
+        // Reading what the same sweep has found is never slower.
+        let [_, seidel, jacobi] = found.each_ref().map(|(_, report)| report.iterations[0]);
+        assert!(seidel < jacobi, "{name}: {seidel} {jacobi}");
+    }
+}
+
+#[test]
+fn cosine_rays_and_global_lines_converge_to_the_same() {
+    for name in MODELS {
+        let Some(mut world) = model(name) else { continue };
+        let options =
+            BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() };
+        let rows = form_factor_errors(&mut world, &options, &[150_000, 2_400_000], 4_000_000).unwrap();
+        for method in [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines] {
+            let own: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
+            println!("{name} {own:?}");
+            // Against the mean of both: sixteen times the rays, a quarter of the noise, but for what the references have themselves.
+            let rays = own[1].rays as f64 / own[0].rays as f64;
+            let gain = own[0].irradiance / own[1].irradiance;
+            assert!(gain > 0.55 * rays.sqrt(), "{name} {method:?}: {gain} by {rays} times the rays: {own:?}");
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What form factors cost and what is left of their error, by method and number of rays, against converged ones. Not a bake.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+
+use super::direct::Sources;
+use super::exchange::patch_direct;
+use super::form_factors::{FormFactorMethod, FormFactors};
+use super::patches::Patches;
+use super::solver::{Solver, gather};
+use crate::progress::Watch;
+use crate::sampling::Sequence;
+use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::{BakeError, BakeOptions};
+
+/// The two methods.
+const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];
+
+/// How good the form factors of one method are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FormFactorErrors {
+    /// How they were counted.
+    pub method: FormFactorMethod,
+    /// Rays or lines cast.
+    pub rays: u64,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Relative error of the matrix of exchange areas, in the Frobenius norm.
+    pub exchange: f64,
+    /// RMSE of the patches' irradiance by bounces and by the sky, by area, relative to its mean.
+    pub irradiance: f64,
+}
+
+/// The form factors of a world's static objects by both methods with so many rays each, against those of both with `converged` rays.
+/// Patches are as many as `options.quality` asks for.
+///
+/// # Errors
+/// [`BakeError`], as of a bake.
+pub fn form_factor_errors(
+    world: &mut World,
+    options: &BakeOptions,
+    rays: &[usize],
+    converged: usize,
+) -> Result<Vec<FormFactorErrors>, BakeError> {
+    options.check()?;
+    let objects = collect(world)?;
+    let points =
+        objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+    let space = Canonical::of(points);
+    let mut warnings = Vec::new();
+    let layout = lay_out(&objects, space, options, &mut warnings)?;
+    let scene = BakeScene::new(&objects, &layout, space, &mut warnings)?;
+    let sources = Sources::new(&scene, lights(world), sky(world));
+    let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+    let patches = Patches::new(&scene, (2.0 * area / options.quality.effort().patches as f32).sqrt());
+    let mut carry_on = |_| ControlFlow::Continue(());
+    let mut watch = Watch::new(&mut carry_on, None);
+    let mut sample = |method, rays, seed| {
+        let begun = Instant::now();
+        let (factors, _) = FormFactors::sample(&scene, &patches, method, rays, seed, &mut watch)?;
+        Ok::<_, BakeError>((factors, begun.elapsed().as_secs_f64()))
+    };
+    let mut references = Vec::new();
+    for method in METHODS {
+        let (factors, _) = sample(method, converged, options.seed.wrapping_add(1))?;
+        references.push(factors);
+    }
+    let direct: Vec<Vec3> = (0..patches.list.len())
+        .map(|index| {
+            let sequence = Sequence::new(options.seed, 5, index as u32);
+            patch_direct(&scene, &sources, &patches, index, references[0].open[index], sequence).0
+        })
+        .collect();
+    let irradiance = |factors: &FormFactors| solution(factors, &patches, &direct, sources.sky);
+    let expected: Vec<Vec<f64>> = references.iter().map(irradiance).collect();
+    let mut found = Vec::new();
+    for method in METHODS {
+        for &count in rays {
+            let (factors, seconds) = sample(method, count, options.seed)?;
+            let own = irradiance(&factors);
+            // The references' own errors are the same for all.
+            let mean = |of: &dyn Fn(usize) -> f64| (0.5 * (of(0).powi(2) + of(1).powi(2))).sqrt();
+            found.push(FormFactorErrors {
+                method,
+                rays: factors.rays,
+                seconds,
+                exchange: mean(&|at| exchange_apart(&factors, &references[at])),
+                irradiance: mean(&|at| irradiance_apart(&own, &expected[at], &references[at])),
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// Irradiance by bounces and by the sky of each patch, mean of the channels.
+fn solution(factors: &FormFactors, patches: &Patches, direct: &[Vec3], sky: Vec3) -> Vec<f64> {
+    let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
+    let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
+    let sky: Vec<f64> = factors.sky.iter().map(|&share| f64::from(share) * grey(sky)).collect();
+    let emission: Vec<f64> = (0..direct.len()).map(|i| reflectance[i] * (grey(direct[i]) + sky[i])).collect();
+    let solved = Solver::default().solve(factors, &reflectance, &emission, 1e-8);
+    gather(factors, &solved.radiosity).iter().zip(sky).map(|(bounced, sky)| bounced + sky).collect()
+}
+
+/// |G - G*| / |G*|, over all entries of either.
+fn exchange_apart(found: &FormFactors, expected: &FormFactors) -> f64 {
+    let (mut apart, mut all) = (0.0, 0.0);
+    for i in 0..expected.len() {
+        let mut own = found.row(i).peekable();
+        for (j, g) in expected.row(i) {
+            while let Some((_, other)) = own.next_if(|&(k, _)| k < j) {
+                apart += other * other;
+            }
+            let other = own.next_if(|&(k, _)| k == j).map_or(0.0, |(_, other)| other);
+            apart += (other - g).powi(2);
+            all += g * g;
+        }
+        apart += own.map(|(_, other)| other * other).sum::<f64>();
+    }
+    if all > 0.0 { (apart / all).sqrt() } else { 0.0 }
+}
+
+fn irradiance_apart(found: &[f64], expected: &[f64], factors: &FormFactors) -> f64 {
+    let (mut apart, mut all, mut area) = (0.0, 0.0, 0.0);
+    for ((found, expected), &own) in found.iter().zip(expected).zip(&factors.areas) {
+        let own = f64::from(own);
+        apart += own * (found - expected).powi(2);
+        all += own * expected;
+        area += own;
+    }
+    if all > 0.0 { (apart / area).sqrt() * area / all } else { 0.0 }
+}
