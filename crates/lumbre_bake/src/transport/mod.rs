@@ -14,4 +14,5 @@ pub(crate) mod guide;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;
+mod share_variance;
 pub(crate) mod solver;
