@@ -27,7 +27,8 @@ mod tests {
 
     /// Of many scrambles, the mean squared error of the share that a chord cuts off the disc, and the mean of what is stated for it.
     fn of_chord(height: f32, samples: u32) -> (f64, f64, usize) {
-        let exact = f64::from((height.acos() - height * (1.0 - height * height).sqrt()) / std::f32::consts::PI);
+        let exact =
+            f64::from((height.acos() - height * (1.0 - height * height).sqrt()) / std::f32::consts::PI);
         let (mut squares, mut stated, mut none) = (0.0, 0.0, 0);
         const SCRAMBLES: u32 = 2000;
         for scramble in 0..SCRAMBLES {
@@ -55,11 +56,16 @@ mod tests {
         for height in [0.0, 0.3, 0.7] {
             for samples in [16, 64, 256, 1024] {
                 let (squared, stated, none) = of_chord(height, samples);
-                println!("{height} {samples}: error {squared:.2e}, stated {stated:.2e}, runs that agree {none}");
+                println!(
+                    "{height} {samples}: error {squared:.2e}, stated {stated:.2e}, runs that agree {none}"
+                );
                 without += none;
                 // What is stated is no less than what is there, and no wild exaggeration: four runs and their double counting bring
                 // it to some times as much.
-                assert!(stated > squared && stated < 8.0 * squared, "{height} {samples}: {squared:e} {stated:e}");
+                assert!(
+                    stated > squared && stated < 8.0 * squared,
+                    "{height} {samples}: {squared:e} {stated:e}"
+                );
             }
         }
         assert!(without > 100, "runs agree by chance: {without} of them");
