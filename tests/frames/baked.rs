@@ -2,11 +2,14 @@
 
 use std::ops::ControlFlow;
 
+use std::sync::Arc;
+
 use bevy_ecs::prelude::*;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, Density, Quality, bake};
+use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
-use lumbre_scene::{Lightmap, default_camera};
+use lumbre_scene::{Lightmap, LightmapImage, PackedFormat, SaveOptions, default_camera, load, save_with};
 use lumbre_tests::compare::compare;
 use lumbre_tests::shared_files::shared_file;
 use lumbre_tests::twin::{self, TwinOptions};
@@ -90,7 +93,7 @@ fn colour_bleeds_and_nothing_inside_is_black() {
 
 #[test]
 fn static_lights_of_a_baked_level_are_not_counted_twice() {
-    use lumbre_optics::{BakeMode, Light, Material};
+    use lumbre_optics::{BakeMode, Light};
     use lumbre_scene::{Camera, Mesh, StaticObject, Transform};
     let mut world = World::new();
     let floor = std::sync::Arc::new(lumbre_mesh::shapes::cuboid(glam::Vec3::new(4.0, 0.2, 4.0), 1));
@@ -111,4 +114,61 @@ fn static_lights_of_a_baked_level_are_not_counted_twice() {
     // One lamp over a convex floor: no bounce, so baked and shaded light are the same but for the texels' width (1/8 m at 1.9 m under
     // the lamp: the inverse square and the cosine change by under 1 % over it) and sampling.
     assert!((baked / shaded - 1.0).abs() < 0.02, "shaded {shaded}, baked {baked}");
+}
+
+/// Replaces every texel, each map once.
+fn change_texels(world: &mut World, change: impl Fn(Vec3) -> Vec3) {
+    let mut lightmaps = world.query::<&mut Lightmap>();
+    for mut lightmap in lightmaps.iter_mut(world) {
+        let texels = lightmap.image.texels.iter().map(|texel| change(*texel)).collect();
+        lightmap.image = Arc::new(LightmapImage { texels, ..(*lightmap.image).clone() });
+    }
+}
+
+#[test]
+fn a_room_from_ktx2_differs_from_the_one_from_open_exr_by_the_encoding_and_no_more() {
+    let Some(mut world) = baked_cornell_box() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.gltf");
+    for format in PackedFormat::ALL {
+        save_with(&mut world, &path, &SaveOptions { ktx2: Some(format), ..SaveOptions::default() }).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let packed = path.with_file_name("packed.gltf");
+        std::fs::write(&packed, text.replace(".exr", ".ktx2")).unwrap();
+        let frame = |path: &std::path::Path, change: &dyn Fn(&mut World)| {
+            let mut world = World::new();
+            load(&mut world, path).unwrap();
+            change(&mut world);
+            let (pixels, report) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
+            assert!(report.plan.status("lightmap").unwrap().runs());
+            pixels
+        };
+        let (exr, ktx2) = (frame(&path, &|_| ()), frame(&packed, &|_| ()));
+        // A frame is linear in its lightmaps. So the frame of the texels' own bounds, in the place of their light, is the bound of every
+        // pixel: filtered and reflected as the light is. To the format's bound comes the half float of the other side, 2^-11 or 2^-25;
+        // and 1/1000 of both for the bound's own half float.
+        let bound = frame(&path, &|world| {
+            let halves = |texel: Vec3| (texel / 2048.0).max(Vec3::splat(2f32.powi(-25)));
+            change_texels(world, |texel| (format.largest_error(texel) + halves(texel)) * 1.001);
+            let mut materials = world.query::<&mut Material>();
+            materials.iter_mut(world).for_each(|mut material| material.front.emission = Vec3::ZERO);
+        });
+        let (mut largest, mut differ) = (0.0f64, 0);
+        for ((exr, ktx2), bound) in exr.iter().zip(&ktx2).zip(&bound) {
+            // And the frame's own f32: some roundings of the pixel.
+            let over = ((*exr - *ktx2).abs() / (*bound + exr.abs() * 1e-6 + 1e-12)).max_element();
+            assert!(over <= 1.0, "{format:?}: {exr} and {ktx2}, bound {bound}");
+            largest = largest.max(over);
+            differ += usize::from(exr != ktx2);
+        }
+        println!("{format:?}: {differ} pixels differ, by {largest:.3} of the bound at most");
+        // Negative control: it is another encoding, and the bound is no wild one.
+        assert!(differ > SIZE * SIZE / 4 && largest > 0.1, "{format:?}: {differ}, {largest}");
+        // And one code of the mantissa more would be seen.
+        let scaled = frame(&packed, &|world| change_texels(world, |texel| texel * (1.0 + 3.0 / 64.0)));
+        let seen = exr.iter().zip(&scaled).zip(&bound);
+        assert!(
+            seen.filter(|((a, b), bound)| (**a - **b).abs().cmpgt(**bound).any()).count() > SIZE * SIZE / 4
+        );
+    }
 }

@@ -84,3 +84,21 @@ impl fmt::Display for Outcome {
         }
     }
 }
+
+/// Lists cases under their row, and makes a test of each.
+#[macro_export]
+macro_rules! cases {
+    ($($row:literal { $($name:ident),+ $(,)? })+) => {
+        /// The cases of this file.
+        pub fn cases() -> Vec<$crate::case::Case> {
+            vec![$($($crate::case::Case { row: $row, name: stringify!($name), run: $name }),+),+]
+        }
+
+        mod tests {
+            $($(#[test]
+            fn $name() {
+                $crate::case::Case { row: $row, name: stringify!($name), run: super::$name }.check();
+            })+)+
+        }
+    };
+}

@@ -18,26 +18,9 @@ mod overflow;
 mod places;
 mod probe;
 mod spots;
+mod table;
 
-use case::{Case, HEADING};
-
-/// Lists cases under their row, and makes a test of each.
-#[macro_export]
-macro_rules! cases {
-    ($($row:literal { $($name:ident),+ $(,)? })+) => {
-        /// The cases of this file.
-        pub fn cases() -> Vec<$crate::case::Case> {
-            vec![$($($crate::case::Case { row: $row, name: stringify!($name), run: $name }),+),+]
-        }
-
-        mod tests {
-            $($(#[test]
-            fn $name() {
-                $crate::case::Case { row: $row, name: stringify!($name), run: super::$name }.check();
-            })+)+
-        }
-    };
-}
+use table::Table;
 
 /// The rows of the list in its order, each with what is done about it; and two that hold for every frame.
 const ROWS: [(&str, &str); 19] = [
@@ -117,8 +100,8 @@ const ROWS: [(&str, &str); 19] = [
 ];
 
 /// Every case, by row.
-fn all() -> Vec<Case> {
-    let mut all = [
+fn whole() -> Table {
+    let cases = [
         functions::cases(),
         normals::cases(),
         highlights::cases(),
@@ -130,45 +113,23 @@ fn all() -> Vec<Case> {
         lists::cases(),
         overflow::cases(),
         probe::cases(),
-    ]
-    .concat();
-    let row = |case: &Case| {
-        let found = ROWS.iter().position(|(row, _)| *row == case.row);
-        found.unwrap_or_else(|| panic!("{} is in no row", case.name))
-    };
-    all.sort_by_key(row);
-    assert!(ROWS.iter().all(|(row, _)| all.iter().any(|case| case.row == *row)), "a row without a case");
-    all
+    ];
+    Table::new("Hard cases of lighting and rasterizing", &ROWS, cases.concat())
 }
 
-/// Runs all and prints the table. With LUMBRE_WRITE_TABLES=1 it becomes docs/hard-cases.md too.
+/// Runs all and prints the table. With LUMBRE_WRITE_TABLES=1 it becomes its part of docs/hard-cases.md too.
 #[test]
 fn table() {
-    let all = all();
-    let mut text = format!(
-        "# Hard cases of lighting and rasterizing\n\n`LUMBRE_WRITE_TABLES=1 cargo test --workspace --test hard_cases -- --nocapture \
-         table` prints this page and writes it; each case is a test of its own too. \
-         {} cases, on {}. Where a case compares many values, the one farthest from its expectation is shown. \
-         u is 2^-24, a rounding of f32.\n",
-        all.len(),
+    let about = format!(
+        ", on {}. Where a case compares many values, the one farthest from its expectation is shown. u is 2^-24, a rounding of f32.",
         adapter::gpu().describe()
     );
-    let mut failed = Vec::new();
-    for (row, about) in ROWS {
-        text += &format!("\n## {row}\n\n{about}\n\n{HEADING}\n");
-        for case in all.iter().filter(|case| case.row == row) {
-            let outcome = (case.run)();
-            text += &format!("| {} | {outcome} |\n", case.name.replace('_', " "));
-            if !outcome.passes() {
-                failed.push(format!("{}: {outcome}", case.name));
-            }
-        }
-    }
-    println!("{text}");
-    assert!(failed.is_empty(), "{failed:#?}");
-    if std::env::var_os("LUMBRE_WRITE_TABLES").is_some() {
-        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/hard-cases.md"), text).unwrap();
-    }
+    whole().print("cargo test --workspace --test hard_cases -- --nocapture table", &about);
+}
+
+#[test]
+fn the_page_lists_these_cases() {
+    whole().in_step();
 }
 
 #[test]

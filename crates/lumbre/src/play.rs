@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use lumbre::bake::{BakeOptions, bake};
+use lumbre::bake::{BakeOptions, Probes, bake};
 use lumbre::demo;
 use lumbre::scene;
 
@@ -53,7 +53,8 @@ fn demo_level() -> anyhow::Result<PathBuf> {
     eprintln!("lumbre: baking {} (once)", source.display());
     let mut world = load(&source)?;
     let bar = progress_bar();
-    let options = BakeOptions { error: 0.02, ..BakeOptions::default() };
+    // Frames do not read probes.
+    let options = BakeOptions { error: 0.02, probes: Probes::Never, ..BakeOptions::default() };
     bake(&mut world, &options, &mut |progress| {
         bar.set_message(progress.stage);
         bar.set_position((progress.fraction * 1000.0) as u64);

@@ -202,6 +202,29 @@ fn what_cannot_work_is_said_before_the_bake() {
 }
 
 #[test]
+fn a_folder_that_takes_no_files_is_said_before_the_bake() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = place();
+    let folder = place.folder.path().join("locked");
+    fs::create_dir(&folder).unwrap();
+    fs::set_permissions(&folder, fs::Permissions::from_mode(0o555)).unwrap();
+    // Permissions bind everybody but the superuser; a file system of the kernel's own binds him too.
+    let binds = tempfile::tempfile_in(&folder).is_err();
+    let folder = if binds { folder } else { PathBuf::from("/sys/kernel") };
+    if !folder.is_dir() {
+        eprintln!("SKIPPED: as the superuser, without /sys, every folder takes files");
+        return;
+    }
+    let mut command = Command::new(LUMBRE);
+    let output =
+        command.arg("bake").arg(&place.level).arg("-o").arg(folder.join("level.glb")).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("cannot be written to") && said.contains(&*folder.to_string_lossy()), "{said}");
+    assert!(output.stdout.is_empty() && !folder.join("level.glb").exists());
+}
+
+#[test]
 fn a_full_disk_leaves_nothing_half_written() {
     let (expected, place) = (expected(), place());
     let mut limited = Command::new("sh");

@@ -163,11 +163,11 @@ impl Client {
     }
 }
 
-fn baked(model: &Path, side: u32, error: f64) -> World {
+fn baked(model: &Path, density: Density, error: f64) -> World {
     let mut world = World::new();
     load(&mut world, model).unwrap_or_else(|error| panic!("{error}"));
     let options = BakeOptions {
-        density: Density::MapSize(side),
+        density,
         quality: Quality::Draft,
         error,
         probes: Probes::Never,
@@ -205,7 +205,7 @@ fn the_cornell_box_as_bevy_finds_it() {
         .filter(|point| point.irradiance.is_finite())
         .collect();
     assert!(points.len() > 100, "there are reference points");
-    let mut world = baked(&model, 128, 0.01);
+    let mut world = baked(&model, Density::MapSize(128), 0.01);
     let folder = tempfile::tempdir().expect("there is room for it");
     for format in PackedFormat::ALL {
         let path = folder.path().join("cornell baked.glb");
@@ -232,7 +232,7 @@ fn the_cornell_box_as_bevy_finds_it() {
 #[test]
 fn the_ktx2_shows_what_the_open_exr_shows() {
     let Some(model) = common::shared("models/cornell_box.glb") else { return };
-    let mut world = baked(&model, 48, 0.01);
+    let mut world = baked(&model, Density::MapSize(48), 0.01);
     let folder = tempfile::tempdir().expect("there is room for it");
     let path = folder.path().join("level.gltf");
     for format in PackedFormat::ALL {
@@ -268,18 +268,102 @@ fn the_ktx2_shows_what_the_open_exr_shows() {
     }
 }
 
+/// A KTX2 file by the bytes of its specification (version 2.0, revision 4): what stands where, and the data format descriptor of the
+/// Khronos Data Format Specification 1.3. Nothing reads here but this.
+fn check_bytes(path: &Path, format: PackedFormat, width: u32, height: u32) {
+    let bytes = std::fs::read(path).expect("the image lies beside the level");
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+    let long = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight bytes")) as usize;
+    assert_eq!(bytes[..12], [0xAB, b'K', b'T', b'X', b' ', b'2', b'0', 0xBB, b'\r', b'\n', 0x1A, b'\n']);
+    // VK_FORMAT_B10G11R11_UFLOAT_PACK32 = 122, VK_FORMAT_E5B9G9R9_UFLOAT_PACK32 = 123; a word is swapped as a whole.
+    let vulkan = if format == PackedFormat::Rgb9E5 { 123 } else { 122 };
+    assert_eq!([word(12), word(16)], [vulkan, 4]);
+    // Width, height, depth, layers, faces, levels, supercompression.
+    assert_eq!([20, 24, 28, 32, 36, 40, 44].map(word), [width, height, 0, 0, 1, 1, 0]);
+    let (descriptor, length) = (word(48) as usize, word(52) as usize);
+    // The index of the one level follows the header: where, how many bytes, and as many unpacked.
+    let (at, size) = (long(80), 4 * width as usize * height as usize);
+    assert_eq!([long(88), long(96)], [size, size]);
+    assert_eq!(at % 4, 0, "texels begin at a multiple of their size");
+    assert!(at >= descriptor + length && at + size == bytes.len());
+    assert_eq!(descriptor, 104, "after the level index");
+    assert_eq!(word(descriptor) as usize, length, "it says its own length");
+    // Khronos' basic descriptor, version 2, of so many bytes.
+    assert_eq!([word(descriptor + 4), word(descriptor + 8)], [0, 2 | (length as u32 - 4) << 16]);
+    // RGBSDA, BT.709, linear, straight alpha; texel blocks of one by one; four bytes in plane 0.
+    assert_eq!(bytes[descriptor + 12..descriptor + 16], [1, 1, 1, 0]);
+    assert_eq!([word(descriptor + 16), word(descriptor + 20), word(descriptor + 24)], [0, 4, 0]);
+    let samples: Vec<[u32; 3]> = (descriptor + 28..descriptor + length)
+        .step_by(16)
+        .map(|at| [word(at) & 0xffff, word(at) >> 16 & 0xff, word(at) >> 24])
+        .collect();
+    // First bit, bits less one, and channel: red, green, blue; 0x20 an exponent, 0x80 a float.
+    let expected: &[[u32; 3]] = match format {
+        PackedFormat::Rgb9E5 => {
+            &[[0, 8, 0], [27, 4, 0x20], [9, 8, 1], [27, 4, 0x21], [18, 8, 2], [27, 4, 0x22]]
+        }
+        PackedFormat::B10G11R11 => &[[0, 10, 0x80], [11, 10, 0x81], [22, 9, 0x82]],
+    };
+    assert_eq!(samples, expected, "{format:?}");
+}
+
 #[test]
-#[ignore = "bakes a whole level: a minute and more"]
 fn the_demo_level_as_bevy_finds_it() {
     let model = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/demo.glb"));
-    // The format is asked for, not the light.
-    let mut world = baked(model, 8, 1.0);
+    // The files are asked for, not the light: few texels and a rough error.
+    let mut world = baked(model, Density::TexelsPerMeter(1.5), 1.0);
+    let ours = common::maps(&mut world);
     let folder = tempfile::tempdir().expect("there is room for it");
-    let path = folder.path().join("demo.baked.glb");
-    saved(&mut world, &path, PackedFormat::Rgb9E5);
-    let client = Client::read(&path);
-    assert!(client.faces.len() > 100 && client.textures.len() > 1);
-    assert!(
-        client.textures.values().any(|texture| texture.texels.iter().any(|texel| texel.max_element() > 0.0))
-    );
+    for format in PackedFormat::ALL {
+        let stem = format!("demo-{}", format.name());
+        let path = folder.path().join(format!("{stem}.glb"));
+        saved(&mut world, &path, format);
+        let client = Client::read(&path);
+        assert!(client.faces.len() > 10_000, "{} triangles have a lightmap", client.faces.len());
+        // One file for each map of the bake, under its name, with its light.
+        assert_eq!(client.textures.len(), ours.len());
+        let mut lit = 0;
+        for (name, image) in &ours {
+            let node = name.strip_suffix(".lightmap.exr").expect("a map is named after its node");
+            let name = format!("{stem}.{node}.ktx2");
+            check_bytes(&path.with_file_name(&name), format, image.width, image.height);
+            let texture = &client.textures[&name];
+            assert_eq!(
+                [texture.width, texture.height],
+                [image.width, image.height].map(|side| side as usize)
+            );
+            for (texel, found) in image.texels.iter().zip(&texture.texels) {
+                let bound = format.largest_error(*texel).as_dvec3() * 1.000_001;
+                assert!((texel.as_dvec3() - *found).abs().cmple(bound).all(), "{name}: {texel} is {found}");
+                lit += usize::from(found.max_element() > 0.0);
+            }
+        }
+        assert!(lit > 1000, "{lit} texels are lit");
+        // Every static mesh of the level has one, and nothing that moves has: by the names of the nodes.
+        let read = |path: &Path| gltf::Gltf::open(path).expect("the gltf crate takes the level");
+        let (plain, baked) = (read(model), read(&path));
+        let mapped: Vec<&str> = baked
+            .nodes()
+            .filter(|node| node.extension_value("LUMBRE_lightmap").is_some())
+            .filter_map(|node| node.name())
+            .collect();
+        let moving = |node: &gltf::Node<'_>| {
+            node.extension_value("LUMBRE_object").is_some_and(|object| object["dynamic"] == true)
+        };
+        let (mut still, mut moves) = (0, 0);
+        for node in plain.nodes().filter(|node| node.mesh().is_some()) {
+            let name = node.name().expect("the level's nodes have names");
+            let alone = !moving(&node) && !under_a_moving_node(&plain, node.index(), &moving);
+            assert_eq!(mapped.contains(&name), alone, "{name}");
+            still += usize::from(alone);
+            moves += usize::from(!alone);
+        }
+        assert!(still > 20 && moves > 2, "{still} stand still, {moves} move");
+    }
+}
+
+/// Whether a node's parent, or its parent's, moves.
+fn under_a_moving_node(level: &gltf::Gltf, node: usize, moving: &impl Fn(&gltf::Node<'_>) -> bool) -> bool {
+    let parent = level.nodes().find(|parent| parent.children().any(|child| child.index() == node));
+    parent.is_some_and(|parent| moving(&parent) || under_a_moving_node(level, parent.index(), moving))
 }

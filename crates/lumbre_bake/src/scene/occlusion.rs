@@ -31,6 +31,10 @@ pub(crate) enum SurfaceHit {
 /// Two hits nearer to each other than this share of their distance and coordinates are in one place.
 pub(super) const SAME_PLACE: f32 = 64.0 / (1 << 24) as f32;
 
+/// Where a segment ends. A target is off its surface by the rounding of its own coordinates. Seen from afar, in a scene much larger than
+/// they are, the surface is met by as many roundings of the distance before it or behind it: those are taken off the end.
+const FAR_END: f32 = 1.0 - 16.0 / (1 << 24) as f32;
+
 impl BakeScene {
     /// The first thing on a ray with a direction of unit length. Counts it among the leaks if it ended where none should.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
@@ -66,7 +70,7 @@ impl BakeScene {
 
     /// Whether something lies between two points that are off their surfaces.
     pub fn blocked(&self, from: Vec3, to: Vec3) -> bool {
-        self.any(&Ray::segment(from, to))
+        self.any(&Ray::segment(from, to).with_range(0.0, FAR_END))
     }
 
     /// Whether something lies in a direction, however far.

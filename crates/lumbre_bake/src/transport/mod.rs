@@ -26,4 +26,5 @@ mod near_pairs;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;
+mod share_variance;
 pub(crate) mod solver;

@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use lumbre_optics::{BakeMode, Light, LightKind, evaluate_light};
 
 use super::direct::{Direct, GROUPS, Receiver, Sources, allotted, group_of, variance_of_mean};
+use super::share_variance::share_variance;
 use crate::sampling::{Sequence, cosine_direction, frame};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -69,7 +70,8 @@ impl Sum {
         };
         let shares = std::array::from_fn(of_group);
         let uneven = variance_of_mean(self.center.map(|sum| sum * per_group));
-        (center * share, center * center * variance_of_mean(shares) + share * share * uneven)
+        let partly = share_variance(shares, share, self.visible + self.hidden);
+        (center * share, center * center * partly + share * share * uneven)
     }
 }
 
@@ -112,8 +114,11 @@ impl Sources<'_> {
     ) {
         let light = &self.lights[index];
         let mut sum = Sum::default();
+        let sequence = sequence.of(1 + index as u32);
+        let sized = light.light.radius.max(light.light.angle) > 0.0;
         for sample in 0..samples {
-            let [x, y, u, v] = sequence.point(sample, 1 + index as u32 % 32);
+            let [a, b, c, d] = sequence.point(sample, 0);
+            let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
             let Some(receiver) = point(x, y) else { continue };
             if let Some(part) = part(self.scene, light, &receiver, u, v) {
                 sum.add(&part, group_of(sample, samples));

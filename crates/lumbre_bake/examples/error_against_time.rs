@@ -1,0 +1,130 @@
+//! The error of a bake against the time it takes: `error_against_time [--scene NAME] [--threads N] [--rounds N]` bakes the scenes that have
+//! converged reference points, each variant after the other, and prints a table of Markdown: the stated error, the true one, seconds.
+//!
+//! `cargo run --release -p lumbre_bake --example error_against_time`. A table is one run: times of two runs are two machines.
+
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use bevy_ecs::world::World;
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+/// A scene with reference points, and the density that it is baked at.
+struct Scene {
+    name: &'static str,
+    model: &'static str,
+    points: &'static str,
+    density: Density,
+}
+
+const SCENES: [Scene; 2] = [
+    Scene {
+        name: "Cornell box",
+        model: "models/cornell_box.glb",
+        points: "conformance/bake/cornell_box.csv",
+        density: Density::MapSize(256),
+    },
+    Scene {
+        name: "alcove",
+        model: "conformance/bake/alcove.glb",
+        points: "conformance/bake/alcove.csv",
+        density: Density::Automatic,
+    },
+];
+
+/// What is varied, and the errors that are asked of it.
+fn variants() -> Vec<(&'static str, BakeOptions, &'static [f64])> {
+    let plain = BakeOptions::default();
+    vec![
+        ("default", plain, &[0.16, 0.08, 0.04, 0.02, 0.01, 0.005]),
+        ("without denoise", BakeOptions { denoise: false, ..plain }, &[0.16, 0.08, 0.04, 0.02, 0.01]),
+        ("draft", BakeOptions { quality: Quality::Draft, ..plain }, &[0.16, 0.01]),
+    ]
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let (mut only, mut threads, mut rounds) = (None, None, 1);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
+        match argument.as_str() {
+            "--scene" => only = Some(value()?),
+            "--threads" => threads = Some(value()?.parse()?),
+            "--rounds" => rounds = value()?.parse()?,
+            _ => return Err(format!("{argument} is no option").into()),
+        }
+    }
+    println!(
+        "| scene | variant | asked % | seconds | stated % | true RMSE % | median % | p95 % | bias % | million rays | ended |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for scene in SCENES.iter().filter(|scene| only.as_deref().is_none_or(|only| scene.name.contains(only))) {
+        let (Some(model), Some(points)) = (common::shared(scene.model), common::shared(scene.points)) else {
+            continue;
+        };
+        let noise = noise_of_reference(&points)?;
+        let points = common::read_reference(&points);
+        for (variant, options, errors) in variants() {
+            for &error in errors {
+                let options = BakeOptions { density: scene.density, error, threads, ..options };
+                let (report, found, seconds) = fastest(&model, &points, &options, rounds)?;
+                // The points' own noise is known and independent of the bake.
+                let rmse = (found.rmse.powi(2) - (noise / found.mean).powi(2)).max(0.0).sqrt();
+                let percent = [
+                    error,
+                    seconds / 100.0,
+                    report.estimated_error,
+                    rmse,
+                    found.median,
+                    found.p95,
+                    found.bias,
+                ]
+                .map(|value| format!("{:.3}", 100.0 * value));
+                println!(
+                    "| {} | {variant} | {} | {:.1} | {} |",
+                    scene.name,
+                    percent.join(" | "),
+                    report.rays as f64 * 1e-6,
+                    report.ended.to_string().split(':').next_back().unwrap_or_default().trim()
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Bakes so many times; the least time, since others may use the machine.
+fn fastest(
+    model: &Path,
+    points: &[common::ReferencePoint],
+    options: &BakeOptions,
+    rounds: u32,
+) -> Result<(BakeReport, common::Comparison, f64), Box<dyn Error>> {
+    let mut best: Option<(BakeReport, common::Comparison, f64)> = None;
+    for _ in 0..rounds.max(1) {
+        let mut world = World::new();
+        lumbre_scene::load(&mut world, model)?;
+        let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()))?;
+        let seconds = report.seconds;
+        if best.as_ref().is_none_or(|(.., least)| seconds < *least) {
+            best = Some((report, common::compare(&mut world, points), seconds));
+        }
+    }
+    best.ok_or_else(|| "nothing was baked".into())
+}
+
+/// Root mean square of the standard errors that the points state of themselves, W/m².
+fn noise_of_reference(path: &Path) -> Result<f64, Box<dyn Error>> {
+    let text = std::fs::read_to_string(path)?;
+    let numbers = text.lines().skip(1).flat_map(|line| line.split(',').skip(9).take(3));
+    let (mut sum, mut count) = (0.0, 0.0);
+    for number in numbers.filter_map(|field| field.parse::<f64>().ok()).filter(|value| value.is_finite()) {
+        sum += number * number;
+        count += 1.0;
+    }
+    Ok(if count > 0.0 { (sum / count).sqrt() } else { 0.0 })
+}
