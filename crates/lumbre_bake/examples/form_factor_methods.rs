@@ -1,6 +1,8 @@
 //! Cosine rays against global lines: `form_factor_methods IN.glb [--draft] [--converged RAYS]` prints the error of the form factors and
 //! of the patches' light by bounces, by rays and by time, against converged ones.
 
+#![allow(clippy::print_stdout, reason = "a program whose result is text")]
+
 use std::error::Error;
 use std::path::PathBuf;
 

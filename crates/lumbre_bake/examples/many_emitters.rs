@@ -1,6 +1,8 @@
 //! Bakes a room lit by a quadrilateral lamp, by spheres of many triangles, by neon letters and by many point lights, and prints
 //! what each costs: `many_emitters [--error X] [--map-size N]`.
 
+#![allow(clippy::print_stdout, reason = "a program whose result is text")]
+
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::sync::Arc;

@@ -98,7 +98,7 @@ pub fn rooms(layout: u64, scale: f64) -> World {
     let mut b = Builder::new(scale);
     let (height, depth, wall) = (2.6, 3.6, 0.15);
     let (left, right) = (-4.0, 4.0 + wall);
-    if layout % 2 == 0 {
+    if layout.is_multiple_of(2) {
         b.shell("rooms", [left, 0.0, 0.0], [right, height, depth], WHITE);
     } else {
         b.block("floor", [left - wall, -0.2, -wall], [right + wall, 0.0, depth + wall], WOOD, 0.0);
@@ -122,7 +122,7 @@ pub fn rooms(layout: u64, scale: f64) -> World {
     // The lamp.
     let (x, z) = (random.between(-2.6, -1.6), random.between(1.4, 2.2));
     let shine = [18.0, 15.0, 11.0];
-    if layout % 2 == 0 {
+    if layout.is_multiple_of(2) {
         let size = (0.6 * scale) as f32;
         let mut lamp = shapes::plane(size, size, 1, 1);
         lamp.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
@@ -185,7 +185,7 @@ pub fn hall(layout: u64, scale: f64) -> World {
     let mut random = Random::new(1000 + layout);
     let mut b = Builder::new(scale);
     let (width, height, depth) = (12.0, 4.0, 8.0);
-    if layout % 2 == 0 {
+    if layout.is_multiple_of(2) {
         b.shell("hall", [0.0; 3], [width, height, depth], WHITE);
     } else {
         b.block("floor", [-0.2, -0.2, -0.2], [width + 0.2, 0.0, depth + 0.2], WOOD, 0.0);
@@ -195,7 +195,7 @@ pub fn hall(layout: u64, scale: f64) -> World {
         b.block("north wall", [-0.2, 0.0, -0.2], [width + 0.2, height, 0.0], WHITE, 0.0);
         b.block("south wall", [-0.2, 0.0, depth], [width + 0.2, height, depth + 0.2], WHITE, 0.0);
     }
-    let sides = if layout % 2 == 0 { 8 } else { 20 };
+    let sides = if layout.is_multiple_of(2) { 8 } else { 20 };
     for x in [2.4, 4.8, 7.2, 9.6] {
         for z in [2.2, 5.8] {
             let radius = random.between(0.2, 0.35);
@@ -212,8 +212,11 @@ pub fn hall(layout: u64, scale: f64) -> World {
     b.world
 }
 
-/// Every kind and layout, by name.
-pub fn all() -> [(&'static str, fn(u64, f64) -> World, u64); 6] {
+/// A name, what builds it by layout and scale, and its layout.
+pub type Named = (&'static str, fn(u64, f64) -> World, u64);
+
+/// Every kind and layout.
+pub fn all() -> [Named; 6] {
     [
         ("rooms_0", rooms, 0),
         ("rooms_1", rooms, 1),
