@@ -44,7 +44,7 @@ const MOST_LINES: u32 = 12;
 /// Smallest part of a cell that is worth a piece of its own.
 const SMALLEST: f64 = 1.0 / 256.0;
 /// Contact lines as long as this share of a piece's size cut it.
-const LENGTH: f64 = 0.25;
+const LENGTH: f64 = 0.1;
 /// What lies so near to a line, as a share of a piece's size, lies on it.
 const ON_LINE: f64 = 0.02;
 

@@ -24,13 +24,13 @@ fn mesh(triangles: &[[Vec3; 3]]) -> Arc<TriangleMesh> {
     Arc::new(TriangleMesh { positions, indices, ..TriangleMesh::default() })
 }
 
-fn square(origin: [f32; 3], u: Vec3, v: Vec3) -> [[Vec3; 3]; 2] {
+pub(super) fn square(origin: [f32; 3], u: Vec3, v: Vec3) -> [[Vec3; 3]; 2] {
     let o = Vec3::from(origin);
     [[o, o + u, o + u + v], [o, o + u + v, o + v]]
 }
 
 /// A scene of matt objects, one per list of triangles.
-fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
+pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
     let mut world = World::new();
     let objects: Vec<Object> = objects
         .iter()

@@ -23,6 +23,8 @@ pub(crate) mod guide;
 mod lambert_integral;
 pub(crate) mod method_study;
 mod near_pairs;
+#[cfg(test)]
+mod patch_tests;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;

@@ -119,7 +119,7 @@ impl PathTracer {
                 self.closest(position + triangle.normal * self.offset, direction)
                     .is_some_and(|hit| self.triangles[hit.triangle].normal.dot(direction) < 0.0)
             });
-            if seen.count() > 0 {
+            if seen.count() > 32 {
                 places.push((position, triangle.normal));
             }
         }

@@ -1,0 +1,60 @@
+//! Patches of a floor that a wall stands on, and that something lies on.
+
+use glam::Vec3;
+
+use super::form_factor_tests::{scene, square};
+use super::patches::Patches;
+use crate::sampling::{Sequence, triangle_point};
+use crate::scene::material::Side;
+
+/// The floor's patches as they are, and as points find them.
+fn check(objects: &[&[[Vec3; 3]]], side: f32, apart: impl Fn(Vec3) -> u32) {
+    let scene = scene(objects);
+    let patches = Patches::new(&scene, side);
+    assert_eq!(patches.list.len() as u64, Patches::count(&scene, side));
+    let area: f32 = patches.list.iter().map(|patch| patch.area).sum();
+    let expected: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+    assert!((area / expected - 1.0).abs() < 1e-5, "{area} {expected}");
+    let place = |position: Vec3| apart(scene.space.world(position).as_vec3());
+    let mut crossed = 0.0;
+    for (index, patch) in patches.list.iter().enumerate() {
+        let sequence = Sequence::new(1, 2, index as u32);
+        let mut places = Vec::new();
+        for sample in 0..64 {
+            let [x, y, ..] = sequence.point(sample, 0);
+            // Off the borders, where rounding may decide.
+            let (u, v) = triangle_point(x, y);
+            let (u, v) = (0.02 + 0.94 * u, 0.02 + 0.94 * v);
+            let at = patches.point(patch, (u, v));
+            assert_eq!(patches.at(patch.triangle, patch.side, at), Some(index as u32), "{patch:?} {at:?}");
+            places.push(place(scene.triangles[patch.triangle as usize].position(at.0, at.1)));
+        }
+        if patch.triangle < 2 && patch.side == Side::Front {
+            let ones = places.iter().filter(|&&place| place == places[0]).count();
+            crossed += patch.area * ones.min(places.len() - ones) as f32 / places.len() as f32;
+        }
+    }
+    // Pieces of less than 1/256 of a cell stay with their neighbours.
+    assert!(crossed < 0.001 * expected, "{crossed} of {expected} in patches on both sides");
+}
+
+#[test]
+fn no_patch_lies_on_both_sides_of_a_wall() {
+    let floor = square([0.0; 3], Vec3::Z * 2.0, Vec3::X * 2.0);
+    for x in [0.3, 0.731, 1.9] {
+        let wall = square([x, 0.0, 0.0], Vec3::Z * 2.0, Vec3::Y);
+        check(&[&floor, &wall], 0.4, |p| u32::from(p.x > x));
+        // It may pass through the floor, too.
+        let sunk = square([x, -0.5, 0.0], Vec3::Z * 2.0, Vec3::Y);
+        check(&[&floor, &sunk], 0.4, |p| u32::from(p.x > x));
+    }
+}
+
+#[test]
+fn no_patch_lies_half_under_a_thing() {
+    let floor = square([0.0; 3], Vec3::Z * 2.0, Vec3::X * 2.0);
+    // A sheet a little above, whose own patches are of no interest.
+    let sheet = square([0.35, 0.01, 0.45], Vec3::X, Vec3::Z);
+    let under = |p: Vec3| p.y < 0.005 && (0.35..1.35).contains(&p.x) && (0.45..1.45).contains(&p.z);
+    check(&[&floor, &sheet], 0.4, |p| u32::from(under(p)));
+}
