@@ -172,6 +172,7 @@ fn what_the_documentation_names_exists() {
         "docs/decisions.md",
         "docs/testing.md",
         "docs/hard-cases.md",
+        "docs/baking.md",
     ];
     for page in pages {
         let page = root.join(page);

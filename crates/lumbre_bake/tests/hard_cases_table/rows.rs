@@ -4,7 +4,7 @@
 pub const ROWS: [(&str, &str); 13] = [
     (
         "a ray hits the face it left, scenes of 1e-3 to 1e5 m",
-        "A ray starts some ulps off its face (Wächter and Binder, Ray Tracing Gems, chapter 6), by the triangle's own size; every scene is brought to canonical units by a power of two. (Only the law of point lights has a length of its own: nearer than a centimetre they get no brighter.) Also [scale](../crates/lumbre_rays/tests/scale.rs) `rays_leave_their_surface_from_a_millimetre_to_a_hundred_kilometres`, `without_the_offset_rays_do_hit_the_surface_they_leave`, `scaling_by_a_power_of_two_changes_no_bit`, and [known answers](../crates/lumbre_bake/tests/known_answers.rs) `the_same_bits_at_every_scale_of_two`.",
+        "A ray starts some ulps off its face (Wächter and Binder, Ray Tracing Gems, chapter 6), by the triangle's own size; every scene is brought to canonical units by a power of two. Also [scale](../crates/lumbre_rays/tests/scale.rs) `rays_leave_their_surface_from_a_millimetre_to_a_hundred_kilometres`, `without_the_offset_rays_do_hit_the_surface_they_leave`, `scaling_by_a_power_of_two_changes_no_bit`, [sizes](../crates/lumbre_bake/tests/hard_cases_of_size.rs) `no_ray_hits_the_face_it_left_from_a_millimetre_to_a_hundred_kilometres`, and [known answers](../crates/lumbre_bake/tests/known_answers.rs) `the_same_bits_at_every_scale_of_two`.",
     ),
     (
         "rays through shared edges and T-junctions",
@@ -40,11 +40,11 @@ pub const ROWS: [(&str, &str); 13] = [
     ),
     (
         "overlapping or out-of-range UVs; texels with no coverage; charts under a texel",
-        "The mesh is named and unwrapped anew; coverage is conservative, values are continued into the gap. Also [validation](../crates/lumbre_mesh/src/uv_validation.rs) `every_fault_names_its_triangles`, [atlas](../crates/lumbre_mesh/tests/atlas.rs) `no_overlap`, `the_check_sees_a_gap_that_is_too_small`, [unwrap](../crates/lumbre_mesh/tests/unwrap.rs) `triangles_without_area_share_a_spot`, and [filling](../crates/lumbre_bake/src/texels/fill.rs) `a_plane_is_continued_exactly_and_moved_to_the_centres`.",
+        "The mesh is named and unwrapped anew; coverage is conservative, values are continued into the gap. Also [validation](../crates/lumbre_mesh/src/uv_validation.rs) `every_fault_names_its_triangles`, [atlas](../crates/lumbre_mesh/tests/atlas.rs) `no_overlap`, `the_check_sees_a_gap_that_is_too_small`, [unwrap](../crates/lumbre_mesh/tests/unwrap.rs) `triangles_without_area_share_a_spot`, [sizes](../crates/lumbre_bake/tests/hard_cases_of_size.rs) `coordinates_out_of_range_and_overlapping_are_named_and_replaced`, `charts_below_a_texel_have_light`, and [filling](../crates/lumbre_bake/src/texels/fill.rs) `a_plane_is_continued_exactly_and_moved_to_the_centres`.",
     ),
     (
         "sums over 10^8 samples, light ratios of 10^8; RGB9E5 saturates at 65408",
-        "Sums over a scene are f64 or counts of 64 bits; the longest sum in f32 is that of one texel's samples. What an encoding costs is in the report of each file. Also [emitters](../crates/lumbre_bake/tests/emitters.rs) `light_ratios_of_a_hundred_million`, `bright_and_dim_lights_side_by_side`, [lightmap files](../crates/lumbre_scene/tests/lightmap_files.rs) `rounding_keeps_the_energy`, `what_does_not_fit_is_reported`, and [RGB9E5](../crates/lumbre_scene/src/lightmap_files/shared_exponent.rs) `every_code_decodes_and_encodes_to_the_same_color`, `the_nearest_color_within_the_closed_bound`.",
+        "Sums over a scene are f64 or counts of 64 bits; the longest sum in f32 is that of one texel's samples. What an encoding costs is in the report of each file. Also [emitters](../crates/lumbre_bake/tests/emitters.rs) `light_ratios_of_a_hundred_million`, `bright_and_dim_lights_side_by_side`, [sizes](../crates/lumbre_bake/tests/hard_cases_of_size.rs) `a_room_lit_a_hundred_million_times_less_than_its_neighbour_is_as_bright_as_alone`, [lightmap files](../crates/lumbre_scene/tests/lightmap_files.rs) `rounding_keeps_the_energy`, `what_does_not_fit_is_reported`, and [RGB9E5](../crates/lumbre_scene/src/lightmap_files/shared_exponent.rs) `every_code_decodes_and_encodes_to_the_same_color`, `the_nearest_color_within_the_closed_bound`.",
     ),
     (
         "kill -9 in the middle, disk full, no permission, an output that exists",
