@@ -235,6 +235,9 @@ fn summary(report: &BakeReport) -> String {
             100.0 * report.resolution.standard_error
         ));
     }
+    for lumbre::bake::ErrorAtTime { seconds, error } in &report.curve {
+        text.push_str(&format!("  after {seconds:8.2} s the error was {:.2} %\n", 100.0 * error));
+    }
     for stage in &report.stages {
         text.push_str(&format!("  {:24} {:7.2} s\n", stage.stage, stage.seconds));
     }

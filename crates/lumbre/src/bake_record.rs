@@ -1,14 +1,16 @@
 //! What lies beside a baked level: of which scene and options it is, which files belong to it, how good it is. By it an unchanged
 //! level is not baked again. Not the baking.
 
-use std::io;
+use std::ffi::OsString;
+use std::fs::OpenOptions;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use lumbre::bake::{BakeReport, Ended};
 use serde::{Deserialize, Serialize};
 
 use crate::lightmap_report::FileLine;
-use crate::output::write_file;
 
 /// The version of this file; another is not read.
 const VERSION: u32 = 1;
@@ -111,10 +113,31 @@ impl BakeRecord {
         let Asked { content, files: encodings, input, time } = asked;
         let (lightmaps, report) = (lightmaps.to_vec(), report.clone());
         let record = Self { version: VERSION, content, input, time, encodings, files, lightmaps, report };
-        write_file(&place(output), |path| {
-            let mut text = serde_json::to_vec_pretty(&record)?;
-            text.push(b'\n');
-            Ok(std::fs::write(path, text)?)
-        })
+        let mut text = serde_json::to_vec_pretty(&record)?;
+        text.push(b'\n');
+        let path = place(output);
+        replace(&path, &text).with_context(|| format!("{} could not be written", path.display()))
     }
+}
+
+/// Writes a file beside its name and renames it. The name beside is always the same: what a killed process left is used again.
+fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(".partial");
+    let beside = path.with_file_name(name);
+    let written = (|| {
+        let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&beside)?;
+        // Whoever else writes it is done in a moment; some network folders know no locks.
+        let _ = file.lock();
+        file.set_len(0)?;
+        file.write_all(content)?;
+        file.sync_all()?;
+        std::fs::rename(&beside, path)
+    })();
+    if written.is_err() {
+        // Half-written; if it cannot be removed either, the first error is the one to tell.
+        let _ = std::fs::remove_file(&beside);
+    }
+    written
 }

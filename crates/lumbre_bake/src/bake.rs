@@ -24,7 +24,7 @@ use crate::texels::straddling::straddling;
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::{Direct, Sources};
 use crate::transport::exchange::Exchange;
-use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, Progress, apply};
+use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, apply};
 
 /// Bakes the light of a world's static objects into lightmaps.
 ///
@@ -80,7 +80,8 @@ fn run(
     watch.stage("layout", &mut report)?;
     let objects = collect(world)?;
     let (placed, sky) = (lights(world), sky(world));
-    let hash = hash_of(&objects, &placed, sky, options);
+    let wanted = Wanted::of(world, &objects);
+    let hash = hash_of(&objects, &placed, sky, &wanted, options);
     report.content_hash = hash.to_string();
     if let Some(checkpoint) = checkpoint {
         watch.tape = Tape::open(checkpoint, &hash)
@@ -93,7 +94,6 @@ fn run(
         report.error_reached = true;
         return Ok(finish(report, &mut watch));
     }
-    let wanted = Wanted::of(world, &objects);
     let points =
         objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
@@ -117,6 +117,7 @@ fn run(
 
     watch.stage("direct light", &mut report)?;
     let mut texels = footprints(&scene, &layout);
+    watch.advance(0.0)?;
     let charts = charts(&scene);
     let (hidden, rays) = remove_hidden(&scene, &layout, &mut texels, options.seed);
     (report.hidden_texels, report.rays) = (hidden, rays);
@@ -137,7 +138,7 @@ fn run(
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
             let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
-            let mut total = fill(&layout, &texels, &charts, &total, 1);
+            let mut total = fill(&layout, &texels, &charts, &total, 1, &mut |_| watch.advance(0.0))?;
             for index in straddling(&scene, &layout, &texels) {
                 total[index] = Vec3::NAN;
             }
@@ -177,8 +178,9 @@ fn run(
     if exchange.is_none() {
         note_direct_error(&texels, &variances, options, &mut report);
         report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
+        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
-    let mut filled = fill(&layout, &texels, &charts, &values, options.gap);
+    let mut filled = fill(&layout, &texels, &charts, &values, options.gap, &mut |done| watch.advance(done))?;
     watch.advance(1.0)?;
     let mut errors = vec![f32::NAN; layout.texels];
     for (texel, variance) in texels.iter().zip(&variances).filter(|(texel, _)| !texel.is_hidden()) {
@@ -188,7 +190,7 @@ fn run(
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
     let maps =
         Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
-    note_seams(&maps, &mut filled, options, &mut report);
+    note_seams(&maps, &mut filled, options, &mut watch, &mut report)?;
     report.resolution = compare(&scene, &layout, &filled, &errors, &points);
     watch.advance(1.0)?;
     let pages = Pages::new(&layout, options.atlas_size, options.gap);
@@ -204,6 +206,10 @@ fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
     // What is still to be done with the result may be interrupted too.
     watch.tape.flush();
     report.seconds = watch.seconds();
+    // From here on there is a map of that error.
+    if !report.curve.is_empty() {
+        report.curve.push(ErrorAtTime { seconds: report.seconds, error: report.estimated_error });
+    }
     report.resumed_seconds = watch.tape.resumed;
     report.warnings.append(&mut watch.tape.warnings);
     let casting: f64 = report
@@ -249,9 +255,15 @@ fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {
     }
 }
 
-fn note_seams(maps: &Maps<'_>, filled: &mut [Vec3], options: &BakeOptions, report: &mut BakeReport) {
+fn note_seams(
+    maps: &Maps<'_>,
+    filled: &mut [Vec3],
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<(), BakeError> {
     let (closed, rays) = match options.seams {
-        true => close_seams(maps, filled),
+        true => close_seams(maps, filled, &mut |done| watch.advance(done))?,
         false => (Err("switched off"), 0),
     };
     report.rays += rays;
@@ -259,6 +271,7 @@ fn note_seams(maps: &Maps<'_>, filled: &mut [Vec3], options: &BakeOptions, repor
         Ok(closed) => report.seams = closed,
         Err(reason) => report.skipped.push(format!("seams: {reason}")),
     }
+    Ok(())
 }
 
 /// Length of a texel's side on the surface, canonical units, by the mean of all.

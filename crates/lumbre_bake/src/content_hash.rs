@@ -1,5 +1,5 @@
 //! One number for everything that a bake depends on, so that an unchanged scene need not be baked again and no checkpoint of another
-//! bake is continued. Not what it does not depend on: cameras, dynamic objects, highlights, threads.
+//! bake is continued. Not what it does not depend on: cameras, highlights, threads; of what moves only the room it takes, for the probes.
 //!
 //! Everything is taken apart field by field, without `..`: whoever adds a field decides here whether the bake reads it.
 
@@ -13,6 +13,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
 
+use crate::probes::Wanted;
 use crate::scene::{Object, Part, PlacedLight, collect, lights, sky};
 use crate::{BakeError, BakeOptions, Density};
 
@@ -38,7 +39,7 @@ impl fmt::Display for ContentHash {
 
 /// The hash of everything that [`bake`](crate::bake) reads of a world and its options, and of the baker itself: static meshes in their
 /// places, what their materials reflect, emit and let through with the pixels of their textures, the lights that are baked and the sky, all in
-/// the order in which they are baked. Take it before the bake, which gives meshes new coordinates.
+/// the order in which they are baked; and where probes are called for, the box around what moves and which faces shine in real time. Take it before the bake, which gives meshes new coordinates.
 ///
 /// Equal hashes mean equal bits, unless [`BakeOptions::time`] cuts a bake short: the hash leaves it out, like the number of threads.
 /// Only global transforms of the world are brought up to date.
@@ -49,7 +50,8 @@ pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentH
     options.check()?;
     let objects = collect(world)?;
     let placed = lights(world);
-    Ok(hash_of(&objects, &placed, sky(world), options))
+    let wanted = Wanted::of(world, &objects);
+    Ok(hash_of(&objects, &placed, sky(world), &wanted, options))
 }
 
 /// The hash of what was collected already.
@@ -57,6 +59,7 @@ pub(crate) fn hash_of(
     objects: &[Object],
     lights: &[PlacedLight],
     sky: Vec3,
+    wanted: &Wanted,
     options: &BakeOptions,
 ) -> ContentHash {
     let mut images = Images::default();
@@ -74,6 +77,15 @@ pub(crate) fn hash_of(
     }
     hasher.hashes(&lights.iter().map(light_hash).collect::<Vec<_>>());
     hasher.color(&sky);
+    hasher.number(wanted.are(options).is_ok().into());
+    if wanted.are(options).is_ok() {
+        // Of what moves, the place of the probes' grid.
+        let (low, high) = wanted.bounds();
+        hasher.doubles(&[low.to_array(), high.to_array()].concat());
+        // In the order of the parts, whose lengths are hashed with their objects.
+        hasher.number(wanted.real_time.len() as u64);
+        wanted.real_time.iter().for_each(|&own| hasher.number(own.into()));
+    }
     hasher.finish()
 }
 

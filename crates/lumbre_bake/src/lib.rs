@@ -57,7 +57,7 @@ pub use content_hash::{ContentHash, content_hash};
 pub use error::BakeError;
 pub use options::{BakeOptions, Density, Probes, Quality};
 pub use progress::Progress;
-pub use report::{BakeReport, Ended, ProbeReport, ResolutionReport, StageTime};
+pub use report::{BakeReport, Ended, ErrorAtTime, ProbeReport, ResolutionReport, StageTime};
 pub use texels::seams::SeamReport;
 pub use transport::form_factors::FormFactorMethod;
 pub use transport::method_study::{FormFactorErrors, form_factor_errors};

@@ -21,8 +21,9 @@ pub(crate) struct Plan {
     pub form_factor_rays: usize,
 }
 
-/// Of a triangle: itself, its corners for the hierarchy, the hierarchy's copy of them, two nodes.
-const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 48 + 2 * 64) as u64;
+/// Of a triangle: itself, its corners for the hierarchy and with its index while it is built, two nodes of the binary tree that is built first,
+/// and of what rays meet: its lane of a block that may be half empty, and its share of nodes of eight (256 bytes each, one in four triangles at worst).
+const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4) as u64;
 
 /// Of a texel that shows a surface: what it has gathered before and after a round, raw and smoothed estimates with their guides, and
 /// eight lists of one number each for the errors.
@@ -42,6 +43,13 @@ const PATCH: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8) as u64;
 /// Of a ray for form factors that meets a patch of its own: the count of it in the rays' half (a list may have grown to twice its
 /// length), in the row and in the column, and both entries of the pair in the matrix and in a half's.
 const RAY: u64 = 2 * 8 + 8 + 2 * 8 + 2 * 8 + 8;
+
+/// Of a patch, for the guide: its region, its place in the list of that, what leaves it, and at worst a region of its own, with the
+/// cut, the head of its list and row, its brightness and exchange.
+const GUIDED_PATCH: u64 = (4 + 8 + 4 + size_of::<Patch>() + 16 + 24 + 8 + 8 + 8 + 4) as u64;
+
+/// Of a pair of regions: the one and the probability, in lists that may have grown to twice their length. A ray makes two.
+const GUIDE_PAIR: u64 = 2 * 2 * (4 + 4);
 
 /// What nothing counts: threads, buffers, the checkpoint's block.
 const REST: u64 = 32 << 20;
@@ -126,6 +134,7 @@ impl Plan {
     fn exchange_bytes(&self, patches: u64) -> u64 {
         // Every patch casts some, however small it is; no patch meets more others than there are.
         let rays = (self.form_factor_rays as u64 + 32 * patches).min(patches.saturating_mul(patches));
-        patches * PATCH + rays * RAY
+        // Regions are fewer than patches, and exchange no more pairs than these.
+        patches * (PATCH + GUIDED_PATCH) + rays * (RAY + GUIDE_PAIR)
     }
 }

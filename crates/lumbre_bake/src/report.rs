@@ -13,6 +13,15 @@ pub struct StageTime {
     pub seconds: f64,
 }
 
+/// How good the lightmap was after some time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ErrorAtTime {
+    /// Wall-clock seconds since the bake began, those of a bake that it continues included.
+    pub seconds: f64,
+    /// Estimated relative RMSE of the lightmap.
+    pub error: f64,
+}
+
 /// The probes of a bake; all zeros without any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProbeReport {
@@ -126,6 +135,9 @@ pub struct BakeReport {
     pub mean_irradiance: [f64; 3],
     /// Estimated relative RMSE that sampling leaves in the lightmap.
     pub estimated_error: f64,
+    /// That error against time: after each round of the final gather (or after direct light, where nothing bounces), and at the end. Empty
+    /// where there was nothing to bake.
+    pub curve: Vec<ErrorAtTime>,
     /// Whether the estimated error is at most the one asked for.
     pub error_reached: bool,
     /// The error that the map's resolution leaves, estimated apart.
@@ -209,6 +221,9 @@ impl std::fmt::Display for BakeReport {
                 "{x} x {y} x {z} probes, {inside} inside geometry, error {:.2} %",
                 100.0 * estimated_error
             )?;
+        }
+        for ErrorAtTime { seconds, error } in &self.curve {
+            writeln!(f, "  after {seconds:>8.3} s error {:.3} %", 100.0 * error)?;
         }
         for stage in &self.stages {
             writeln!(f, "  {:<14} {:>8.3} s", stage.stage, stage.seconds)?;

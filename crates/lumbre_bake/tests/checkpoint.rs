@@ -90,6 +90,40 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
 }
 
 #[test]
+fn every_stage_may_be_interrupted_in_its_midst() {
+    // Where the callback is asked, by stage: the n-th time is one chance to end it.
+    let mut asked = Vec::new();
+    bake(&mut corner(), &options(), &mut |progress| {
+        asked.push(progress.stage);
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    let times = |stage: &str| asked.iter().filter(|own| **own == stage).count();
+    // The beginning and the end of a stage ask, too.
+    for stage in ["direct light", "form factors", "radiosity", "final gather", "texels", "seams"] {
+        assert!(times(stage) >= 3, "{stage} is asked {} times", times(stage));
+    }
+    for stage in ["final gather", "texels", "seams"] {
+        for wanted in 0..times(stage) {
+            let (mut world, mut seen) = (corner(), 0);
+            let result = bake(&mut world, &options(), &mut |progress| {
+                seen += usize::from(progress.stage == stage);
+                if seen > wanted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            // How many chunks there are depends on the machine: the last of them may be missing.
+            match result {
+                Err(BakeError::Cancelled { stage: found }) => assert_eq!(found, stage),
+                other => assert!(stage == "final gather" && other.is_ok(), "{stage} {wanted}: {other:?}"),
+            }
+            assert!(bits(&mut world).is_empty() || stage == "final gather");
+            if stage == "final gather" && wanted > 6 {
+                break;
+            }
+        }
+    }
+}
+
+#[test]
 fn a_complete_checkpoint_holds_all_the_long_work() {
     let folder = tempfile::tempdir().unwrap();
     let kept = checkpoint(&folder.path().join("checkpoint"), true);

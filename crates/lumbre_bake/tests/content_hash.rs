@@ -7,10 +7,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_ecs::prelude::*;
-use glam::Vec3;
-use lumbre_bake::{BakeOptions, ContentHash, Density, FormFactorMethod, Quality, Solver, bake, content_hash};
-use lumbre_optics::{AlphaMode, BakeMode, Light, Material};
-use lumbre_scene::{Camera, DynamicObject, Hidden, Mesh, Name, Transform};
+use glam::{Vec2, Vec3};
+use lumbre_bake::{
+    BakeOptions, ContentHash, Density, FormFactorMethod, Probes, Quality, Solver, bake, content_hash,
+};
+use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, SpotCone, Surface};
+use lumbre_scene::{
+    Camera, DynamicObject, EmissiveLight, Hidden, Image, MaterialTextures, Mesh, MetallicRoughnessTexture,
+    Name, Sampler, TextureReference, Transform, Wrap,
+};
 
 #[path = "common/corner.rs"]
 mod corner;
@@ -44,6 +49,98 @@ fn mesh(world: &mut World, change: impl FnOnce(&mut lumbre_mesh::TriangleMesh)) 
     change(Arc::make_mut(&mut mesh.0));
 }
 
+/// Something dynamic on the floor's edge: the probes' grid holds it.
+fn moving(world: &mut World, at: f64) {
+    let ball = Arc::new(lumbre_mesh::shapes::uv_sphere(0.3, 8, 4));
+    let place = Transform::from_xyz(at, 0.5, 2.5);
+    world.spawn((Mesh(ball), Material::default(), DynamicObject, place));
+}
+
+/// The floor's texture in one slot or the other.
+fn textured(change: impl FnOnce(&mut MaterialTextures)) -> ContentHash {
+    hash(|world| {
+        let image = Image { name: "tiles".into(), width: 2, height: 1, rgba: vec![9; 8] };
+        let reference = TextureReference {
+            image: Arc::new(image),
+            sampler: Sampler::default(),
+            tex_coord: 0,
+            offset: Vec2::ZERO,
+            rotation: 0.0,
+            scale: Vec2::ONE,
+        };
+        let of_metal = MetallicRoughnessTexture {
+            texture: reference.clone(),
+            base_color: Vec3::ONE,
+            metallic: 0.5,
+            roughness: 0.5,
+        };
+        let mut textures = MaterialTextures {
+            base_color: Some(reference.clone()),
+            emissive: Some(reference),
+            metallic_roughness: Some(of_metal),
+        };
+        change(&mut textures);
+        let floor = object(world, "floor");
+        world.entity_mut(floor).insert(textures);
+    })
+}
+
+#[test]
+fn all_of_a_texture_that_is_read_changes_the_hash() {
+    type Change = fn(&mut TextureReference);
+    let changes: &[(&str, Change)] = &[
+        ("pixel", |t| Arc::make_mut(&mut t.image).rgba[5] ^= 1),
+        ("shape", |t| {
+            let image = Arc::make_mut(&mut t.image);
+            (image.width, image.height) = (1, 2);
+        }),
+        ("wrap u", |t| t.sampler.wrap_u = Wrap::ClampToEdge),
+        ("wrap v", |t| t.sampler.wrap_v = Wrap::ClampToEdge),
+        ("set", |t| t.tex_coord = 1),
+        ("offset", |t| t.offset.y += 1e-6),
+        ("rotation", |t| t.rotation += 1e-6),
+        ("scale u", |t| t.scale.x += 1e-6),
+        ("scale v", |t| t.scale.y += 1e-3),
+    ];
+    let mut seen = vec![("none of it", textured(|_| {})), ("no texture", hash(|_| {}))];
+    let mut add = |what, changed| {
+        for (other, known) in &seen {
+            assert_ne!(changed, *known, "{what} and {other}");
+        }
+        seen.push((what, changed));
+    };
+    for (what, change) in changes {
+        add(what, textured(|textures| change(textures.base_color.as_mut().unwrap())));
+        add(what, textured(|textures| change(textures.emissive.as_mut().unwrap())));
+        add(what, textured(|textures| change(&mut textures.metallic_roughness.as_mut().unwrap().texture)));
+    }
+    add("factor", textured(|t| t.metallic_roughness.as_mut().unwrap().base_color.x = 0.5));
+    add("metallic", textured(|t| t.metallic_roughness.as_mut().unwrap().metallic = 0.6));
+    add("no base colour", textured(|t| t.base_color = None));
+    add("no emission", textured(|t| t.emissive = None));
+    add("no metal", textured(|t| t.metallic_roughness = None));
+    let roughness = textured(|t| t.metallic_roughness.as_mut().unwrap().roughness = 0.9);
+    assert_eq!(roughness, textured(|_| {}), "highlights are not baked");
+}
+
+#[test]
+fn what_moves_counts_only_where_probes_are_called_for() {
+    let never = BakeOptions { probes: Probes::Never, ..BakeOptions::default() };
+    let mut still = corner();
+    let mut moved = corner();
+    moving(&mut moved, 0.0);
+    let hash = |world: &mut World| content_hash(world, &never).unwrap();
+    assert_eq!(hash(&mut still), hash(&mut moved));
+    let lamp = object(&mut moved, "lamp");
+    moved.entity_mut(lamp).insert(EmissiveLight);
+    assert_eq!(hash(&mut still), hash(&mut moved));
+    // A copy of it inside its box changes nothing of the grid.
+    let automatic = BakeOptions::default();
+    let one = content_hash(&mut moved, &automatic).unwrap();
+    moving(&mut moved, 0.0);
+    assert_eq!(one, content_hash(&mut moved, &automatic).unwrap());
+}
+
 #[test]
 fn the_same_scene_has_the_same_hash_whatever_else_is_in_the_world() {
     let plain = hash(|_| {});
@@ -54,11 +151,11 @@ fn the_same_scene_has_the_same_hash_whatever_else_is_in_the_world() {
         hash(|world| {
             world.spawn((Camera::default(), Transform::from_xyz(0.0, 1.0, 5.0)));
             let ball = Arc::new(lumbre_mesh::shapes::uv_sphere(0.3, 8, 4));
-            world.spawn((Mesh(Arc::clone(&ball)), Material::default(), DynamicObject));
+            world.spawn((Mesh(Arc::clone(&ball)), Material::default(), DynamicObject, Hidden));
             world.spawn((Mesh(ball), Material::default(), lumbre_scene::StaticObject, Hidden));
             world.spawn(Light::point(Vec3::ONE));
         }),
-        "cameras, dynamic and hidden objects and dynamic lights are not baked"
+        "cameras, hidden objects and dynamic lights are not baked"
     );
     assert_eq!(
         plain,
@@ -91,6 +188,62 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("unlit", |world| material(world, |m| m.unlit = true)),
         ("light's colour", |world| light(world, |l| l.diffuse.z += 1e-6)),
         ("light's attenuation", |world| light(world, |l| l.attenuation.quadratic += 1e-6)),
+        ("light's constant attenuation", |world| light(world, |l| l.attenuation.constant += 1e-6)),
+        ("light's linear attenuation", |world| light(world, |l| l.attenuation.linear += 1e-6)),
+        ("light's clamp", |world| light(world, |l| l.attenuation.clamp = !l.attenuation.clamp)),
+        ("light's range", |world| light(world, |l| l.attenuation.range = 7.0)),
+        ("light's radius", |world| light(world, |l| l.radius = 0.1)),
+        ("light's angle", |world| light(world, |l| l.angle = 0.1)),
+        ("light's kind", |world| light(world, |l| l.kind = LightKind::Directional)),
+        ("spot", |world| light(world, |l| l.spot = Some(SpotCone::Exponent { cutoff: 1.0, exponent: 2.0 }))),
+        ("cutoff", |world| {
+            light(world, |l| l.spot = Some(SpotCone::Exponent { cutoff: 0.9, exponent: 2.0 }))
+        }),
+        ("exponent", |world| {
+            light(world, |l| l.spot = Some(SpotCone::Exponent { cutoff: 1.0, exponent: 3.0 }))
+        }),
+        ("smooth spot", |world| light(world, |l| l.spot = Some(SpotCone::Smooth { inner: 1.0, outer: 2.0 }))),
+        ("light's place", |world| {
+            let mut lights = world.query_filtered::<&mut Transform, With<Light>>();
+            lights.single_mut(world).unwrap().translation.y += 1e-9;
+        }),
+        ("sky", |world| {
+            let mut settings = lumbre_scene::SceneSettings::default();
+            settings.sky.z = 1e-6;
+            world.insert_resource(settings);
+        }),
+        ("name", |world| {
+            let floor = object(world, "floor");
+            world.entity_mut(floor).insert(Name::new("ground"));
+        }),
+        ("alpha", |world| {
+            material(world, |m| (m.alpha, m.alpha_mode) = (0.5, AlphaMode::Mask { cutoff: 0.5 }))
+        }),
+        ("cutoff of a mask", |world| material(world, |m| m.alpha_mode = AlphaMode::Mask { cutoff: 0.4 })),
+        ("blend", |world| material(world, |m| m.alpha_mode = AlphaMode::Blend)),
+        ("back's emission", |world| {
+            material(world, |m| m.back = Some(Surface { emission: Vec3::ONE, ..m.front.clone() }));
+        }),
+        ("uv0", |world| mesh(world, |mesh| mesh.uv0[3].x += 1e-6)),
+        ("scaled", |world| {
+            let crate_ = object(world, "box");
+            world.get_mut::<Transform>(crate_).unwrap().scale.y *= 1.0 + 1e-9;
+        }),
+        ("hidden", |world| {
+            let crate_ = object(world, "box");
+            world.entity_mut(crate_).insert(Hidden);
+        }),
+        ("gone", |world| {
+            let crate_ = object(world, "box");
+            world.despawn(crate_);
+        }),
+        ("something moves", |world| moving(world, 0.0)),
+        ("it moves elsewhere", |world| moving(world, 1e-9)),
+        ("and a face shines in real time", |world| {
+            moving(world, 0.0);
+            let lamp = object(world, "lamp");
+            world.entity_mut(lamp).insert(EmissiveLight);
+        }),
         ("light's baking", |world| light(world, |l| l.bake = BakeMode::Mixed)),
         ("light off", |world| light(world, |l| l.enabled = false)),
         ("moved", |world| {
@@ -110,7 +263,26 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         }
         seen.push((what, changed));
     }
+    // Whoever adds a field adds it here and below.
     let default = BakeOptions::default();
+    let BakeOptions {
+        density: _,
+        atlas_size: _,
+        error: _,
+        time: _,
+        quality: _,
+        gap: _,
+        seed: _,
+        threads: _,
+        solver: _,
+        denoise: _,
+        seams: _,
+        probes: _,
+        probe_spacing: _,
+        memory: _,
+        form_factors: _,
+        resolution_error: _,
+    } = default;
     let options = [
         ("density", BakeOptions { density: Density::MapSize(64), ..default }),
         ("map size", BakeOptions { density: Density::MapSize(65), ..default }),
@@ -123,6 +295,11 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("resolution error", BakeOptions { resolution_error: false, ..default }),
         ("solver", BakeOptions { solver: Solver::Jacobi, ..default }),
         ("denoise", BakeOptions { denoise: false, ..default }),
+        ("atlas", BakeOptions { atlas_size: Some(256), ..default }),
+        ("seams", BakeOptions { seams: false, ..default }),
+        ("probes", BakeOptions { probes: Probes::Always, ..default }),
+        ("no probes", BakeOptions { probes: Probes::Never, probe_spacing: Some(0.5), ..default }),
+        ("probe spacing", BakeOptions { probe_spacing: Some(0.5), ..default }),
         ("memory", BakeOptions { memory: Some(1 << 30), ..default }),
     ];
     for (what, options) in options {

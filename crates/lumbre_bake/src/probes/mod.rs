@@ -13,6 +13,7 @@ mod grid;
 mod light;
 
 use bevy_ecs::prelude::*;
+use glam::DVec3;
 use lumbre_scene::{
     AmbientCube, ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, IrradianceVolume, Mesh,
 };
@@ -37,10 +38,10 @@ pub(crate) struct PlacedVolume {
 /// What the World asks of the probes.
 pub(crate) struct Wanted {
     /// Corners of what moves, world space.
-    moving: Vec<glam::DVec3>,
+    moving: Vec<DVec3>,
     any: bool,
     /// By the index of its material in the scene, whether a surface is a polygon light in a frame.
-    real_time: Vec<bool>,
+    pub(crate) real_time: Vec<bool>,
 }
 
 impl Wanted {
@@ -65,6 +66,23 @@ impl Wanted {
         Self { moving, any, real_time }
     }
 
+    /// Whether probes are called for, or why not.
+    pub fn are(&self, options: &BakeOptions) -> Result<(), &'static str> {
+        match options.probes {
+            Probes::Never => Err("they are switched off"),
+            Probes::Automatic if !self.any => Err("nothing moves"),
+            Probes::Automatic | Probes::Always => Ok(()),
+        }
+    }
+
+    /// Corners of the box around what moves, world space; infinite and turned inside out if there is nothing.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let finite = self.moving.iter().filter(|point| point.is_finite());
+        finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| {
+            (low.min(point), high.max(point))
+        })
+    }
+
     /// Bakes the probes, if they are called for; the report says why not.
     pub fn bake(
         &self,
@@ -75,12 +93,7 @@ impl Wanted {
         watch: &mut Watch<'_>,
         report: &mut BakeReport,
     ) -> Result<Option<PlacedVolume>, BakeError> {
-        let reason = match options.probes {
-            Probes::Never => Some("they are switched off"),
-            Probes::Automatic if !self.any => Some("nothing moves"),
-            Probes::Automatic | Probes::Always => None,
-        };
-        if let Some(reason) = reason {
+        if let Err(reason) = self.are(options) {
             report.skipped.push(format!("probes: {reason}"));
             return Ok(None);
         }

@@ -6,6 +6,7 @@ use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::footprint::{Footprint, Texel};
+use crate::BakeError;
 use crate::scene::LightmapLayout;
 
 /// Square texels of spread below which a slope counts as unknown.
@@ -161,14 +162,15 @@ fn around(width: u32, height: u32, x: u32, y: u32, radius: u32) -> impl Iterator
     rows.flat_map(move |ny| columns.clone().map(move |nx| (nx, ny)))
 }
 
-/// Fills all maps from values per covered texel; NaN where nothing is known.
+/// Fills all maps from values per covered texel; NaN where nothing is known. `advance` is told the fraction done, and may end it.
 pub(crate) fn fill(
     layout: &LightmapLayout,
     texels: &[Texel],
     charts: &[u32],
     values: &[Vec3],
     rings: u32,
-) -> Vec<Vec3> {
+    advance: &mut dyn FnMut(f32) -> Result<(), BakeError>,
+) -> Result<Vec<Vec3>, BakeError> {
     let mut known: Vec<Option<Known>> = vec![None; layout.texels];
     for (texel, &value) in texels.iter().zip(values) {
         if !texel.is_hidden() {
@@ -182,8 +184,9 @@ pub(crate) fn fill(
         let own = map.first..map.first + (map.width * map.height) as usize;
         let values = fill_map(map.width, map.height, &known[own.clone()], &hidden[own], rings);
         filled.extend(values.into_iter().map(|value| value.unwrap_or(Vec3::NAN)));
+        advance(filled.len() as f32 / layout.texels.max(1) as f32)?;
     }
-    filled
+    Ok(filled)
 }
 
 /// `reach`: how far in texels filtering reads.

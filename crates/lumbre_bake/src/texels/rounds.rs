@@ -13,7 +13,7 @@ use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
 use crate::progress::Watch;
 use crate::transport::direct::Direct;
-use crate::{BakeError, BakeOptions, BakeReport, Ended};
+use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
 /// Share of the squared error below which the gather's own noise is not worth more rays.
 const WORTH_RAYS: f64 = 0.1;
@@ -73,6 +73,7 @@ pub(crate) fn gather(
             }
             false => (raw.clone(), vec![0.0; texels.len()]),
         };
+        watch.advance(1.0)?;
         let patch_bias = patch_bias(&surroundings, texels, &gathered, outgoing.patches.mean_reflectance());
         let spread = spread(&surroundings, texels, &estimates);
         let errors = GatherErrors {
@@ -94,6 +95,8 @@ pub(crate) fn gather(
         let sum: f64 = open_variances(texels, &variances).sum::<f64>() - by_chance;
         report.estimated_error = if total > 0.0 { (sum / open).sqrt() / total } else { 0.0 };
         report.error_reached = report.estimated_error <= options.error;
+        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
+        watch.advance(1.0)?;
         let late = !in_time || watch.clock().late();
         // Of the error, the part that more rays make smaller: what the patches leave stays.
         let by_rays = errors.by_rays();

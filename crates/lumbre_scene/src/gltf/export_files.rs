@@ -1,7 +1,10 @@
 //! Writing several files so that each is under its final name whole or not at all. Not what is in them.
+//!
+//! Of what a process is writing one file is locked: `.partial` files of which none is were left by one that was killed, and go.
 
+use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsString;
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +15,39 @@ use super::export::SaveError;
 pub(crate) struct Files {
     /// (temporary, final)
     waiting: Vec<(PathBuf, PathBuf)>,
+    /// One of the temporary ones, locked so that no other process takes them for left over.
+    held: Option<File>,
+    /// Folders that were looked through for what was left over.
+    tidied: HashSet<PathBuf>,
+}
+
+/// The process in a name that [`Files`] gives to what is not finished: `.NAME.PROCESS-ATTEMPT.partial`.
+fn writer(name: &str) -> Option<&str> {
+    let own = name.strip_prefix('.')?.strip_suffix(".partial")?;
+    let (process, attempt) = own.rsplit_once('.')?.1.split_once('-')?;
+    let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    (number(process) && number(attempt)).then_some(process)
+}
+
+/// Removes what killed processes have left half-written in a folder. That it cannot is no reason not to write.
+fn tidy(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    let mut by_process: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for entry in entries.flatten() {
+        // A link or a pipe is not ours, and opening it might wait for ever.
+        if entry.file_type().is_ok_and(|kind| kind.is_file())
+            && let Some(process) = entry.file_name().to_str().and_then(writer)
+        {
+            by_process.entry(process.to_owned()).or_default().push(entry.path());
+        }
+    }
+    let free =
+        |path: &PathBuf| OpenOptions::new().write(true).open(path).is_ok_and(|file| file.try_lock().is_ok());
+    for left in by_process.into_values().filter(|paths| paths.iter().all(free)) {
+        for path in left {
+            let _ = fs::remove_file(path);
+        }
+    }
 }
 
 impl Files {
@@ -24,6 +60,13 @@ impl Files {
                 "the path names no file",
             )));
         };
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        if self.tidied.insert(folder.to_owned()) {
+            tidy(folder);
+        }
         for attempt in 0..100 {
             let mut hidden = OsString::from(".");
             hidden.push(name);
@@ -31,8 +74,17 @@ impl Files {
             let temporary = path.with_file_name(hidden);
             match OpenOptions::new().write(true).create_new(true).open(&temporary) {
                 Ok(mut file) => {
+                    // Another process that tidies may have been quicker than the lock. Where there are no locks nobody tidies.
+                    if self.held.is_none()
+                        && (matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !temporary.exists())
+                    {
+                        let _ = fs::remove_file(&temporary);
+                        continue;
+                    }
                     self.waiting.push((temporary, path.to_owned()));
-                    return file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed);
+                    let written = file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed);
+                    self.held.get_or_insert(file);
+                    return written;
                 }
                 Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(failed(error)),
@@ -47,6 +99,9 @@ impl Files {
     /// Gives every file its final name, in the order they were written.
     pub(crate) fn commit(mut self) -> Result<Vec<PathBuf>, SaveError> {
         let mut done = Vec::new();
+        // The first is soon no temporary file any more: the last is locked as well.
+        let last = self.waiting.last().and_then(|(temporary, _)| File::open(temporary).ok());
+        let _ = last.as_ref().map(File::try_lock);
         while !self.waiting.is_empty() {
             let (temporary, path) = &self.waiting[0];
             fs::rename(temporary, path).map_err(|source| SaveError::Write { path: path.clone(), source })?;
@@ -62,5 +117,45 @@ impl Drop for Files {
             // Nothing more can be done about a file that cannot be removed either.
             let _ = fs::remove_file(temporary);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_killed_process_left_goes_and_what_is_being_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for left in [".room.glb.12-0.partial", ".floor.lightmap.exr.9-3.partial"] {
+            fs::write(at(left), "half").unwrap();
+        }
+        let kept = ["notes.partial", ".mine.partial", ".a.x-1.partial", ".b.7-.partial", "room.glb"];
+        for name in kept {
+            fs::write(at(name), name).unwrap();
+        }
+        let mut other = Files::default();
+        other.write(&at("other.glb"), b"other").unwrap();
+        let mut files = Files::default();
+        files.write(&at("room.glb"), b"new").unwrap();
+        assert!(!at(".room.glb.12-0.partial").exists() && !at(".floor.lightmap.exr.9-3.partial").exists());
+        for name in kept {
+            assert_eq!(fs::read_to_string(at(name)).unwrap(), name);
+        }
+        other.commit().unwrap();
+        files.commit().unwrap();
+        assert_eq!(fs::read(at("other.glb")).unwrap(), b"other");
+        assert_eq!(fs::read(at("room.glb")).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), kept.len() + 1);
+    }
+
+    #[test]
+    fn what_is_not_committed_goes() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut files = Files::default();
+        files.write(&folder.path().join("room.glb"), b"new").unwrap();
+        drop(files);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

@@ -19,6 +19,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::footprint::Texel;
+use crate::BakeError;
 use crate::scene::{BakeScene, LightmapLayout};
 use least_squares::Unknowns;
 
@@ -52,23 +53,32 @@ pub(crate) struct Maps<'a> {
 /// Chart of a texel that no surface covers in the open.
 const NO_CHART: u32 = u32::MAX;
 
+/// What closing came to, or why there was nothing to do; and the rays cast.
+type Closed = (Result<SeamReport, &'static str>, u64);
+
 /// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known). Returns what was done, and the rays cast;
-/// a reason in place of a report where there is nothing to do.
-pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3]) -> (Result<SeamReport, &'static str>, u64) {
+/// a reason in place of a report where there is nothing to do. `advance` is told the fraction done, and may end it.
+pub(crate) fn close_seams(
+    maps: &Maps<'_>,
+    filled: &mut [Vec3],
+    advance: &mut dyn FnMut(f32) -> Result<(), BakeError>,
+) -> Result<Closed, BakeError> {
     if maps.mean.is_nan() || maps.mean <= 0.0 {
-        return (Err("the maps are black"), 0);
+        return Ok((Err("the maps are black"), 0));
     }
     let edges = edges::borders(maps.scene);
     let mut charts = vec![NO_CHART; maps.layout.texels];
     for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
         charts[texel.index as usize] = maps.charts[texel.triangle as usize];
     }
-    let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }.all();
+    let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }
+        .all(&mut |done| advance(0.5 * done))?;
     if found.samples.is_empty() {
-        return (Err("no two borders of charts join smoothly in one place"), found.rays);
+        return Ok((Err("no two borders of charts join smoothly in one place"), found.rays));
     }
     let unknowns = Unknowns::new(maps, &charts, filled, &found.samples);
+    advance(0.5)?;
     let mut report = unknowns.solve(&found.samples, filled, maps.mean);
     report.edges = found.pairs;
-    (Ok(report), found.rays)
+    Ok((Ok(report), found.rays))
 }

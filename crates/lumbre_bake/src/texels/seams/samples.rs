@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::edge_grid::EdgeGrid;
 use super::edges::Edge;
 use super::{Maps, NO_CHART};
+use crate::BakeError;
 
 /// Edges nearer than this are in one place, canonical units: 64 roundings of the largest coordinate, which is below 2.
 const SAME_PLACE: f64 = 64.0 / (1 << 23) as f64;
@@ -58,23 +59,34 @@ pub(crate) struct Sampling<'a> {
     pub edges: &'a [Edge],
 }
 
+/// Edges between two chances to end it.
+const AT_ONCE: usize = 1024;
+
 impl Sampling<'_> {
-    pub fn all(&self) -> Found {
+    pub fn all(&self, advance: &mut dyn FnMut(f32) -> Result<(), BakeError>) -> Result<Found, BakeError> {
         let grid = EdgeGrid::new(self.edges, SAME_PLACE);
-        let found: Vec<Found> = (0..self.edges.len() as u32)
-            .into_par_iter()
-            .map(|index| {
-                let mut own = Found { samples: Vec::new(), pairs: 0, rays: 0 };
-                for other in grid.near(index) {
-                    let before = own.samples.len();
-                    own.rays += self.between(index, other, &mut own.samples);
-                    own.pairs += usize::from(own.samples.len() > before);
-                }
-                own
-            })
-            .collect();
-        let (pairs, rays) = found.iter().fold((0, 0), |(p, r), own| (p + own.pairs, r + own.rays));
-        Found { samples: found.into_iter().flat_map(|own| own.samples).collect(), pairs, rays }
+        let of_edge = |index: u32| {
+            let mut own = Found { samples: Vec::new(), pairs: 0, rays: 0 };
+            for other in grid.near(index) {
+                let before = own.samples.len();
+                own.rays += self.between(index, other, &mut own.samples);
+                own.pairs += usize::from(own.samples.len() > before);
+            }
+            own
+        };
+        let mut all = Found { samples: Vec::new(), pairs: 0, rays: 0 };
+        let count = self.edges.len() as u32;
+        for start in (0..count).step_by(AT_ONCE) {
+            let end = (start + AT_ONCE as u32).min(count);
+            let found: Vec<Found> = (start..end).into_par_iter().map(of_edge).collect();
+            for own in found {
+                all.samples.extend(own.samples);
+                all.pairs += own.pairs;
+                all.rays += own.rays;
+            }
+            advance(end as f32 / count as f32)?;
+        }
+        Ok(all)
     }
 
     /// Adds the samples of what two edges share; returns the rays cast.
