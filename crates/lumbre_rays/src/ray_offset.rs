@@ -58,9 +58,9 @@ mod tests {
             by if by < 0.0 => (from + by).next_down(),
             by => from + by,
         };
-        let numbers = [0.0, -0.0, 1e-45, -1e-45, 1e-38, -3.0, 0.1, -0.1, 1.0, 7e5, -2e20, 3e38];
-        for (x, n) in numbers.iter().flat_map(|&x| [-1.0, -1e-30, -0.0, 0.0, 0.3, 1.0].map(|n| (x, n))) {
-            for extent in [0.0, 1.0, 1e6] {
+        let numbers = [0.0f32, -0.0, 1e-45, -1e-45, 1e-38, -3.0, 0.1, -0.1, 1.0, 7e5, -2e20, 3e38];
+        for (x, n) in numbers.iter().flat_map(|&x| [-1.0f32, -1e-30, -0.0, 0.0, 0.3, 1.0].map(|n| (x, n))) {
+            for extent in [0.0f32, 1.0, 1e6] {
                 let normal = Vec3::new(n, 0.0, 0.0);
                 let length = extent.max(x.abs()) * RELATIVE_ERROR * n.abs();
                 let moved = offset_ray_origin(Vec3::new(x, 0.0, 0.0), normal, extent).x;
