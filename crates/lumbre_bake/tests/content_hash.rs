@@ -229,10 +229,6 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
             let crate_ = object(world, "box");
             world.get_mut::<Transform>(crate_).unwrap().scale.y *= 1.0 + 1e-9;
         }),
-        ("hidden", |world| {
-            let crate_ = object(world, "box");
-            world.entity_mut(crate_).insert(Hidden);
-        }),
         ("gone", |world| {
             let crate_ = object(world, "box");
             world.despawn(crate_);
@@ -263,6 +259,12 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         }
         seen.push((what, changed));
     }
+    // What is hidden is not there.
+    let hidden = hash(|world| {
+        let crate_ = object(world, "box");
+        world.entity_mut(crate_).insert(Hidden);
+    });
+    assert!(seen.contains(&("gone", hidden)));
     // Whoever adds a field adds it here and below.
     let default = BakeOptions::default();
     let BakeOptions {
