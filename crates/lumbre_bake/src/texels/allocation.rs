@@ -12,10 +12,12 @@ pub(crate) struct Allotment {
     pub samples: u32,
 }
 
-/// Factors of a bisection of what a sample is worth.
-const STEP: f64 = 1.25;
-/// Most that one round multiplies the samples by: a variance from few is not to be trusted further.
-const MOST_AT_ONCE: u32 = 8;
+/// Most that one round doubles the samples: a variance from few is not to be trusted further.
+const MOST_DOUBLINGS: usize = 3;
+/// What a sample must at least be worth is sought by this factor, down to this share of the highest, and then by so many halvings.
+const FACTOR: f64 = 4.0;
+const LEAST: f64 = 1e-9;
+const HALVINGS: u32 = 6;
 
 /// The samples that bring the sum of variances down to `goal`, each texel's to at most `most`, by powers of two; all that can be had if that
 /// does not suffice. `variances` and `samples` are those of `texels`, by index; `order` is that of the variance's fall with the samples.
@@ -27,39 +29,50 @@ pub(crate) fn allot(
     order: f64,
     goal: f64,
 ) -> Vec<Allotment> {
+    // With k times the samples, each is worth 1 / k^(1 + p) of what it was, and k^-p of the variance is left.
+    let powers = |exponent: f64| [1.0, 2.0, 4.0, 8.0].map(|factor: f64| factor.powf(exponent));
+    let (devalued, remaining) = (powers(1.0 + order), powers(-order));
     let worth = |index: u32| f64::from(variances[index as usize]) / f64::from(samples[index as usize].max(1));
-    let wanted = |index: u32, least_worth: f64| {
-        let own = samples[index as usize].max(1);
-        let mut factor = 1;
-        while worth(index) > least_worth * f64::from(factor).powf(1.0 + order)
-            && factor < MOST_AT_ONCE
-            && own * factor < most
+    // Doublings of a texel's samples; the last one may end at `most`.
+    let doublings = |index: u32, least_worth: f64| {
+        let (own, worth) = (samples[index as usize].max(1), worth(index));
+        let mut doublings = 0;
+        while doublings < MOST_DOUBLINGS
+            && own << doublings < most
+            && worth > least_worth * devalued[doublings]
         {
-            factor *= 2;
+            doublings += 1;
         }
-        (own * factor).min(most.max(own))
+        doublings
     };
     let left = |least_worth: f64| -> f64 {
-        let one = |index: u32| {
-            let own = f64::from(samples[index as usize].max(1));
-            f64::from(variances[index as usize]) * (own / f64::from(wanted(index, least_worth))).powf(order)
-        };
+        let one = |index| f64::from(variances[index as usize]) * remaining[doublings(index, least_worth)];
         texels.clone().map(one).sum()
     };
-    let mut least_worth = texels.clone().map(worth).fold(0.0, f64::max);
-    while least_worth > f64::MIN_POSITIVE && left(least_worth) > goal {
-        let before = least_worth;
-        least_worth /= STEP;
-        // Where all have what they may have, nothing is gained any more.
-        let nobody_is_left = texels.clone().all(|index| {
-            let own = samples[index as usize].max(1);
-            wanted(index, before) >= (own * MOST_AT_ONCE).min(most.max(own)) || worth(index) == 0.0
-        });
-        if nobody_is_left {
-            break;
+    let highest = texels.clone().map(worth).fold(0.0, f64::max);
+    // All that can be had, if need be; less where that does.
+    let (mut too_high, mut least_worth) = (0.0, highest);
+    if left(highest) > goal {
+        least_worth = 0.0;
+        let mut power = highest;
+        // Down by factors first, as variances are many orders apart, to where the goal is met or nobody can have more.
+        while power > f64::MIN_POSITIVE && left(power) > goal && power > highest * LEAST {
+            (too_high, power) = (power, power / FACTOR);
+        }
+        if left(power) <= goal {
+            let (mut above, mut below) = (too_high, power);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (above + below);
+                if left(middle) <= goal { below = middle } else { above = middle }
+            }
+            least_worth = below;
         }
     }
-    let more = |index: u32| Allotment { index, samples: wanted(index, least_worth) };
+    let wanted = |index: u32| {
+        let own = samples[index as usize].max(1);
+        (own << doublings(index, least_worth)).min(most.max(own))
+    };
+    let more = |index: u32| Allotment { index, samples: wanted(index) };
     texels.map(more).filter(|own| own.samples > samples[own.index as usize]).collect()
 }
 

@@ -2,6 +2,7 @@
 //! reached, the time is up or the quality's most rays are cast.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::allocation::{Allotment, allot};
 use super::chunks::in_chunks_in_time;
@@ -65,10 +66,10 @@ pub(crate) fn gather(
             from_patches(outgoing, texels, &mut gathered);
         }
         round += 1;
-        let raw: Vec<Estimates> = gathered.iter().map(Gathered::estimates).collect();
+        let raw: Vec<Estimates> = gathered.par_iter().map(Gathered::estimates).collect();
         let (estimates, smoothing_bias) = match options.denoise {
             true => {
-                let near: Vec<f32> = gathered.iter().map(Gathered::inverse_distance).collect();
+                let near: Vec<f32> = gathered.par_iter().map(Gathered::inverse_distance).collect();
                 smooth(&surroundings, &raw, &near)
             }
             false => (raw.clone(), vec![0.0; texels.len()]),

@@ -34,7 +34,7 @@ pub(crate) struct Level {
 /// two halves: 4 / 9 / sqrt(2 * 49 / 9). What the second takes in goes together over some 28 texels: its blocks hold four
 /// that do not, and the radius as many blocks.
 const LEVELS: [Level; 2] = [
-    Level { step: 1, steps: 4, width: 3.0, near: 1.0, guide_steps: 1, chance: 0.135 },
+    Level { step: 1, steps: 3, width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 },
     Level { step: 3, steps: 4, width: 9.0, near: 12.0, guide_steps: 0, chance: 0.33 },
 ];
 

@@ -67,8 +67,12 @@ impl FormFactors {
         };
         let whole = Self::pooled(&cast, patches, &NearPairs::default(), Cast::whole);
         let near = near_pairs(scene, patches, &whole, &cast, seed);
-        let halves = [0, 1].map(|half| Self::pooled(&cast, patches, &near, |cast| cast.half(half)));
-        let mut whole = Self::pooled(&cast, patches, &near, Cast::whole);
+        let half = |half: usize| Self::pooled(&cast, patches, &near, |cast| cast.half(half));
+        let ((even, odd), mut whole) = rayon::join(
+            || rayon::join(|| half(0), || half(1)),
+            || Self::pooled(&cast, patches, &near, Cast::whole),
+        );
+        let halves = [even, odd];
         (whole.rays, whole.exact) = (rays, near.count());
         Ok((whole, halves))
     }
