@@ -1,5 +1,7 @@
 //! A table of hard cases, and its part of docs/hard-cases.md. Not the cases.
 
+#![allow(clippy::print_stdout, reason = "the table is what the test is for")]
+
 use std::path::Path;
 
 use crate::case::{Case, HEADING};

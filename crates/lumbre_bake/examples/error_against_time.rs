@@ -3,6 +3,8 @@
 //!
 //! `cargo run --release -p lumbre_bake --example error_against_time`. A table is one run: times of two runs are two machines.
 
+#![allow(clippy::print_stdout, reason = "a program whose result is text")]
+
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::Path;

@@ -175,7 +175,10 @@ struct Map {
     errors: Vec<f32>,
 }
 
-fn baked(input: &Path, options: &BakeOptions) -> Result<(BakeReport, Vec<(String, Map)>), Box<dyn Error>> {
+/// Maps by name.
+type Maps = Vec<(String, Map)>;
+
+fn baked(input: &Path, options: &BakeOptions) -> Result<(BakeReport, Maps), Box<dyn Error>> {
     let held_out = scenes::all().into_iter().find(|(name, ..)| input.as_os_str() == *name);
     let mut world = match held_out {
         Some((_, scene, layout)) => scene(layout, 1.0),

@@ -182,7 +182,7 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("color", |world| mesh(world, |mesh| mesh.colors = vec![glam::Vec4::ONE; mesh.positions.len()])),
         ("reflectance", |world| material(world, |m| m.front.diffuse.y += 1e-6)),
         ("emission", |world| material(world, |m| m.front.emission.y += 1e-6)),
-        ("back", |world| material(world, |m| m.back = Some(m.front.clone()))),
+        ("back", |world| material(world, |m| m.back = Some(m.front))),
         ("mask", |world| material(world, |m| m.alpha_mode = AlphaMode::Mask { cutoff: 0.5 })),
         ("double-sided", |world| material(world, |m| m.double_sided = !m.double_sided)),
         ("unlit", |world| material(world, |m| m.unlit = true)),
@@ -222,7 +222,7 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("cutoff of a mask", |world| material(world, |m| m.alpha_mode = AlphaMode::Mask { cutoff: 0.4 })),
         ("blend", |world| material(world, |m| m.alpha_mode = AlphaMode::Blend)),
         ("back's emission", |world| {
-            material(world, |m| m.back = Some(Surface { emission: Vec3::ONE, ..m.front.clone() }));
+            material(world, |m| m.back = Some(Surface { emission: Vec3::ONE, ..m.front }));
         }),
         ("uv0", |world| mesh(world, |mesh| mesh.uv0[3].x += 1e-6)),
         ("scaled", |world| {

@@ -2,6 +2,8 @@
 //! and lit from one of them, and a hall with columns. At a density that a test has time for; the examples `held_out_scenes`, `bake_file`
 //! and `judge` do the same at any.
 
+#![allow(clippy::print_stdout, reason = "the figures are what one wants to see of it")]
+
 use std::ops::ControlFlow;
 use std::path::Path;
 

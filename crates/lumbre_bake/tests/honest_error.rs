@@ -1,6 +1,8 @@
 //! The error that a bake states of itself, against a converged bake of the same map: at most twice the stated one on 95 of a hundred
 //! texels, on 92 where few rays are asked for texel by texel. The converged bakes have patches half as large, as many rays as their own estimate calls for, and no smoothing.
 
+#![allow(clippy::print_stdout, reason = "the shares are what one wants to see of it")]
+
 use std::ops::ControlFlow;
 use std::sync::Arc;
 

@@ -3,6 +3,8 @@
 //!
 //! `cargo run --release -p lumbre_tests --example bake_pictures -- MODEL.glb TABLE.md docs/images`
 
+#![allow(clippy::print_stdout, reason = "a program whose result is text, too")]
+
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -48,11 +48,11 @@ impl Axes {
 
 /// A power of ten, or two or five of them, beyond a number.
 fn round(value: f64, up: bool) -> f64 {
-    let steps = (-4..5).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(power)));
+    let mut steps = (-4..5).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(power)));
     if up {
-        steps.clone().find(|step| *step >= value).unwrap_or(value)
+        steps.find(|step| *step >= value).unwrap_or(value)
     } else {
-        steps.filter(|step| *step <= value).last().unwrap_or(value)
+        steps.rfind(|step| *step <= value).unwrap_or(value)
     }
 }
 

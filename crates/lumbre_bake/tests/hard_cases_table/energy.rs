@@ -205,7 +205,7 @@ fn the_mean_of_four_million_texels() -> Outcome {
 
 fn the_same_in_f32() -> Outcome {
     // Negative control: what a sum in f32 makes of as many.
-    let texel = 0.318_309_9f32;
+    let texel = std::f32::consts::FRAC_1_PI;
     let count = 1 << 24;
     let sum = (0..count).fold(0.0f32, |sum, _| sum + texel);
     let why = "negative control: a sum in f32 of four times as many equal texels, over their number, loses so much of the light: of the last of them each is rounded to 1/2 or to 0";
