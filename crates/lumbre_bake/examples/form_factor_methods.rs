@@ -6,9 +6,10 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use bevy_ecs::world::World;
 use lumbre_bake::{BakeOptions, Density, Quality, form_factor_errors};
 
+#[path = "../tests/held_out/input.rs"]
+mod input;
 #[path = "../tests/held_out/random.rs"]
 mod random;
 #[path = "../tests/held_out/scenes.rs"]
@@ -30,15 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input] = &paths[..] else {
         return Err("give an input file, or the name of a held-out scene".into());
     };
-    let held_out = scenes::all().into_iter().find(|(name, ..)| input.as_os_str() == *name);
-    let mut world = match held_out {
-        Some((_, scene, layout)) => scene(layout, 1.0),
-        None => {
-            let mut world = World::new();
-            lumbre_scene::load(&mut world, input)?;
-            world
-        }
-    };
+    let mut world = input::world_of(input)?;
     let rays = [100_000, 400_000, 1_500_000, 6_000_000];
     println!("{}", input.display());
     println!("{:>12} {:>12} {:>9} {:>10} {:>10}", "method", "rays", "seconds", "exchange", "irradiance");

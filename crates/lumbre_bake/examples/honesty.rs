@@ -8,11 +8,12 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use bevy_ecs::world::World;
 use glam::Vec3;
 use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
 use lumbre_scene::Lightmap;
 
+#[path = "../tests/held_out/input.rs"]
+mod input;
 #[path = "../tests/held_out/random.rs"]
 mod random;
 #[path = "../tests/held_out/scenes.rs"]
@@ -179,15 +180,7 @@ struct Map {
 type Maps = Vec<(String, Map)>;
 
 fn baked(input: &Path, options: &BakeOptions) -> Result<(BakeReport, Maps), Box<dyn Error>> {
-    let held_out = scenes::all().into_iter().find(|(name, ..)| input.as_os_str() == *name);
-    let mut world = match held_out {
-        Some((_, scene, layout)) => scene(layout, 1.0),
-        None => {
-            let mut world = World::new();
-            lumbre_scene::load(&mut world, input)?;
-            world
-        }
-    };
+    let mut world = input::world_of(input)?;
     let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()))?;
     let mut query = world.query::<(&Lightmap, &LightmapError)>();
     let mut maps: Vec<(String, Map)> = query

@@ -24,9 +24,9 @@ const PASS: f32 = 0.7;
 const AIM: f64 = 0.95;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
-/// And by how much it lowers the part that rays leave: the first estimates are rough.
+/// The most by which a round lowers the part that rays leave: the first estimates are rough.
 const MOST_OF_A_ROUND: f64 = 8.0;
-/// And a round that leaves more than this of the squared error that it was to lower was the last.
+/// A round that leaves more than this of the squared error that it was to lower was the last.
 const STALLED: f64 = 0.95;
 
 /// Irradiance by bounces of every covered texel, and the variance of what the map then holds, mean of the channels.

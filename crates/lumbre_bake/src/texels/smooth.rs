@@ -31,7 +31,7 @@ pub(crate) struct Level {
 
 /// The first reaches little further than a texel's own size, whatever is near; the second only where everything is far. `chance`, for
 /// the first: four times the variance of a texel for one scramble, a ninth of it in a block, of which the radius holds 49/9, twice for
-/// two halves: 4 / 9 / sqrt(2 * 49 / 9). What the second takes in goes together over some 28 texels: its blocks hold four
+/// two halves: 4 / 9 / sqrt(2 * 49 / 9). What the second takes in goes together over some 20 texels: its blocks hold four
 /// that do not, and the radius as many blocks.
 const LEVELS: [Level; 2] = [
     Level { step: 1, steps: 3, width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 },
