@@ -1,6 +1,6 @@
-//! How honest the stated error is: `honesty IN.glb|SCENE [--map-size N] [--error X[,X…]] [--draft] [--truth FILE] [--pictures FOLDER]` bakes a file (or a
+//! How honest the stated error is: `honesty IN.glb|SCENE [--map-size N] [--error X[,X…]] [--draft] [--raw] [--open-seams] [--alone] [--truth FILE] [--pictures FOLDER]` bakes a file (or a
 //! held-out scene by its name) as asked and to convergence, texel by texel the same maps, and prints the true error beside the stated one,
-//! with where they differ most. With `--truth FILE` the converged maps are kept there, or taken from there. Pictures show the true error over twice the stated one: grey below 1, red above.
+//! with where they differ most; with `--alone` only what it cost, without the converged bake. With `--truth FILE` the converged maps are kept there, or taken from there. Pictures show the true error over twice the stated one: grey below 1, red above.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
@@ -22,7 +22,7 @@ mod scenes;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut options = BakeOptions { density: Density::MapSize(64), ..BakeOptions::default() };
     let (mut paths, mut pictures, mut errors) = (Vec::new(), None, vec![options.error]);
-    let mut kept = None;
+    let (mut kept, mut alone) = (None, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
@@ -32,6 +32,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--error" => errors = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?,
             "--seed" => options.seed = value()?.parse()?,
             "--draft" => options.quality = Quality::Draft,
+            "--alone" => alone = true,
+            "--raw" => options.denoise = false,
+            "--open-seams" => options.seams = false,
             "--truth" => kept = Some(PathBuf::from(value()?)),
             "--pictures" => pictures = Some(PathBuf::from(value()?)),
             _ => paths.push(PathBuf::from(&argument)),
@@ -40,6 +43,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input] = &paths[..] else { return Err("give an input file".into()) };
     let converged =
         BakeOptions { quality: Quality::Reference, error: 2e-3, seed: 99, denoise: false, ..options };
+    if alone {
+        for error in errors {
+            let (report, _) = baked(input, &BakeOptions { error, ..options })?;
+            println!(
+                "{error}: {:.2} s, {} rays, {:.0} per texel, states {:.3} %",
+                report.seconds,
+                report.rays,
+                report.gather_rays,
+                100.0 * report.estimated_error
+            );
+        }
+        return Ok(());
+    }
     let truth = match &kept {
         Some(path) if path.exists() => read_truth(path)?,
         _ => {
@@ -168,6 +184,20 @@ fn compare(report: &BakeReport, found: &[(String, Map)], truth: &[(String, Map)]
     };
     list("worst", &|texel| texel.0);
     list("least honest", &|texel| texel.0 / texel.1.hypot(texel.2).max(1e-4 * mean));
+    let mut maps: Vec<(&String, u32, u32)> = Vec::new();
+    for (apart, stated, also, name, ..) in &texels {
+        let failed = u32::from(*apart > 2.0 * stated.hypot(*also));
+        match maps.iter_mut().find(|(other, ..)| other == name) {
+            Some((_, all, failures)) => (*all, *failures) = (*all + 1, *failures + failed),
+            None => maps.push((name, 1, failed)),
+        }
+    }
+    maps.sort_by_key(|(_, _, failures)| std::cmp::Reverse(*failures));
+    println!("most beyond twice theirs");
+    for (name, all, failures) in maps.iter().take(12) {
+        let share = 100.0 * f64::from(*failures) / f64::from(*all);
+        println!("  {name}: {failures} of {all} texels, {share:.1} %");
+    }
 }
 
 struct Map {

@@ -13,6 +13,7 @@ use crate::probes::Wanted;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
 use crate::texels::charts::charts;
+use crate::texels::divided_light::DividedLight;
 use crate::texels::error_estimate::variances;
 use crate::texels::fill::fill;
 use crate::texels::footprint::{Texel, footprints};
@@ -20,9 +21,9 @@ use crate::texels::gather::{Outgoing, SCRAMBLES};
 use crate::texels::hidden::remove_hidden;
 use crate::texels::resolution_error::{DensePoint, Light, compare};
 use crate::texels::seams::{Maps, close_seams};
-use crate::texels::straddling::straddling;
+use crate::texels::straddling::{crossed, straddling};
 use crate::texels::{lighting, rounds};
-use crate::transport::direct::{Direct, Sources};
+use crate::transport::direct::Sources;
 use crate::transport::exchange::Exchange;
 use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, apply};
 
@@ -119,7 +120,12 @@ fn run(
     let mut texels = footprints(&scene, &layout);
     watch.advance(0.0)?;
     let charts = charts(&scene);
-    let (hidden, rays) = remove_hidden(&scene, &layout, &mut texels, options.seed);
+    let crossed = crossed(&scene, &layout);
+    let touched: Vec<usize> = straddling(&layout, &texels, &crossed)
+        .iter()
+        .map(|straddling| texels[straddling.texel as usize].index as usize)
+        .collect();
+    let (hidden, rays) = remove_hidden(&scene, &layout, &mut texels, &touched);
     (report.hidden_texels, report.rays) = (hidden, rays);
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
@@ -137,16 +143,22 @@ fn run(
         }
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
-            let total: Vec<Vec3> = direct.iter().map(Direct::total).collect();
-            let mut total = fill(&layout, &texels, &charts, &total, 1, &mut |_| watch.advance(0.0))?;
-            for index in straddling(&scene, &layout, &texels) {
-                total[index] = Vec3::NAN;
+            let straddling = straddling(&layout, &texels, &crossed);
+            let [_, samples, _] = options.quality.effort().direct;
+            let (divided, rays) = DividedLight::new(&sources, &texels, &straddling, (samples, options.seed));
+            report.rays += rays;
+            watch.advance(0.0)?;
+            let mut total = vec![Vec3::NAN; layout.texels];
+            for (texel, direct) in texels.iter().zip(&direct).filter(|(texel, _)| !texel.is_hidden()) {
+                total[texel.index as usize] = direct.total();
             }
+            divided.places().for_each(|index| total[index] = Vec3::NAN);
             let outgoing = Outgoing {
                 scene: &scene,
                 layout: &layout,
                 patches: &exchange.patches,
                 direct: &total,
+                divided: &divided,
                 sky: sources.sky,
                 patch_direct: &exchange.direct,
                 patch_indirect: &exchange.indirect,
@@ -172,7 +184,7 @@ fn run(
             let sum = baked.iter().zip(&indirect).map(|(direct, indirect)| *direct + *indirect);
             (sum.collect(), variances)
         }
-        None => (baked, variances(&direct, None)),
+        None => (baked, variances(&direct, None, 0.0)),
     };
     note_mean(&texels, &values, &mut report);
     if exchange.is_none() {
@@ -180,12 +192,10 @@ fn run(
         report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
-    let mut filled = fill(&layout, &texels, &charts, &values, options.gap, &mut |done| watch.advance(done))?;
+    let known = (values.as_slice(), variances.as_slice());
+    let (mut filled, errors) =
+        fill(&layout, &texels, &charts, known, options.gap, &mut |done| watch.advance(done))?;
     watch.advance(1.0)?;
-    let mut errors = vec![f32::NAN; layout.texels];
-    for (texel, variance) in texels.iter().zip(&variances).filter(|(texel, _)| !texel.is_hidden()) {
-        errors[texel.index as usize] = *variance;
-    }
     watch.stage("seams", &mut report)?;
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
     let maps =

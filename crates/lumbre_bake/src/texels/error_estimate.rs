@@ -8,6 +8,7 @@
 //!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
 //!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
 //!            + solver:       residual / (1 - rho) of the light by bounces
+//!            + arithmetic:   what cracks as wide as coordinates are rounded let through of all the light
 //! ```
 //!
 //! Not in it: the map's own resolution, and what a penumbra hides that all samples of a texel and of its neighbours missed.
@@ -36,6 +37,8 @@ pub(crate) struct GatherErrors<'a> {
 /// Steps each way, and texels of a step, over which the spread of the scrambles is put together.
 const SPREAD_STEPS: i64 = 2;
 const SPREAD_STEP: i64 = 3;
+/// Squared, by how much of itself the variance of four scrambles is off: 2 / (4 - 1).
+const ALONE: f32 = 2.0 / 3.0;
 
 /// Variance of every texel's mean, mean of the channels. Four scrambles alone tell it badly: in one case of seven the mean is further than
 /// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts,
@@ -60,7 +63,9 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimate
         });
         let count = count.max(1) as f32;
         let (mean, of_halves) = (sum / count, of_halves / count);
-        let by_chance = ((squares / count - mean * mean).max(0.0) / count).sqrt();
+        // At least that of as many values with three degrees of freedom each: of few, what they differ by says little.
+        let scatter = (squares / count - mean * mean).max(ALONE * mean * mean);
+        let by_chance = (scatter / count).sqrt();
         mean.max(of_halves) + by_chance
     };
     texels.par_iter().zip(&own).map(|(texel, own)| own.max(around(texel))).collect()
@@ -73,8 +78,12 @@ impl GatherErrors<'_> {
     }
 }
 
-/// Variance of every covered texel, mean of the channels.
-pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>) -> Vec<f32> {
+/// Share of the mean light that is within the rounding of coordinates: sixteen of it, as where segments end.
+const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
+
+/// Variance of every covered texel, mean of the channels; `light` is the mean of all, W/m², of which cracks may let through.
+pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> Vec<f32> {
+    let least = (ARITHMETIC * light).powi(2);
     direct
         .iter()
         .enumerate()
@@ -88,7 +97,7 @@ pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>) ->
                     + unsolved * unsolved
                     + gather.patch_bias[index].rest
             });
-            direct.variance + by_bounces
+            direct.variance + by_bounces + least
         })
         .collect()
 }

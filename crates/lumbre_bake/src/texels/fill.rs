@@ -19,6 +19,8 @@ const BICUBIC_RINGS: u32 = 4;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Known {
     pub value: Vec3,
+    /// Squared error, mean of the channels.
+    pub variance: f32,
     /// Where in the texel's unit square.
     pub middle: Vec2,
     pub chart: u32,
@@ -32,7 +34,7 @@ fn fill_map(
     known: &[Option<Known>],
     hidden: &[Hidden],
     rings: u32,
-) -> Vec<Option<Vec3>> {
+) -> Vec<Option<Known>> {
     // The charts' own texels first, moved to their centres.
     let mut current: Vec<Option<Known>> = (0..known.len())
         .into_par_iter()
@@ -44,8 +46,9 @@ fn fill_map(
                 return Some(own);
             }
             let (x, y) = (index as u32 % width, index as u32 / width);
-            let value = continued(width, height, known, x, y, own.chart, true).unwrap_or(own.value);
-            Some(Known { value, middle: Vec2::splat(0.5), ..own })
+            let (value, variance) =
+                continued(width, height, known, x, y, own.chart, true).unwrap_or((own.value, own.variance));
+            Some(Known { value, variance, middle: Vec2::splat(0.5), ..own })
         })
         .collect();
     for ring in 0..rings.max(2) {
@@ -62,13 +65,13 @@ fn fill_map(
                 }
                 let (x, y) = (index as u32 % width, index as u32 / width);
                 let chart = nearest_chart(width, height, &current, x, y)?;
-                let value = continued(width, height, &current, x, y, chart, false)?;
-                Some(Known { value, middle: Vec2::splat(0.5), chart })
+                let (value, variance) = continued(width, height, &current, x, y, chart, false)?;
+                Some(Known { value, variance, middle: Vec2::splat(0.5), chart })
             })
             .collect();
         current = next;
     }
-    current.into_iter().map(|known| known.map(|known| known.value)).collect()
+    current
 }
 
 /// Whether other geometry hides a texel.
@@ -98,7 +101,8 @@ fn nearest_chart(width: u32, height: u32, known: &[Option<Known>], x: u32, y: u3
 }
 
 /// The value at a texel's centre by a plane through its chart's texels around, held within their range (and a little
-/// more): weighted least squares.
+/// more): weighted least squares. With it comes its squared error: by errors that have nothing to do with each other or by errors that are
+/// all alike, whichever is more, as smoothed texels are in between.
 fn continued(
     width: u32,
     height: u32,
@@ -107,13 +111,16 @@ fn continued(
     y: u32,
     chart: u32,
     own_counts: bool,
-) -> Option<Vec3> {
+) -> Option<(Vec3, f32)> {
     let center = Vec2::new(x as f32, y as f32) + 0.5;
     let mut moments = [0.0f64; 6];
     let mut sums = [glam::DVec3::ZERO; 3];
     // Of the texels next to it, and of those one further.
     let mut ranges = [(Vec3::INFINITY, Vec3::NEG_INFINITY); 2];
-    let mut nearest = (f32::INFINITY, Vec3::ZERO);
+    let mut nearest = (f32::INFINITY, Vec3::ZERO, 0.0);
+    // Weights, places and squared errors.
+    let mut terms = [(0.0f64, DVec2::ZERO, 0.0f64); 25];
+    let mut count = 0;
     for (nx, ny) in around(width, height, x, y, 2) {
         if !own_counts && nx == x && ny == y {
             continue;
@@ -123,6 +130,8 @@ fn continued(
         };
         let d = Vec2::new(nx as f32, ny as f32) + other.middle - center;
         let weight = f64::from((-0.7 * d.length_squared()).exp());
+        terms[count] = (weight, d.as_dvec2(), f64::from(other.variance));
+        count += 1;
         let (dx, dy, value) = (f64::from(d.x), f64::from(d.y), other.value.as_dvec3());
         for (moment, term) in moments.iter_mut().zip([1.0, dx, dy, dx * dx, dx * dy, dy * dy]) {
             *moment += weight * term;
@@ -133,7 +142,7 @@ fn continued(
         let range = &mut ranges[usize::from(x.abs_diff(nx).max(y.abs_diff(ny)) > 1)];
         *range = (range.0.min(other.value), range.1.max(other.value));
         if d.length() < nearest.0 {
-            nearest = (d.length(), other.value);
+            nearest = (d.length(), other.value, other.variance);
         }
     }
     if nearest.0 == f32::INFINITY {
@@ -152,7 +161,14 @@ fn continued(
     let (low, high) = if ranges[0].0.x <= ranges[0].1.x { ranges[0] } else { ranges[1] };
     let reach = (high - low) * 0.5;
     let value = value.clamp((low - reach).max(Vec3::ZERO), high + reach);
-    Some(if value.is_finite() { value } else { nearest.1 })
+    let (mut apart, mut alike) = (0.0, 0.0);
+    for (weight, d, variance) in &terms[..count] {
+        let share = weight / moments[0] * (1.0 + (*d - DVec2::new(sx, sy)).dot(towards));
+        apart += share * share * variance;
+        alike += share * variance.sqrt();
+    }
+    let variance = apart.max(alike * alike) as f32;
+    Some(if value.is_finite() && variance.is_finite() { (value, variance) } else { (nearest.1, nearest.2) })
 }
 
 /// Texels within `radius` of one, itself among them.
@@ -162,31 +178,37 @@ fn around(width: u32, height: u32, x: u32, y: u32, radius: u32) -> impl Iterator
     rows.flat_map(move |ny| columns.clone().map(move |nx| (nx, ny)))
 }
 
-/// Fills all maps from values per covered texel; NaN where nothing is known. `advance` is told the fraction done, and may end it.
+/// Fills all maps from values and squared errors per covered texel; NaN where nothing is known, and errors also where no surface is shown.
+/// `advance` is told the fraction done, and may end it.
 pub(crate) fn fill(
     layout: &LightmapLayout,
     texels: &[Texel],
     charts: &[u32],
-    values: &[Vec3],
+    (values, variances): (&[Vec3], &[f32]),
     rings: u32,
     advance: &mut dyn FnMut(f32) -> Result<(), BakeError>,
-) -> Result<Vec<Vec3>, BakeError> {
+) -> Result<(Vec<Vec3>, Vec<f32>), BakeError> {
     let mut known: Vec<Option<Known>> = vec![None; layout.texels];
-    for (texel, &value) in texels.iter().zip(values) {
+    for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
         if !texel.is_hidden() {
             let chart = charts[texel.triangle as usize];
-            known[texel.index as usize] = Some(Known { value, middle: texel.middle(), chart });
+            known[texel.index as usize] = Some(Known { value, variance, middle: texel.middle(), chart });
         }
     }
     let hidden = hidden(layout, texels, if rings >= BICUBIC_RINGS { 2 } else { 1 });
     let mut filled = Vec::with_capacity(layout.texels);
+    let mut errors = Vec::with_capacity(layout.texels);
     for map in &layout.maps {
         let own = map.first..map.first + (map.width * map.height) as usize;
-        let values = fill_map(map.width, map.height, &known[own.clone()], &hidden[own], rings);
-        filled.extend(values.into_iter().map(|value| value.unwrap_or(Vec3::NAN)));
+        let all = fill_map(map.width, map.height, &known[own.clone()], &hidden[own.clone()], rings);
+        filled.extend(all.iter().map(|known| known.map_or(Vec3::NAN, |known| known.value)));
+        let shown = all.iter().zip(&known[own]);
+        errors.extend(
+            shown.map(|(all, own)| all.filter(|_| own.is_some()).map_or(f32::NAN, |all| all.variance)),
+        );
         advance(filled.len() as f32 / layout.texels.max(1) as f32)?;
     }
-    Ok(filled)
+    Ok((filled, errors))
 }
 
 /// `reach`: how far in texels filtering reads.
@@ -230,13 +252,13 @@ mod tests {
             for x in 2..6u32 {
                 let middle = if x == 2 { Vec2::new(0.875, 0.5) } else { Vec2::splat(0.5) };
                 let value = plane(x as f32 + middle.x, y as f32 + middle.y);
-                known[(y * 8 + x) as usize] = Some(Known { value, middle, chart: 0 });
+                known[(y * 8 + x) as usize] = Some(Known { value, variance: 0.01, middle, chart: 0 });
             }
         }
         let filled = fill_map(8, 8, &known, &[Hidden::No; 64], 1);
         for y in 2..6u32 {
             for x in 1..7u32 {
-                let found = filled[(y * 8 + x) as usize].unwrap();
+                let found = filled[(y * 8 + x) as usize].unwrap().value;
                 let expected = plane(x as f32 + 0.5, y as f32 + 0.5);
                 // The ridge bends the slope by a per cent or two.
                 assert!((found - expected).abs().max_element() < 0.06, "{x} {y}: {found} {expected}");
@@ -254,12 +276,12 @@ mod tests {
                     3 => (9.0, 1),
                     _ => return None,
                 };
-                Some(Known { value: Vec3::splat(value), middle: Vec2::splat(0.5), chart })
+                Some(Known { value: Vec3::splat(value), variance: 0.0, middle: Vec2::splat(0.5), chart })
             })
             .collect();
         let filled = fill_map(4, 4, &known, &[Hidden::No; 16], 2);
         for row in filled.chunks(4) {
-            assert_eq!(row.iter().map(|v| v.unwrap().x).collect::<Vec<_>>(), [1.0, 1.0, 9.0, 9.0]);
+            assert_eq!(row.iter().map(|v| v.unwrap().value.x).collect::<Vec<_>>(), [1.0, 1.0, 9.0, 9.0]);
         }
     }
 }

@@ -220,6 +220,13 @@ impl Texel {
         }
     }
 
+    /// Length of its side on its surface, canonical units.
+    pub fn side(&self, scene: &BakeScene) -> f32 {
+        let triangle = &scene.triangles[self.triangle as usize];
+        let [a, b, c] = triangle.uv;
+        (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
+    }
+
     /// Whether it shows nothing that light reaches.
     pub fn is_hidden(&self) -> bool {
         self.footprint == Footprint::Hidden

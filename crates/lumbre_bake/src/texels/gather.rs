@@ -6,6 +6,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
+use super::divided_light::DividedLight;
 use super::footprint::{Texel, receiver};
 use super::tile_sequence::TileSequence;
 use crate::sampling::{cosine_about, triangle_point};
@@ -23,8 +24,10 @@ pub(crate) struct Outgoing<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
-    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none.
+    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, or more than one.
     pub direct: &'a [Vec3],
+    /// Of the texels that have more than one.
+    pub divided: &'a DividedLight,
     /// Irradiance that a surface gets of an unhidden sky.
     pub sky: Vec3,
     /// Per patch, direct irradiance.
@@ -366,7 +369,7 @@ impl Outgoing<'_> {
         }
     }
 
-    /// Of the texel hit, or of the patch where no texel shows that side.
+    /// Of the texel hit, or its part, or of the patch where no texel shows that side.
     fn direct_at(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {
         if side == Side::Front {
             let scene_triangle = &self.scene.triangles[triangle as usize];
@@ -375,8 +378,12 @@ impl Outgoing<'_> {
             let uv = a + (b - a) * u + (c - a) * v;
             let (x, y) = (uv.x as u32, uv.y as u32);
             if x < map.width && y < map.height {
-                let direct = self.direct[map.first + (y * map.width + x) as usize];
+                let index = map.first + (y * map.width + x) as usize;
+                let direct = self.direct[index];
                 if !direct.x.is_nan() {
+                    return direct;
+                }
+                if let Some(direct) = self.divided.at(index as u32, uv.fract()) {
                     return direct;
                 }
             }

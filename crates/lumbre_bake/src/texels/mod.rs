@@ -4,6 +4,7 @@
 pub(crate) mod allocation;
 pub(crate) mod charts;
 pub(crate) mod chunks;
+pub(crate) mod divided_light;
 pub(crate) mod error_estimate;
 pub(crate) mod fill;
 pub(crate) mod footprint;

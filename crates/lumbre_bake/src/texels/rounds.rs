@@ -85,8 +85,8 @@ pub(crate) fn gather(
             patch_bias: &patch_bias,
             residual_bound: report.residual_bound,
         };
-        let variances = variances(direct, Some(&errors));
         let total = mean_direct + estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
+        let variances = variances(direct, Some(&errors), total as f32);
         let of_patches = |part: fn(&PatchBias) -> f32| -> f64 {
             let open = texels.iter().zip(&patch_bias).filter(|(texel, _)| !texel.is_hidden());
             open.map(|(_, bias)| f64::from(part(bias))).sum()

@@ -1,6 +1,5 @@
 //! Texels that a wall thinner than themselves crosses, with surface in the open on both sides of it: one value for both. They show that
-//! value, but hand nothing on: what bounces is read from the patches there, which are cut along the wall. Not texels that are hidden in
-//! part: those hold the light of the part in the open.
+//! value, but do not hand it on: see `divided_light`. Not texels that are hidden in part: those hold the light of the part in the open.
 
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -15,23 +14,43 @@ const SHORTEST: f64 = 0.25;
 /// Texels beside a line that do not count as beyond it.
 const MARGIN: f64 = 0.05;
 
-/// Places, in the row of all maps, of the texels that a contact line divides.
-pub(crate) fn straddling(scene: &BakeScene, layout: &LightmapLayout, texels: &[Texel]) -> Vec<usize> {
+/// A texel that contact lines divide: its place among those covered, and the lines' parts in its unit square.
+pub(crate) struct Straddling {
+    pub texel: u32,
+    pub lines: Vec<[DVec2; 2]>,
+}
+
+/// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
+pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(usize, [DVec2; 2])> {
     let tree = BoxTree::new(&scene.triangles);
     let mut lines: Vec<(usize, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
         .flat_map_iter(|index| divisions(scene, layout, &tree, index))
         .collect();
     lines.sort_by_key(|(place, _)| *place);
+    lines
+}
+
+/// Of the texels that lines cross, those that they divide, in the order of the maps.
+pub(crate) fn straddling(
+    layout: &LightmapLayout,
+    texels: &[Texel],
+    crossed: &[(usize, [DVec2; 2])],
+) -> Vec<Straddling> {
     let mut place = vec![u32::MAX; layout.texels];
     for (number, texel) in texels.iter().enumerate() {
         place[texel.index as usize] = number as u32;
     }
-    let divided = lines.iter().filter(|(index, line)| {
-        texels.get(place[*index] as usize).is_some_and(|texel| is_divided(texel, *line))
-    });
-    let mut found: Vec<usize> = divided.map(|(index, _)| *index).collect();
-    found.dedup();
+    let mut found: Vec<Straddling> = Vec::new();
+    for &(index, line) in crossed {
+        let texel = place[index];
+        if texels.get(texel as usize).is_some_and(|texel| is_divided(texel, line)) {
+            match found.last_mut() {
+                Some(last) if last.texel == texel => last.lines.push(line),
+                _ => found.push(Straddling { texel, lines: vec![line] }),
+            }
+        }
+    }
     found
 }
 

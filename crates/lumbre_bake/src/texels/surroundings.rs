@@ -29,9 +29,7 @@ impl<'a> Surroundings<'a> {
 
     /// Length of a texel's side on its surface, canonical units.
     pub fn texel_side(&self, texel: &Texel) -> f32 {
-        let triangle = &self.scene.triangles[texel.triangle as usize];
-        let [a, b, c] = triangle.uv;
-        (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
+        texel.side(self.scene)
     }
 
     /// Texels of the same chart and about the same normal, with their offsets.

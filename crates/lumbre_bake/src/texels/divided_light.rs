@@ -1,0 +1,133 @@
+//! Direct light in the parts of texels that walls divide, one value for each part: what bounces off the floor on one side of a thin wall
+//! must not be read on the other. Not which texels those are: that is `straddling`.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
+use super::straddling::Straddling;
+use crate::sampling::Sequence;
+use crate::transport::direct::Sources;
+
+/// Lines through one texel that count: what more there are lie mostly along these.
+const MOST_LINES: usize = 8;
+/// Lines whose ends are this near to another's, in texels, divide nothing that it does not.
+const SAME_LINE: f32 = 1.0 / 16.0;
+
+/// Sequences of these texels' shadow samples.
+const PURPOSE: u32 = 64;
+
+/// One side of each line through a texel.
+#[derive(Clone, Debug)]
+struct Part {
+    /// A bit for each line that it lies on the left of.
+    sides: u32,
+    /// The middle of its points.
+    middle: Vec2,
+    /// Direct irradiance, mixed lights included.
+    light: Vec3,
+}
+
+/// One texel.
+#[derive(Clone, Debug)]
+struct Divided {
+    lines: Vec<[Vec2; 2]>,
+    parts: Vec<Part>,
+}
+
+/// All of them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DividedLight {
+    /// By place in the row of all maps.
+    texels: HashMap<u32, Divided>,
+}
+
+impl DividedLight {
+    /// By `samples` shadow rays to each source in each part; with it the rays cast.
+    pub fn new(
+        sources: &Sources<'_>,
+        texels: &[Texel],
+        straddling: &[Straddling],
+        (samples, seed): (u32, u32),
+    ) -> (Self, u64) {
+        let divided: Vec<(u32, Divided, u64)> = straddling
+            .par_iter()
+            .filter_map(|straddling| {
+                let texel = &texels[straddling.texel as usize];
+                let (divided, rays) = divide(sources, texel, &straddling.lines, samples, seed)?;
+                Some((texel.index, divided, rays))
+            })
+            .collect();
+        let rays = divided.iter().map(|(.., rays)| rays).sum();
+        (Self { texels: divided.into_iter().map(|(index, divided, _)| (index, divided)).collect() }, rays)
+    }
+
+    /// Places, in the row of all maps, of the texels.
+    pub fn places(&self) -> impl Iterator<Item = usize> + '_ {
+        self.texels.keys().map(|&index| index as usize)
+    }
+
+    /// Direct irradiance at a point of a texel's unit square; `None` if the texel is not divided.
+    pub fn at(&self, index: u32, offset: Vec2) -> Option<Vec3> {
+        let divided = self.texels.get(&index)?;
+        let sides = sides(&divided.lines, offset);
+        let own = divided.parts.iter().find(|part| part.sides == sides);
+        let apart = |part: &&Part| part.middle.distance_squared(offset);
+        // A corner too small for a point of its own.
+        let nearest = || divided.parts.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        own.or_else(nearest).map(|part| part.light)
+    }
+}
+
+fn divide(
+    sources: &Sources<'_>,
+    texel: &Texel,
+    lines: &[[DVec2; 2]],
+    samples: u32,
+    seed: u32,
+) -> Option<(Divided, u64)> {
+    let mut kept: Vec<[Vec2; 2]> = Vec::new();
+    for line in lines {
+        let [a, b] = line.map(|end| end.as_vec2());
+        let same = |&[p, q]: &[Vec2; 2]| {
+            let normal = (q - p).normalize_or_zero().perp();
+            [a, b].into_iter().all(|end| normal.dot(end - p).abs() < SAME_LINE)
+        };
+        if kept.len() < MOST_LINES && a != b && !kept.iter().any(same) {
+            kept.push([a, b]);
+        }
+    }
+    let points = match &texel.footprint {
+        Footprint::Points(points) => points.clone(),
+        Footprint::Whole(triangle) => {
+            match footprint(sources.scene, std::iter::once(*triangle), texel.x, texel.y, FINE)? {
+                Footprint::Points(points) => points,
+                Footprint::Whole(_) | Footprint::Hidden => return None,
+            }
+        }
+        Footprint::Hidden => return None,
+    };
+    let mut by_side: Vec<(u32, FootprintPoint)> =
+        points.into_iter().map(|point| (sides(&kept, point.offset), point)).collect();
+    by_side.sort_by_key(|(sides, _)| *sides);
+    let mut rays = 0;
+    let parts = by_side.chunk_by(|a, b| a.0 == b.0).map(|own| {
+        let sequence = Sequence::new(seed, PURPOSE, texel.index).of(own[0].0);
+        let direct = sources.irradiance(sequence, samples, &|x, _| {
+            let index = ((x * own.len() as f32) as usize).min(own.len() - 1);
+            Some(receiver(sources.scene, &own[index].1))
+        });
+        rays += u64::from(direct.rays);
+        let middle = own.iter().map(|(_, point)| point.offset).sum::<Vec2>() / own.len() as f32;
+        Part { sides: own[0].0, middle, light: direct.total() }
+    });
+    let parts: Vec<Part> = parts.collect();
+    Some((Divided { lines: kept, parts }, rays))
+}
+
+/// A bit for each line that has a point on its left.
+fn sides(lines: &[[Vec2; 2]], point: Vec2) -> u32 {
+    lines.iter().enumerate().map(|(bit, [a, b])| u32::from((*b - *a).perp_dot(point - *a) > 0.0) << bit).sum()
+}
