@@ -1,8 +1,7 @@
 //! What the patches' size leaves in their light: the same system with patches twice as large, each the sum of those that it is made of, no
-//! ray more. The mean light of constant elements converges with the square of their size where it is smooth (as in Galerkin's method;
-//! Troutman and Max, "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993); where shadows' edges and doorways lie within
-//! them, with the size itself (of two rooms' bounced light an order of 1.2 was measured): by Richardson's extrapolation all of what differs
-//! between the two is then what the finer one is still off by. Not the noise of form factors: that is told by two halves of the rays.
+//! ray more. The mean light of constant elements converges with the square of their size (as in Galerkin's method; Troutman and Max,
+//! "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993): by Richardson's extrapolation a third of what differs between the
+//! two is what the finer one is still off by. Not the noise of form factors: that is told by two halves of the rays.
 
 use rayon::prelude::*;
 
@@ -13,8 +12,8 @@ use crate::scene::BakeScene;
 
 /// Times larger.
 const COARSER: f32 = 2.0;
-/// Of the difference between both, the part that the finer one is off by: 1 / (2^p - 1) with the order p = 1.
-const LEFT: f64 = 1.0;
+/// Of the difference between both, the part that the finer one is off by: 1 / (2² - 1).
+const LEFT: f64 = 1.0 / 3.0;
 
 /// The error, with its sign, of each patch's irradiance by bounces, for grey reflectances, and light that direct light and the sky have
 /// brought (`first`, W/m²); `side` is the patches' own.
