@@ -10,8 +10,8 @@ use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 
 /// Seed of all rays here.
 const SEED: u32 = 0;
-/// A point from which no ray comes further than this share of its texel's side lies against something: faces that touch are apart by
-/// what their corners are rounded by, and no light is seen in between.
+/// A point from which no ray comes further than this share of its texel's side, or of its triangle's, lies against something: faces
+/// that touch are apart by what their corners are rounded by, and no light is seen in between.
 const PRESSED: f32 = 1.0 / 64.0;
 
 /// Rays that look for something odd in every texel, and those that judge a point of an odd one.
@@ -48,9 +48,16 @@ pub(crate) fn remove_hidden(
     (hidden, rays)
 }
 
+/// Rays that end before this go nowhere, canonical units.
+fn pressed(scene: &BakeScene, texel: &Texel) -> f32 {
+    let own = (2.0 * scene.triangles[texel.triangle as usize].area).sqrt();
+    // The smaller one, and never NaN.
+    PRESSED * own.min(texel.side(scene))
+}
+
 fn looks_odd(scene: &BakeScene, texel: &Texel) -> bool {
     let sequence = Sequence::new(SEED, 2, texel.index);
-    let pressed = PRESSED * texel.side(scene);
+    let pressed = pressed(scene, texel);
     let mut ended = 0;
     (0..PROBES).any(|ray| {
         let [x, y, u, v] = sequence.point(ray, 0);
@@ -83,7 +90,7 @@ fn judge(scene: &BakeScene, texel: &mut Texel) -> (usize, u64) {
         return (0, 0);
     };
     let sequence = Sequence::new(SEED, 3, texel.index);
-    let pressed = PRESSED * texel.side(scene);
+    let pressed = pressed(scene, texel);
     let mut rays = 0;
     let mut open: Vec<FootprintPoint> = Vec::new();
     for (index, point) in points.iter().enumerate() {
