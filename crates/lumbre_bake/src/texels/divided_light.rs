@@ -131,3 +131,24 @@ fn divide(
 fn sides(lines: &[[Vec2; 2]], point: Vec2) -> u32 {
     lines.iter().enumerate().map(|(bit, [a, b])| u32::from((*b - *a).perp_dot(point - *a) > 0.0) << bit).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_side_of_a_wall_has_its_own_light() {
+        // A wall along x = 0.5, and a corner of another one beyond it that no point of the grid fell into.
+        let lines =
+            vec![[Vec2::new(0.5, 0.0), Vec2::new(0.5, 1.0)], [Vec2::new(0.9, 1.0), Vec2::new(1.0, 0.9)]];
+        let part =
+            |at: Vec2, light: f32| Part { sides: sides(&lines, at), middle: at, light: Vec3::splat(light) };
+        let parts = vec![part(Vec2::new(0.25, 0.5), 1.0), part(Vec2::new(0.75, 0.5), 8.0)];
+        assert_ne!(parts[0].sides, parts[1].sides);
+        let divided = DividedLight { texels: HashMap::from([(7, Divided { lines, parts })]) };
+        for (x, y, expected) in [(0.49, 0.99, 1.0), (0.01, 0.0, 1.0), (0.51, 0.01, 8.0), (0.99, 0.98, 8.0)] {
+            assert_eq!(divided.at(7, Vec2::new(x, y)), Some(Vec3::splat(expected)), "{x} {y}");
+        }
+        assert_eq!(divided.at(8, Vec2::splat(0.5)), None);
+    }
+}
