@@ -4,11 +4,15 @@
 use rayon::prelude::*;
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
+use super::tiles::{Tiles, area, positions_of};
 use crate::sampling::{Sequence, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::transport::box_tree::BoxTree;
+use crate::transport::shaft::is_free_before;
 
-/// Rays that look for something odd in every texel, and those that judge a point of an odd one.
+/// Rays that look for something odd in every texel, and in a tile that nothing crosses, and those that judge a point of an odd one.
 const PROBES: u32 = 6;
+const TILE_PROBES: u32 = 16;
 const JUDGES: u32 = 8;
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast.
@@ -18,8 +22,7 @@ pub(crate) fn remove_hidden(
     texels: &mut [Texel],
     seed: u32,
 ) -> (usize, u64) {
-    let odd: Vec<bool> = texels.par_iter().map(|texel| looks_odd(scene, texel, seed)).collect();
-    let mut rays = texels.len() as u64 * u64::from(PROBES);
+    let (odd, mut rays) = odd(scene, texels, seed);
     // Six rays may miss a corner of a texel; its neighbours' rays did not.
     let mut near = vec![false; layout.texels];
     for (texel, _) in texels.iter().zip(&odd).filter(|(_, odd)| **odd) {
@@ -39,15 +42,43 @@ pub(crate) fn remove_hidden(
     (hidden, rays)
 }
 
-fn looks_odd(scene: &BakeScene, texel: &Texel, seed: u32) -> bool {
-    let sequence = Sequence::new(seed, 2, texel.index);
-    (0..PROBES).any(|ray| {
-        let [x, y, u, v] = sequence.point(ray, 0);
-        let Some(point) = texel.point(scene, x, y) else { return false };
-        let receiver = receiver(scene, &point);
-        let direction = cosine_about(receiver.geometric_normal, u, v);
-        matches!(scene.first_hit(receiver.origin, direction), SurfaceHit::Inside | SurfaceHit::Back)
-    })
+/// Texels that look odd, and the rays cast. Where nothing crosses the space before a tile, all of it is inside of something or none of it:
+/// some rays of the whole tile tell.
+fn odd(scene: &BakeScene, texels: &[Texel], seed: u32) -> (Vec<bool>, u64) {
+    let tiles = Tiles::new(texels);
+    let tree = BoxTree::new(&scene.triangles);
+    let suspect: Vec<bool> = tiles
+        .members
+        .par_iter()
+        .map(|members| {
+            let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
+            let mut positions = Vec::new();
+            members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
+            let free = members.first().and_then(|first| area(scene, first.triangle, &positions));
+            let free = free.is_some_and(|area| is_free_before(&area, scene, &tree));
+            let of_tile =
+                (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
+            !free || of_tile.enumerate().any(|(ray, texel)| is_odd(scene, texel, seed, ray as u32))
+        })
+        .collect();
+    let suspects = |place: usize| suspect[tiles.tile_of[place] as usize];
+    let odd: Vec<bool> = texels
+        .par_iter()
+        .enumerate()
+        .map(|(place, texel)| suspects(place) && (0..PROBES).any(|ray| is_odd(scene, texel, seed, ray)))
+        .collect();
+    let asked = (0..texels.len()).filter(|&place| suspects(place)).count();
+    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + asked as u64 * u64::from(PROBES);
+    (odd, rays)
+}
+
+/// Whether a ray of a texel meets the inside of something, or a back.
+fn is_odd(scene: &BakeScene, texel: &Texel, seed: u32, ray: u32) -> bool {
+    let [x, y, u, v] = Sequence::new(seed, 2, texel.index).point(ray, 0);
+    let Some(point) = texel.point(scene, x, y) else { return false };
+    let receiver = receiver(scene, &point);
+    let direction = cosine_about(receiver.geometric_normal, u, v);
+    matches!(scene.first_hit(receiver.origin, direction), SurfaceHit::Inside | SurfaceHit::Back)
 }
 
 /// Keeps the points of a texel that are in the open. Returns 1 if some are not, and the rays cast.
