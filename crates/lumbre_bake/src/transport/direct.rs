@@ -9,7 +9,7 @@ use super::emitter_tree::EmitterTree;
 use super::emitters::{Emitter, emitters, lamps};
 use super::shaft::Between;
 use super::share_variance::uneven_variance;
-use super::visible_part::visible_part;
+use super::visible_part::{Pieces, visible_part};
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -277,6 +277,7 @@ impl<'a> Sources<'a> {
         let (mut sums, mut counts) = ([Vec3::ZERO; GROUPS], [0u32; GROUPS]);
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut seen, mut hidden) = (0, 0);
+        let mut room = Pieces::NONE;
         for sample in 0..points {
             let [x, y, ..] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
@@ -284,7 +285,7 @@ impl<'a> Sources<'a> {
             let (mut light, mut cut) = (Vec3::ZERO, false);
             for (emitter, blockers) in &between.emitters {
                 let emitter = &self.emitters[*emitter as usize];
-                let visible = visible_part(position, normal, &emitter.corners_f64, blockers)?;
+                let visible = visible_part(position, normal, &emitter.corners_f64, blockers, &mut room)?;
                 light += emitter.radiance * (std::f64::consts::PI * visible.factor) as f32;
                 cut |= visible.hidden;
             }

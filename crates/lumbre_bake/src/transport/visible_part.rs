@@ -33,9 +33,10 @@ impl Piece {
     }
 
     /// Its parts outside and inside of a half-space: heights above 0 are inside.
-    fn split(&self, height: impl Fn(DVec3) -> f64) -> Option<(Self, Self)> {
-        let (mut outside, mut inside) = (Self::NONE, Self::NONE);
-        let Some(&last) = self.corners().last() else { return Some((outside, inside)) };
+    #[inline(always)]
+    fn split(&self, outside: &mut Self, inside: &mut Self, height: impl Fn(DVec3) -> f64) -> Option<()> {
+        (outside.count, inside.count) = (0, 0);
+        let Some(&last) = self.corners().last() else { return Some(()) };
         let (mut before, mut before_height) = (last, height(last));
         for &corner in self.corners() {
             let own = height(corner);
@@ -51,8 +52,19 @@ impl Piece {
             }
             (before, before_height) = (corner, own);
         }
-        Some((outside, inside))
+        Some(())
     }
+}
+
+/// Room for the pieces of an emitter.
+pub(crate) struct Pieces {
+    list: [Piece; PIECES],
+    /// What is left of one while it is cut, and of that.
+    rest: [Piece; 2],
+}
+
+impl Pieces {
+    pub const NONE: Self = Self { list: [Piece::NONE; PIECES], rest: [Piece::NONE; 2] };
 }
 
 /// What a point sees of an emitter.
@@ -71,20 +83,21 @@ pub(crate) fn visible_part(
     normal: DVec3,
     emitter: &Corners,
     blockers: &[Corners],
+    room: &mut Pieces,
 ) -> Option<Visible> {
     let [p, q, r] = emitter.map(|corner| corner - point);
     // Behind the triangle, or in its plane.
     if (q - p).cross(r - p).dot(p) >= 0.0 {
         return Some(Visible::default());
     }
-    let mut whole = Piece::NONE;
+    let Pieces { list: pieces, rest } = room;
+    let [mut rest, mut next] = rest.each_mut();
+    rest.count = 0;
     for corner in [p, q, r] {
-        whole.push(corner)?;
+        rest.push(corner)?;
     }
-    let (_, above) = whole.split(|corner| corner.dot(normal))?;
-    let (mut pieces, mut count) = ([Piece::NONE; PIECES], 1);
-    pieces[0] = above;
-    let mut hidden = false;
+    rest.split(next, &mut pieces[0], |corner| corner.dot(normal))?;
+    let (mut count, mut hidden) = (1, false);
     for blocker in blockers {
         let Some(shadow) = Shadow::new(blocker.map(|corner| corner - point)) else { continue };
         let (before, mut kept) = (count, 0);
@@ -97,14 +110,12 @@ pub(crate) fn visible_part(
                 continue;
             }
             hidden = true;
-            let mut rest = pieces[place];
+            *rest = pieces[place];
             for side in 0..4 {
-                let (outside, inside) = rest.split(|corner| shadow.height(side, corner))?;
-                if outside.count >= 3 {
-                    *pieces.get_mut(count)? = outside;
-                    count += 1;
-                }
-                rest = inside;
+                let outside = pieces.get_mut(count)?;
+                rest.split(outside, next, |corner| shadow.height(side, corner))?;
+                count += usize::from(outside.count >= 3);
+                (rest, next) = (next, rest);
                 if rest.count < 3 {
                     break;
                 }
