@@ -198,3 +198,7 @@ impl Shaft {
 /// Most triangles that are looked at for one shaft, and that may stand in it: beyond, rays are quicker.
 const MOST_LOOKED_AT: usize = 512;
 const MOST_BLOCKERS: usize = 32;
+
+#[cfg(test)]
+#[path = "shaft_tests.rs"]
+mod tests;
