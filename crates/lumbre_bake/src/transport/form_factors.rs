@@ -280,19 +280,33 @@ pub(super) fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
 /// exchange is known have that instead; with the entries comes which of them do.
 fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>) -> (FormFactors, Vec<bool>) {
     let incoming = Incoming::new(counts);
-    let rate = |i: usize| f64::from(counts[i].count) / f64::from(areas[i]);
+    let rates: Vec<f64> =
+        counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
     let row = |i: usize| -> Vec<(u32, f32, bool)> {
-        let (mut out, mut into) = (counts[i].met.iter().peekable(), incoming.row(i).iter().peekable());
-        let mut known = near.row(i).iter().peekable();
+        let (out, into, known) = (&counts[i].met[..], incoming.row(i), near.row(i));
+        let (mut x, mut y, mut z) = (0, 0, 0);
         let mut row = Vec::with_capacity(out.len() + into.len() + known.len());
+        let number = |list: &[(u32, u32)], at: usize| list.get(at).map_or(u32::MAX, |entry| entry.0);
         loop {
-            let next = [out.peek().map(|c| c.0), into.peek().map(|c| c.0), known.peek().map(|c| c.0)];
-            let Some(j) = next.into_iter().flatten().min() else { return row };
-            let is_next = |&&(other, _): &&(u32, u32)| other == j;
-            let n = out.next_if(is_next).map_or(0, |c| c.1) + into.next_if(is_next).map_or(0, |c| c.1);
-            let own = known.next_if(|&&(other, _)| other == j).map(|&(_, g)| g);
-            let counted = || (f64::from(n) / (rate(i) + rate(j as usize))) as f32;
-            row.push((j, own.unwrap_or_else(counted), own.is_some()));
+            let [a, b] = [number(out, x), number(into, y)];
+            let c = known.get(z).map_or(u32::MAX, |entry| entry.0);
+            let j = a.min(b).min(c);
+            if j == u32::MAX {
+                return row;
+            }
+            let mut n = 0;
+            if a == j {
+                (n, x) = (n + out[x].1, x + 1);
+            }
+            if b == j {
+                (n, y) = (n + into[y].1, y + 1);
+            }
+            if c == j {
+                row.push((j, known[z].1, true));
+                z += 1;
+            } else {
+                row.push((j, (f64::from(n) / (rates[i] + rates[j as usize])) as f32, false));
+            }
         }
     };
     let mut factors = FormFactors { starts: vec![0], ..FormFactors::default() };
