@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::emitter_tree::EmitterTree;
 use super::emitters::{Emitter, emitters, lamps};
 use super::shaft::Between;
-use super::share_variance::uneven_variance;
+use super::share_variance::{share_variance, uneven_variance};
 use super::visible_part::{Pieces, visible_part};
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
@@ -360,11 +360,13 @@ impl<'a> Sources<'a> {
         direct.seen.add(group, visible, hidden);
         let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
         let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
+        let grey = share(group_seen.iter().sum(), group_all.iter().sum());
         let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
             true => group_seen[at] / group_all[at],
-            false => mean.element_sum() / 3.0,
+            false => grey,
         });
-        Share { mean, variance: variance_of_mean(shares), asked: visible + hidden }
+        let asked = visible + hidden;
+        Share { mean, variance: share_variance(shares, grey, asked), asked }
     }
 }
 
