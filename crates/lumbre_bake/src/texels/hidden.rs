@@ -95,13 +95,14 @@ fn judge(scene: &BakeScene, texel: &mut Texel, seed: u32) -> (usize, u64) {
         return (0, 0);
     };
     let sequence = Sequence::new(seed, 3, texel.index);
-    let open: Vec<FootprintPoint> = points
-        .iter()
-        .enumerate()
-        .filter(|(index, point)| in_the_open(scene, point, sequence, *index as u32))
-        .map(|(_, point)| *point)
-        .collect();
-    let rays = points.len() as u64 * u64::from(JUDGES);
+    let mut rays = 0;
+    let is_open = |(index, point): &(usize, &FootprintPoint)| {
+        let (open, asked) = in_the_open(scene, point, sequence, *index as u32);
+        rays += u64::from(asked);
+        open
+    };
+    let open: Vec<FootprintPoint> =
+        points.iter().enumerate().filter(is_open).map(|(_, point)| *point).collect();
     let reduced = open.len() < points.len();
     if open.is_empty() {
         texel.footprint = Footprint::Hidden;
@@ -112,8 +113,8 @@ fn judge(scene: &BakeScene, texel: &mut Texel, seed: u32) -> (usize, u64) {
     (usize::from(reduced), rays)
 }
 
-/// Half the rays see the inside of something closed, or all see backs: the point is hidden.
-fn in_the_open(scene: &BakeScene, point: &FootprintPoint, sequence: Sequence, index: u32) -> bool {
+/// Half the rays see the inside of something closed, or all see backs: the point is hidden. With the rays that it took to tell.
+fn in_the_open(scene: &BakeScene, point: &FootprintPoint, sequence: Sequence, index: u32) -> (bool, u32) {
     let receiver = receiver(scene, point);
     let (mut inside, mut backs) = (0, 0);
     for ray in 0..JUDGES {
@@ -123,6 +124,14 @@ fn in_the_open(scene: &BakeScene, point: &FootprintPoint, sequence: Sequence, in
             SurfaceHit::Back => backs += 1,
             _ => {}
         }
+        // However the others end.
+        let (others, open) = (JUDGES - 1 - ray, ray + 1 - inside - backs);
+        if open > 0 && 2 * (inside + others) < JUDGES {
+            return (true, ray + 1);
+        }
+        if 2 * inside >= JUDGES {
+            return (false, ray + 1);
+        }
     }
-    2 * inside < JUDGES && inside + backs < JUDGES
+    (2 * inside < JUDGES && inside + backs < JUDGES, JUDGES)
 }
