@@ -4,12 +4,15 @@
 
 use glam::DVec3;
 
-use super::polygon::lambert;
+use super::polygon::{lambert, point_to_triangle};
 use super::shaft::Corners;
 
 /// Corners of a piece, and pieces, at most: what needs more is left to rays.
 const CORNERS: usize = 12;
 const PIECES: usize = 24;
+
+/// What is left of an emitter, by its share, where triangles that meet leave gaps as narrow as coordinates are rounded: nothing.
+const GAP: f64 = 1.0 / (1 << 16) as f64;
 
 /// A convex polygon, relative to the point that looks.
 #[derive(Clone, Copy)]
@@ -130,7 +133,9 @@ pub(crate) fn visible_part(
         }
     }
     let factor = pieces[..count].iter().map(|piece| lambert(normal, piece.corners())).sum::<f64>();
-    Some(Visible { factor: factor.clamp(0.0, 1.0), hidden })
+    // The whole is at most 1.
+    let is_gap = hidden && factor < GAP && factor < GAP * point_to_triangle(point, normal, emitter);
+    Some(Visible { factor: if is_gap { 0.0 } else { factor.clamp(0.0, 1.0) }, hidden })
 }
 
 /// What a triangle hides: inside of three planes through the point and its edges, and beyond its own.
@@ -252,6 +257,29 @@ mod tests {
             some_hidden += u32::from(found.factor > 0.0 && found.factor < whole);
         }
         assert!(some_hidden > 10, "{some_hidden}");
+    }
+
+    #[test]
+    fn what_meets_leaves_no_gap() {
+        // A screen before all of the lamp, cut into triangles that share corners, and one of a grid of f32 corners that meet in T's.
+        let emitter = lamp(2.0);
+        let sequence = Sequence::new(11, 78, 0);
+        for index in 0..500 {
+            let [x, y, z, angle] = sequence.point(index, 0).map(f64::from);
+            let turn = DVec3::new((6.3 * angle).cos(), 0.1 * (y - 0.5), (6.3 * angle).sin()).normalize();
+            let across = DVec3::Y.cross(turn);
+            let at = |a: f64, b: f64| {
+                (DVec3::new(x - 0.5, 0.7, z - 0.5) + turn * a + across * b).as_vec3().as_dvec3()
+            };
+            let square = |low: f64, high: f64, left: f64, right: f64| {
+                let [a, b, c, d] = [at(low, left), at(high, left), at(high, right), at(low, right)];
+                [[a, b, c], [a, c, d]]
+            };
+            let screen =
+                [square(-9.0, 9.0, -9.0, 0.1), square(-9.0, 0.3, 0.1, 9.0), square(0.3, 9.0, 0.1, 9.0)];
+            let seen = factor(DVec3::new(0.1 * x, 0.0, 0.2 * z), &emitter, &screen.concat());
+            assert_eq!(seen, Visible { factor: 0.0, hidden: true }, "{index}");
+        }
     }
 
     #[test]
