@@ -4,6 +4,8 @@
 //! p v / n off the sum over all, at first. The least samples for a sum come where that is the same for all that have more than at first
 //! (Neyman, "On the Two Different Aspects of the Representative Method", 1934, section 5).
 
+use rayon::prelude::*;
+
 /// A texel that is to have more samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Allotment {
@@ -12,6 +14,8 @@ pub(crate) struct Allotment {
     pub samples: u32,
 }
 
+/// Texels that are summed up together.
+const CHUNK: usize = 4096;
 /// Most that one round doubles the samples: a variance from few is not to be trusted further.
 const MOST_DOUBLINGS: usize = 3;
 /// What a sample must at least be worth is sought by this factor, down to this share of the highest, and then by so many halvings.
@@ -45,9 +49,13 @@ pub(crate) fn allot(
         }
         doublings
     };
+    let all: Vec<u32> = texels.clone().collect();
     let left = |least_worth: f64| -> f64 {
-        let one = |index| f64::from(variances[index as usize]) * remaining[doublings(index, least_worth)];
-        texels.clone().map(one).sum()
+        let one =
+            |&index: &u32| f64::from(variances[index as usize]) * remaining[doublings(index, least_worth)];
+        // By chunks of one size, so that the sum is the same on any number of threads.
+        let sums: Vec<f64> = all.par_chunks(CHUNK).map(|chunk| chunk.iter().map(one).sum()).collect();
+        sums.iter().sum()
     };
     let highest = texels.clone().map(worth).fold(0.0, f64::max);
     // All that can be had, if need be; less where that does.

@@ -44,10 +44,10 @@ const ALONE: f32 = 2.0 / 3.0;
 /// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts,
 /// with one standard error of the neighbours' mean, since rays end where it is small by chance.
 pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimates: &[Estimates]) -> Vec<f32> {
-    let own: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum() / 3.0).collect();
+    let own: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum() / 3.0).collect();
     // The scrambles of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
-        .iter()
+        .par_iter()
         .map(|[a, b, c, d]| {
             let apart = 0.25 * (*a + *b - *c - *d);
             (apart * apart).element_sum() / 3.0
@@ -55,7 +55,7 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimate
         .collect();
     let around = |texel: &Texel| {
         let (mut sum, mut squares, mut of_halves, mut count) = (0.0, 0.0, 0.0, 0u32);
-        surroundings.every(texel, SPREAD_STEPS, SPREAD_STEP).for_each(|(.., other)| {
+        surroundings.around(texel, SPREAD_STEPS, SPREAD_STEP, |other| {
             sum += own[other];
             squares += own[other] * own[other];
             of_halves += halves[other];
@@ -85,7 +85,7 @@ const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
 pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> Vec<f32> {
     let least = (ARITHMETIC * light).powi(2);
     direct
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(index, direct)| {
             let by_bounces = gather.map_or(0.0, |gather| {
@@ -141,14 +141,24 @@ struct Checks {
 }
 
 impl Checks {
-    fn add(&mut self, gathered: &Gathered) {
+    fn of(gathered: &Gathered) -> Self {
         let samples = f64::from(gathered.samples.max(1));
-        self.count += f64::from(gathered.checks);
-        self.difference += gathered.differences.as_dvec3();
-        self.square += f64::from(gathered.squared_differences);
         let light =
             gathered.sums.iter().map(|sum| sum.as_dvec3()).sum::<DVec3>() / samples / SCRAMBLES as f64;
-        self.light += light * f64::from(gathered.checks);
+        Self {
+            count: f64::from(gathered.checks),
+            difference: gathered.differences.as_dvec3(),
+            square: f64::from(gathered.squared_differences),
+            light: light * f64::from(gathered.checks),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        self.difference += other.difference;
+        self.square += other.square;
+        self.light += other.light;
     }
 
     /// The mean difference, beyond `expected` of it; how much of it is known, in [0, 1]; the square of what chance may have made of it.
@@ -177,8 +187,9 @@ pub(crate) fn patch_bias(
     let later = (reflectance / (1.0 - reflectance)).powi(2);
     let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
     let mut of_maps = vec![Checks::default(); maps];
-    for (texel, gathered) in texels.iter().zip(gathered) {
-        of_maps[texel.object as usize].add(gathered);
+    let checked: Vec<Checks> = gathered.par_iter().map(Checks::of).collect();
+    for (texel, checked) in texels.iter().zip(&checked) {
+        of_maps[texel.object as usize].add(checked);
     }
     // Per unit of light by bounces.
     let of_maps: Vec<DVec3> = of_maps
@@ -190,9 +201,7 @@ pub(crate) fn patch_bias(
         .collect();
     let around = |texel: &Texel| {
         let mut checks = Checks::default();
-        surroundings.of(texel, CHECK_RADIUS).for_each(|(.., other)| {
-            checks.add(&gathered[other]);
-        });
+        surroundings.around(texel, CHECK_RADIUS, 1, |other| checks.add(&checked[other]));
         if checks.count < 2.0 {
             return Unsmoothed::default();
         }
@@ -211,7 +220,7 @@ pub(crate) fn patch_bias(
     // One neighbourhood's checks tell the square of what is unknown by a single sample, which may be as good as nothing: others' tell it too.
     let wider = |(texel, own): (&Texel, &Unsmoothed)| {
         let (mut sum, mut count) = (0.0, 0u32);
-        surroundings.every(texel, WIDER_STEPS, WIDER_STEP).for_each(|(.., other)| {
+        surroundings.around(texel, WIDER_STEPS, WIDER_STEP, |other| {
             sum += alone[other].unknown;
             count += 1;
         });

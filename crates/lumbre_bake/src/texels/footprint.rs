@@ -66,7 +66,7 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
             }
             covers.sort_unstable();
             covers
-                .chunk_by(|a, b| a.0 == b.0)
+                .par_chunk_by(|a, b| a.0 == b.0)
                 .filter_map(|chunk| {
                     let cell = chunk[0].0;
                     let (x, y) = (cell % map.width, cell / map.width);

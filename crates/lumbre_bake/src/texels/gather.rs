@@ -282,7 +282,7 @@ impl Outgoing<'_> {
             return None;
         }
         let patch = self.patches.at(triangle, side, at)?;
-        let reflectance = self.reflectance(triangle, side, at, patch);
+        let reflectance = self.reflectance(triangle, side, at);
         let direct = self.direct_at(triangle, side, at, patch);
         Some(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
     }
@@ -337,7 +337,7 @@ impl Outgoing<'_> {
             SurfaceHit::Back | SurfaceHit::Inside => return Err(Vec3::ZERO),
         };
         let patch = self.patches.at(triangle, side, at).ok_or(Vec3::ZERO)?;
-        let reflectance = self.reflectance(triangle, side, at, patch);
+        let reflectance = self.reflectance(triangle, side, at);
         let direct = self.direct_at(triangle, side, at, patch);
         Ok(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
     }
@@ -356,16 +356,16 @@ impl Outgoing<'_> {
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
         let irradiance = self.direct_at(triangle, side, at, patch) + self.patch_indirect[patch as usize];
-        self.reflectance(triangle, side, at, patch) * irradiance
+        self.reflectance(triangle, side, at) * irradiance
     }
 
-    fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {
+    fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
         let scene_triangle = &self.scene.triangles[triangle as usize];
         let surface = &self.scene.surfaces[scene_triangle.surface as usize];
         if surface.varies() {
             surface.reflectance(side, scene_triangle.vertices, [1.0 - u - v, u, v])
         } else {
-            self.patches.list[patch as usize].reflectance
+            self.patches.reflectance(triangle, side)
         }
     }
 

@@ -5,8 +5,11 @@
 use rayon::prelude::*;
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
+use super::tiles::{Tiles, area, positions_of};
 use crate::sampling::{Sequence, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::transport::box_tree::BoxTree;
+use crate::transport::shaft::is_free_before;
 
 /// Seed of all rays here.
 const SEED: u32 = 0;
@@ -14,8 +17,9 @@ const SEED: u32 = 0;
 /// that touch are apart by what their corners are rounded by, and no light is seen in between.
 const PRESSED: f32 = 1.0 / 64.0;
 
-/// Rays that look for something odd in every texel, and those that judge a point of an odd one.
+/// Rays that look for something odd in every texel, and in a tile that nothing crosses, and those that judge a point of an odd one.
 const PROBES: u32 = 6;
+const TILE_PROBES: u32 = 16;
 const JUDGES: u32 = 8;
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. `touched` are the
@@ -26,8 +30,7 @@ pub(crate) fn remove_hidden(
     texels: &mut [Texel],
     touched: &[usize],
 ) -> (usize, u64) {
-    let odd: Vec<bool> = texels.par_iter().map(|texel| looks_odd(scene, texel)).collect();
-    let mut rays = texels.len() as u64 * u64::from(PROBES);
+    let (odd, mut rays) = odd(scene, texels);
     // Six rays may miss a corner of a texel; its neighbours' rays did not.
     let mut near = vec![false; layout.texels];
     touched.iter().for_each(|&index| near[index] = true);
@@ -55,24 +58,69 @@ fn pressed(scene: &BakeScene, texel: &Texel) -> f32 {
     PRESSED * own.min(texel.side(scene))
 }
 
+/// Texels that look odd, and the rays cast. Where nothing crosses the space before a tile, all of it is inside of something or none of it:
+/// some rays of the whole tile tell.
+fn odd(scene: &BakeScene, texels: &[Texel]) -> (Vec<bool>, u64) {
+    let tiles = Tiles::new(texels);
+    let tree = BoxTree::new(&scene.triangles);
+    let suspect: Vec<bool> = tiles
+        .members
+        .par_iter()
+        .map(|members| {
+            let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
+            let mut positions = Vec::new();
+            members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
+            let free = members.first().and_then(|first| area(scene, first.triangle, &positions));
+            let free = free.is_some_and(|area| is_free_before(&area, scene, &tree));
+            let of_tile =
+                (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
+            let fine = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
+            !(free && of_tile.enumerate().all(fine))
+        })
+        .collect();
+    let suspects = |place: usize| suspect[tiles.tile_of[place] as usize];
+    let odd: Vec<bool> = texels
+        .par_iter()
+        .enumerate()
+        .map(|(place, texel)| suspects(place) && looks_odd(scene, texel))
+        .collect();
+    let asked = (0..texels.len()).filter(|&place| suspects(place)).count();
+    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + asked as u64 * u64::from(PROBES);
+    (odd, rays)
+}
+
+/// What a ray of a texel meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Probe {
+    Clear,
+    /// Something at once.
+    Pressed,
+    /// The inside of something, or a back.
+    Hidden,
+}
+
+fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
+    let [x, y, u, v] = Sequence::new(SEED, 2, texel.index).point(ray, 0);
+    let Some(point) = texel.point(scene, x, y) else { return Probe::Clear };
+    let receiver = receiver(scene, &point);
+    let direction = cosine_about(receiver.geometric_normal, u, v);
+    match scene.first_hit(receiver.origin, direction) {
+        SurfaceHit::Inside | SurfaceHit::Back => Probe::Hidden,
+        SurfaceHit::Lit { distance, .. } if distance < pressed(scene, texel) => Probe::Pressed,
+        SurfaceHit::Lit { .. } | SurfaceHit::None => Probe::Clear,
+    }
+}
+
 fn looks_odd(scene: &BakeScene, texel: &Texel) -> bool {
-    let sequence = Sequence::new(SEED, 2, texel.index);
-    let pressed = pressed(scene, texel);
     let mut ended = 0;
-    (0..PROBES).any(|ray| {
-        let [x, y, u, v] = sequence.point(ray, 0);
-        let Some(point) = texel.point(scene, x, y) else { return false };
-        let receiver = receiver(scene, &point);
-        let direction = cosine_about(receiver.geometric_normal, u, v);
-        match scene.first_hit(receiver.origin, direction) {
-            SurfaceHit::Inside | SurfaceHit::Back => true,
-            // One may end so in any corner.
-            SurfaceHit::Lit { distance, .. } if distance < pressed => {
-                ended += 1;
-                ended > 1
-            }
-            SurfaceHit::Lit { .. } | SurfaceHit::None => false,
+    (0..PROBES).any(|ray| match probe(scene, texel, ray) {
+        Probe::Hidden => true,
+        // One may end so in any corner.
+        Probe::Pressed => {
+            ended += 1;
+            ended > 1
         }
+        Probe::Clear => false,
     })
 }
 

@@ -4,6 +4,7 @@
 use super::allocation::allot;
 use super::chunks::{in_chunks, in_chunks_in_time};
 use super::footprint::{Texel, receiver};
+use super::shafts::Shafts;
 use crate::progress::Watch;
 use crate::sampling::Sequence;
 use crate::scene::{BakeScene, LightmapLayout};
@@ -23,24 +24,25 @@ pub(crate) fn direct_light(
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Direct>, BakeError> {
     let [few, many, most] = options.quality.effort().direct;
-    let light = |texel: &Texel, samples: u32| {
+    let shafts = Shafts::new(scene, sources, texels);
+    let light = |place: usize, samples: u32| {
+        let texel = &texels[place];
         if texel.is_hidden() {
             return Direct::default();
         }
         let sequence = Sequence::new(options.seed, 4, texel.index);
-        sources.irradiance(sequence, samples, &|x, y| {
+        sources.irradiance_past(&shafts.between(place, texel), sequence, samples, &|x, y| {
             texel.point(scene, x, y).map(|point| receiver(scene, &point))
         })
     };
     // A complete map first, whatever time it takes.
     let clock = watch.clock();
     watch.pass(PASS);
-    let mut direct = in_chunks(texels.len(), watch, |index| {
-        light(&texels[index], if clock.late() { few.min(LATE) } else { few })
-    })?;
+    let mut direct =
+        in_chunks(texels.len(), watch, |index| light(index, if clock.late() { few.min(LATE) } else { few }))?;
     let again = in_doubt(layout, texels, &direct);
     watch.pass(PASS);
-    let better = in_chunks_in_time(again.len(), watch, |place| light(&texels[again[place] as usize], many))?;
+    let better = in_chunks_in_time(again.len(), watch, |place| light(again[place] as usize, many))?;
     replace(&mut direct, &again, better);
     // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
@@ -56,7 +58,7 @@ pub(crate) fn direct_light(
         let wanted = allot(again.iter().copied(), &variances, &samples, most, ORDER, goal);
         watch.pass(PASS);
         let better = in_chunks_in_time(wanted.len(), watch, |place| {
-            light(&texels[wanted[place].index as usize], wanted[place].samples)
+            light(wanted[place].index as usize, wanted[place].samples)
         })?;
         if better.is_empty() {
             break;

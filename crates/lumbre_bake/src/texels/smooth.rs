@@ -3,12 +3,12 @@
 //! In levels: the second takes what the first has made of every third texel, and so reaches three times as far for the same work
 //! (Dammertz, Sewtz, Hanika and Lensch, "Edge-Avoiding À-Trous Wavelet Transform", 2010).
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 use super::footprint::Texel;
 use super::gather::SCRAMBLES;
-use super::plane::{HALF, Plane, Values};
+use super::plane::{HALF, Planes, Row, Values};
 use super::smoothing_bias::squared_bias;
 use super::surroundings::Surroundings;
 
@@ -49,8 +49,7 @@ pub(crate) fn smooth(
         .texels
         .par_iter()
         .map(|texel| {
-            let near =
-                mean_of(surroundings.of(texel, NOISE_STEPS).map(|(.., other)| inverse_distances[other]));
+            let near = mean_around(surroundings, texel, 1, inverse_distances);
             let steps = near * surroundings.texel_side(texel);
             if steps.is_finite() { steps * steps } else { 0.0 }
         })
@@ -78,24 +77,14 @@ impl Level {
     ) -> (Vec<Estimates>, Vec<f32>) {
         let texels = surroundings.texels;
         // A single texel's spread of four is itself noise: the neighbourhood's mean is not.
-        let variances: Vec<f32> = estimates.iter().map(|e| variance(e).element_sum()).collect();
-        let noise: Vec<f32> = texels
-            .par_iter()
-            .map(|texel| {
-                let around = surroundings.every(texel, NOISE_STEPS, self.step);
-                mean_of(around.map(|(.., other)| variances[other]))
-            })
-            .collect();
-        // Each half's weights come from the other half: noise that shaped the weights would pull the mean towards what is
-        // most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
-        let guides: Vec<[Vec3A; 2]> =
-            texels.par_iter().map(|texel| self.guide(surroundings, texel, estimates)).collect();
+        let variances: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum()).collect();
+        let noise: Vec<f32> =
+            texels.par_iter().map(|texel| mean_around(surroundings, texel, self.step, &variances)).collect();
+        let guides = self.guides(surroundings, estimates);
         // Of a guide over a texel's mean: twice for a half, and the less the more texels.
         let guide_noise = 2.0 / ((2 * self.guide_steps + 1) as f32).powi(2);
-        let values: Vec<[Values; 2]> = estimates
-            .par_iter()
-            .map(|&[a, b, c, d]| [[a, b], [c, d]].map(|half| half.map(|value| value.extend(1.0))))
-            .collect();
+        let values: Vec<Values> =
+            estimates.par_iter().map(|estimates| estimates.map(|value| value.extend(1.0))).collect();
         let mut smoothed: Vec<Estimates> = (0..texels.len())
             .into_par_iter()
             .map(|index| {
@@ -104,47 +93,83 @@ impl Level {
                     return estimates[index];
                 }
                 let narrow = self.width.powi(-2) + self.near * self.near * nearness[index];
-                let own_guides = guides[index];
-                let mut planes = [Plane::default(), Plane::default()];
-                // Of iterators within iterators, the loop that the iterator itself runs is the quick one.
-                surroundings.every(texel, self.steps, self.step).for_each(|(dx, dy, other)| {
-                    let apart = (dx * dx + dy * dy) * narrow;
-                    let expected = GUIDE_SIGMAS * guide_noise * (noise[index] + noise[other]);
-                    let inverse = 1.0 / expected.max(f32::MIN_POSITIVE);
-                    for (half, (plane, values)) in planes.iter_mut().zip(&values[other]).enumerate() {
-                        let difference = guides[other][1 - half] - own_guides[1 - half];
-                        let weight = falloff(apart + difference.length_squared() * inverse);
-                        plane.add(dx, dy, weight, values);
+                let (own_guide, own_noise) = (guides[index], noise[index]);
+                let mut planes = Planes::default();
+                surroundings.runs(texel, self.steps, self.step, |run| {
+                    let mut row = Row::default();
+                    let (y, mut x) = (run.down as f32, run.right as f32);
+                    for other in (run.first..run.end).step_by(self.step as usize) {
+                        let expected = GUIDE_SIGMAS * guide_noise * (own_noise + noise[other]);
+                        let inverse = 1.0 / expected.max(f32::MIN_POSITIVE);
+                        let apart = Vec4::splat((x * x + y * y) * narrow);
+                        row.add(
+                            x,
+                            falloff(apart + guides[other].apart(&own_guide) * inverse),
+                            &values[other],
+                        );
+                        x += self.step as f32;
                     }
+                    planes.add(y, &row);
                 });
                 let mut smoothed = estimates[index];
-                for (half, plane) in planes.iter().enumerate() {
-                    plane.at_center(&mut smoothed[half * HALF..][..HALF]);
+                for half in 0..SCRAMBLES / HALF {
+                    planes.at_center(half, &mut smoothed[half * HALF..][..HALF]);
                 }
                 smoothed
             })
             .collect();
         let mut bias = squared_bias(surroundings, self.step, estimates, &smoothed);
-        for (index, bias) in bias.iter_mut().enumerate() {
-            let before = noise[index] / 3.0;
-            *bias = (*bias - self.chance * before).max(0.0);
-            if *bias + variance(&smoothed[index]).element_sum() / 3.0 > before {
-                (smoothed[index], *bias) = (estimates[index], 0.0);
-            }
-        }
+        let before = estimates.par_iter().zip(&noise);
+        smoothed.par_iter_mut().zip(&mut bias).zip(before).for_each(
+            |((smoothed, bias), (estimates, noise))| {
+                let before = noise / 3.0;
+                *bias = (*bias - self.chance * before).max(0.0);
+                if *bias + variance(smoothed).element_sum() / 3.0 > before {
+                    (*smoothed, *bias) = (*estimates, 0.0);
+                }
+            },
+        );
         (smoothed, bias)
     }
 
-    /// The means of both halves over the texels next to one.
-    fn guide(&self, surroundings: &Surroundings<'_>, texel: &Texel, estimates: &[Estimates]) -> [Vec3A; 2] {
-        let (mut sums, mut count) = ([Vec3::ZERO; 2], 0u32);
-        surroundings.every(texel, self.guide_steps, self.step).for_each(|(.., other)| {
-            for (half, sum) in sums.iter_mut().enumerate() {
-                *sum += estimates[other][half * HALF..][..HALF].iter().sum::<Vec3>();
-            }
-            count += HALF as u32;
-        });
-        sums.map(|sum| Vec3A::from(sum / count.max(1) as f32))
+    /// What tells edges at each texel: the means of both halves over the texels next to it. Each half's weights come from the other half: noise
+    /// that shaped the weights would pull the mean towards what is most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive
+    /// Rendering with Non-Local Means", 2012).
+    fn guides(&self, surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> Vec<Guide> {
+        let own: Vec<Guide> =
+            estimates.par_iter().map(|[a, b, c, d]| Guide::of([*c + *d, *a + *b])).collect();
+        let around = |texel: &Texel| {
+            let (mut sum, mut count) = (Guide::default(), 0u32);
+            surroundings.around(texel, self.guide_steps, self.step, |other| {
+                sum.first += own[other].first;
+                sum.second += own[other].second;
+                count += HALF as u32;
+            });
+            let scale = 1.0 / count.max(1) as f32;
+            Guide { first: sum.first * scale, second: sum.second * scale }
+        };
+        surroundings.texels.par_iter().map(around).collect()
+    }
+}
+
+/// Light for the weights of each half: red and green of both, then blue.
+#[derive(Clone, Copy, Default)]
+struct Guide {
+    first: Vec4,
+    second: Vec4,
+}
+
+impl Guide {
+    fn of([one, two]: [Vec3; 2]) -> Self {
+        Self { first: Vec4::new(one.x, two.x, one.y, two.y), second: Vec4::new(one.z, two.z, 0.0, 0.0) }
+    }
+
+    /// Squared differences, for each half.
+    #[inline(always)]
+    fn apart(&self, other: &Self) -> Vec4 {
+        let (first, second) = (self.first - other.first, self.second - other.second);
+        let (first, second) = (first * first, second * second);
+        first + first.zwzw() + second
     }
 }
 
@@ -153,15 +178,20 @@ const GUIDE_SIGMAS: f32 = 8.0;
 /// Reach over which a texel's noise is averaged, in steps.
 const NOISE_STEPS: i64 = 2;
 
-fn mean_of(values: impl Iterator<Item = f32>) -> f32 {
-    let (sum, count) = values.fold((0.0, 0u32), |(sum, count), value| (sum + value, count + 1));
+/// Over a texel's neighbours.
+fn mean_around(surroundings: &Surroundings<'_>, texel: &Texel, step: i64, values: &[f32]) -> f32 {
+    let (mut sum, mut count) = (0.0, 0u32);
+    surroundings.around(texel, NOISE_STEPS, step, |other| {
+        sum += values[other];
+        count += 1;
+    });
     sum / count.max(1) as f32
 }
 
 /// (1 - x/16)^16: e^-x within .013, and nothing beyond 16.
 #[inline(always)]
-fn falloff(x: f32) -> f32 {
-    let mut power = (1.0 - x * (1.0 / 16.0)).max(0.0);
+fn falloff(x: Vec4) -> Vec4 {
+    let mut power = (Vec4::ONE - x * (1.0 / 16.0)).max(Vec4::ZERO);
     for _ in 0..4 {
         power *= power;
     }

@@ -1,6 +1,6 @@
 //! What smoothing may have done to the light besides taking its noise away. Not the smoothing.
 
-use glam::Vec3;
+use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::plane::HALF;
@@ -21,13 +21,13 @@ pub(crate) fn squared_bias(
     smoothed: &[Estimates],
 ) -> Vec<f32> {
     let half = |estimates: &Estimates, half: usize| [estimates[half * HALF], estimates[half * HALF + 1]];
-    let differences: Vec<[[Vec3; HALF]; 2]> = raw
+    let differences: Vec<[[Vec3A; HALF]; 2]> = raw
         .par_iter()
         .zip(smoothed)
         .map(|(raw, smoothed)| {
             [0, 1].map(|side| {
                 let [a, b] = half(smoothed, side);
-                half(raw, 1 - side).map(|raw| 0.5 * (a + b) - raw)
+                half(raw, 1 - side).map(|raw| Vec3A::from(0.5 * (a + b) - raw))
             })
         })
         .collect();
@@ -36,8 +36,8 @@ pub(crate) fn squared_bias(
         .par_iter()
         .zip(smoothed)
         .map(|(texel, smoothed)| {
-            let (mut sums, mut count) = ([[Vec3::ZERO; HALF]; 2], 0u32);
-            surroundings.every(texel, BLOCK_RADIUS, step).for_each(|(.., other)| {
+            let (mut sums, mut count) = ([[Vec3A::ZERO; HALF]; 2], 0u32);
+            surroundings.around(texel, BLOCK_RADIUS, step, |other| {
                 for (sums, differences) in sums.iter_mut().zip(&differences[other]) {
                     for (sum, difference) in sums.iter_mut().zip(differences) {
                         *sum += *difference;
@@ -59,7 +59,7 @@ pub(crate) fn squared_bias(
         .par_iter()
         .map(|texel| {
             let (mut sum, mut count) = (0.0, 0u32);
-            surroundings.every(texel, BIAS_RADIUS, step).for_each(|(.., other)| {
+            surroundings.around(texel, BIAS_RADIUS, step, |other| {
                 sum += of_blocks[other];
                 count += 1;
             });

@@ -37,8 +37,16 @@ impl BoxTree {
 
     /// Calls `visit` for every triangle whose box may meet the one from `low` to `high`, in an order that depends on the scene alone.
     pub fn near(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u32)) {
+        self.near_while(low, high, |index| {
+            visit(index);
+            true
+        });
+    }
+
+    /// As [`near`](Self::near), as long as `visit` wants more; whether it always did.
+    pub fn near_while(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u32) -> bool) -> bool {
         if self.nodes.is_empty() {
-            return;
+            return true;
         }
         let mut stack = vec![0u32];
         while let Some(index) = stack.pop() {
@@ -50,9 +58,12 @@ impl BoxTree {
                 stack.extend([node.first, index + 1]);
             } else {
                 let range = node.first as usize..(node.first + node.count) as usize;
-                self.items[range].iter().copied().for_each(&mut visit);
+                if !self.items[range].iter().all(|&index| visit(index)) {
+                    return false;
+                }
             }
         }
+        true
     }
 }
 

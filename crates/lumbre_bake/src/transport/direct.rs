@@ -7,6 +7,9 @@ use glam::Vec3;
 
 use super::emitter_tree::EmitterTree;
 use super::emitters::{Emitter, emitters, lamps};
+use super::shaft::Between;
+use super::share_variance::{share_variance, uneven_variance};
+use super::visible_part::{Pieces, visible_part};
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -169,6 +172,16 @@ impl<'a> Sources<'a> {
         self.sky != Vec3::ZERO
     }
 
+    /// The parts of the emissive surfaces whose shadows are told apart at a receiver.
+    pub fn parts(&self, receiver: &Receiver) -> Vec<u32> {
+        self.tree.groups(receiver)
+    }
+
+    /// The emitters of such a part, if they are few.
+    pub fn emitters_of(&self, part: u32) -> Option<Vec<u32>> {
+        self.tree.emitters_of(part, FEW_EMITTERS)
+    }
+
     /// Mean irradiance of a receiver by `samples` shadow rays to the emitters and to each light; `point` maps the unit
     /// square onto its surface.
     pub fn irradiance(
@@ -177,9 +190,21 @@ impl<'a> Sources<'a> {
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
     ) -> Direct {
+        self.irradiance_past(&[], sequence, samples, point)
+    }
+
+    /// As [`irradiance`](Self::irradiance), without shadow rays to the parts for which it is known what may stand `between`: those are as
+    /// exact as the receiver's points.
+    pub fn irradiance_past(
+        &self,
+        between: &[Between],
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+    ) -> Direct {
         let mut direct = Direct::default();
         if !self.emitters.is_empty() {
-            let light = self.emitted(sequence, samples, point, &mut direct);
+            let light = self.emitted(between, sequence, samples, point, &mut direct);
             direct.baked += light;
         }
         self.punctual(sequence, samples, point, &mut direct);
@@ -190,6 +215,7 @@ impl<'a> Sources<'a> {
     /// full light and in full shadow of each, and in between its error is that of the share alone.
     fn emitted(
         &self,
+        between: &[Between],
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -204,13 +230,28 @@ impl<'a> Sources<'a> {
         for (place, (&group, weight)) in groups.iter().zip(weights).enumerate() {
             let own = allotted(samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
+            let unoccluded = || {
+                Unoccluded::mean(|x, y| {
+                    point(x, y).map(|receiver| self.tree.unoccluded(&self.emitters, group, &receiver))
+                })
+            };
+            let known =
+                between.iter().find(|between| between.part == group).and_then(|between| {
+                    match between.emitters.is_empty() {
+                        true => Some(unoccluded()),
+                        false => self.seen_past(between, sequence, (own, set), point, direct),
+                    }
+                });
+            if let Some((light, variance)) = known {
+                irradiance += light;
+                direct.variance += variance + (self.tree.error() * grey(light)).powi(2);
+                continue;
+            }
             let mut share = self.seen_share(group, &anchor, sequence, (own, set), point, direct);
             if share.mean == Vec3::ZERO && share.asked > 0 {
                 continue;
             }
-            let (light, uneven) = Unoccluded::mean(|x, y| {
-                point(x, y).map(|receiver| self.tree.unoccluded(&self.emitters, group, &receiver))
-            });
+            let (light, uneven) = unoccluded();
             if share.asked == 0 && light != Vec3::ZERO {
                 // Of few samples all may be of sides that look away.
                 share = self.seen_share(group, &anchor, sequence, (AGAIN * own, set), point, direct);
@@ -220,6 +261,53 @@ impl<'a> Sources<'a> {
             direct.variance += (self.tree.error() * grey(light * share.mean)).powi(2);
         }
         irradiance
+    }
+
+    /// The light of a part of which it is known what may stand between, at as many points as are worth so many shadow rays, and its variance;
+    /// `None` if some point sees it in too many pieces.
+    fn seen_past(
+        &self,
+        between: &Between,
+        sequence: Sequence,
+        (samples, set): (u32, u32),
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) -> Option<(Vec3, f32)> {
+        let points = (samples / RAYS_OF_A_POINT).max(GROUPS as u32);
+        let (mut sums, mut counts) = ([Vec3::ZERO; GROUPS], [0u32; GROUPS]);
+        let (mut least, mut most) = (f32::INFINITY, 0.0f32);
+        let (mut seen, mut hidden) = (0, 0);
+        let mut room = Pieces::NONE;
+        for sample in 0..points {
+            let [x, y, ..] = sequence.point(sample, set);
+            let Some(receiver) = point(x, y) else { continue };
+            let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
+            let (mut light, mut cut) = (Vec3::ZERO, false);
+            for (emitter, blockers) in &between.emitters {
+                let emitter = &self.emitters[*emitter as usize];
+                let visible = visible_part(position, normal, &emitter.corners_f64, blockers, &mut room)?;
+                light += emitter.radiance * (std::f64::consts::PI * visible.factor) as f32;
+                cut |= visible.hidden;
+            }
+            let grey = light.element_sum() / 3.0;
+            (least, most) = (least.min(grey), most.max(grey));
+            seen += u32::from(grey > 0.0);
+            hidden += u32::from(cut);
+            let group = group_of(sample, points);
+            sums[group] += light;
+            counts[group] += 1;
+        }
+        direct.seen.add(between.part, seen, hidden);
+        let count = counts.iter().sum::<u32>();
+        if count == 0 {
+            return Some((Vec3::ZERO, 0.0));
+        }
+        let mean = sums.iter().sum::<Vec3>() / count as f32;
+        let of_group = |group: usize| match counts[group] {
+            0 => mean.element_sum() / 3.0,
+            own => sums[group].element_sum() / (3 * own) as f32,
+        };
+        Some((mean, uneven_variance(std::array::from_fn(of_group), most - least, count)))
     }
 
     /// The part of a group's light that is seen, by so many samples of dimension set `set`.
@@ -272,11 +360,13 @@ impl<'a> Sources<'a> {
         direct.seen.add(group, visible, hidden);
         let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
         let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
+        let grey = share(group_seen.iter().sum(), group_all.iter().sum());
         let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
             true => group_seen[at] / group_all[at],
-            false => mean.element_sum() / 3.0,
+            false => grey,
         });
-        Share { mean, variance: variance_of_mean(shares), asked: visible + hidden }
+        let asked = visible + hidden;
+        Share { mean, variance: share_variance(shares, grey, asked), asked }
     }
 }
 
@@ -290,6 +380,11 @@ struct Share {
 
 /// So many times the samples where none of them could bring light, though there is some.
 const AGAIN: u32 = 16;
+
+/// Most emitters of a part of which it is asked what stands before each.
+const FEW_EMITTERS: usize = 8;
+/// Shadow rays that take about as long as one point that sees a source exactly.
+const RAYS_OF_A_POINT: u32 = 8;
 
 /// The dimension sets of groups begin here: before it are the punctual lights'.
 const FIRST_SET: u32 = 34;

@@ -135,6 +135,21 @@ impl EmitterTree {
         groups
     }
 
+    /// The emitters of a part, if they are at most `most`.
+    pub fn emitters_of(&self, part: u32, most: usize) -> Option<Vec<u32>> {
+        let (mut found, mut open) = (Vec::new(), vec![part]);
+        while let Some(index) = open.pop() {
+            match self.nodes[index as usize].kind {
+                Kind::Leaf(emitter) => found.push(emitter),
+                Kind::Inner([near, far]) => open.extend([far, near]),
+            }
+            if found.len() + open.len() > most {
+                return None;
+            }
+        }
+        Some(found)
+    }
+
     /// Irradiance of a part as if nothing were between.
     pub fn unoccluded(&self, emitters: &[Emitter], part: u32, receiver: &Receiver) -> Vec3 {
         let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());

@@ -65,13 +65,15 @@ impl FormFactors {
             FormFactorMethod::CosineRays => cosine_rays::cast(scene, patches, rays, seed, watch)?,
             FormFactorMethod::GlobalLines => global_lines::cast(scene, patches, rays, seed, watch)?,
         };
-        let whole = Self::pooled(&cast, patches, &NearPairs::default(), Cast::whole);
-        let near = near_pairs(scene, patches, &whole, &cast, seed);
-        let half = |half: usize| Self::pooled(&cast, patches, &near, |cast| cast.half(half));
-        let ((even, odd), mut whole) = rayon::join(
-            || rayon::join(|| half(0), || half(1)),
-            || Self::pooled(&cast, patches, &near, Cast::whole),
-        );
+        let [whole, even, odd] =
+            [|cast: &Cast| cast.whole(), |cast: &Cast| cast.half(0), |cast: &Cast| cast.half(1)]
+                .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
+        let areas = || patches.list.iter().map(|patch| patch.area).collect();
+        let (counted, _) = pool(&whole, &NearPairs::default(), areas());
+        let near = near_pairs(scene, patches, &counted, &cast, seed);
+        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near);
+        let ((even, odd), mut whole) =
+            rayon::join(|| rayon::join(|| pooled(&even), || pooled(&odd)), || pooled(&whole));
         let halves = [even, odd];
         (whole.rays, whole.exact) = (rays, near.count());
         Ok((whole, halves))
@@ -85,11 +87,9 @@ impl FormFactors {
         Self { starts: vec![0; count + 1], areas, open, sky, ..Self::default() }
     }
 
-    /// The matrix of some of the rays: of each patch those that `of` picks.
-    fn pooled(cast: &[Cast], patches: &Patches, near: &NearPairs, of: impl Fn(&Cast) -> Counts) -> Self {
-        let counts: Vec<Counts> = cast.iter().map(of).collect();
-        let areas: Vec<f32> = patches.list.iter().map(|patch| patch.area).collect();
-        let (mut factors, exact) = pool(&counts, near, areas);
+    /// The matrix of some of the rays.
+    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs) -> Self {
+        let (mut factors, exact) = pool(counts, near, areas);
         factors.open = counts.iter().map(Counts::open).collect();
         let sky = |own: &Counts| own.missed as f32 / (own.count - own.inside).max(1) as f32;
         factors.sky = counts.iter().map(sky).collect();
@@ -249,14 +249,17 @@ impl Cast {
 }
 
 fn merged(a: &[(u32, u32)], b: &[(u32, u32)]) -> Vec<(u32, u32)> {
-    let mut both = [a, b].concat();
-    both.sort_unstable();
-    both.dedup_by(|next, kept| {
-        let same = next.0 == kept.0;
-        kept.1 += if same { next.1 } else { 0 };
-        same
-    });
-    both
+    let mut both = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    loop {
+        let next = [a.peek().map(|own| own.0), b.peek().map(|own| own.0)];
+        let Some(number) = next.into_iter().flatten().min() else { return both };
+        let is_next = |&&(own, _): &&(u32, u32)| own == number;
+        both.push((
+            number,
+            a.next_if(is_next).map_or(0, |own| own.1) + b.next_if(is_next).map_or(0, |own| own.1),
+        ));
+    }
 }
 
 /// How often each number occurs, in order.
@@ -276,30 +279,82 @@ pub(super) fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
 /// G from two Poisson counts is their sum over the sum of their rates. (A line counts in both directions, which weighs the same.) Pairs whose
 /// exchange is known have that instead; with the entries comes which of them do.
 fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>) -> (FormFactors, Vec<bool>) {
-    let mut incoming: Vec<Vec<(u32, u32)>> = vec![Vec::new(); counts.len()];
-    for (i, own) in counts.iter().enumerate() {
-        for &(j, n) in &own.met {
-            incoming[j as usize].push((i as u32, n));
+    let incoming = Incoming::new(counts);
+    let rates: Vec<f64> =
+        counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
+    let row = |i: usize| -> Vec<(u32, f32, bool)> {
+        let (out, into, known) = (&counts[i].met[..], incoming.row(i), near.row(i));
+        let (mut x, mut y, mut z) = (0, 0, 0);
+        let mut row = Vec::with_capacity(out.len() + into.len() + known.len());
+        let number = |list: &[(u32, u32)], at: usize| list.get(at).map_or(u32::MAX, |entry| entry.0);
+        loop {
+            let [a, b] = [number(out, x), number(into, y)];
+            let c = known.get(z).map_or(u32::MAX, |entry| entry.0);
+            let j = a.min(b).min(c);
+            if j == u32::MAX {
+                return row;
+            }
+            let mut n = 0;
+            if a == j {
+                (n, x) = (n + out[x].1, x + 1);
+            }
+            if b == j {
+                (n, y) = (n + into[y].1, y + 1);
+            }
+            if c == j {
+                row.push((j, known[z].1, true));
+                z += 1;
+            } else {
+                row.push((j, (f64::from(n) / (rates[i] + rates[j as usize])) as f32, false));
+            }
         }
-    }
-    let rate = |i: usize| f64::from(counts[i].count) / f64::from(areas[i]);
+    };
     let mut factors = FormFactors { starts: vec![0], ..FormFactors::default() };
     let mut exact = Vec::new();
-    for (i, (own, into)) in counts.iter().zip(&incoming).enumerate() {
-        let (mut out, mut into) = (own.met.iter().peekable(), into.iter().peekable());
-        let mut known = near.row(i).iter().peekable();
-        loop {
-            let next = [out.peek().map(|c| c.0), into.peek().map(|c| c.0), known.peek().map(|c| c.0)];
-            let Some(j) = next.into_iter().flatten().min() else { break };
-            let is_next = |&&(other, _): &&(u32, u32)| other == j;
-            let n = out.next_if(is_next).map_or(0, |c| c.1) + into.next_if(is_next).map_or(0, |c| c.1);
-            let own = known.next_if(|&&(other, _)| other == j).map(|&(_, g)| g);
-            factors.columns.push(j);
-            factors.exchange.push(own.unwrap_or((f64::from(n) / (rate(i) + rate(j as usize))) as f32));
-            exact.push(own.is_some());
+    // Some rows at a time, so that they are not all there twice.
+    for first in (0..counts.len()).step_by(ROWS) {
+        let rows: Vec<_> = (first..(first + ROWS).min(counts.len())).into_par_iter().map(row).collect();
+        for row in rows {
+            factors.columns.extend(row.iter().map(|entry| entry.0));
+            factors.exchange.extend(row.iter().map(|entry| entry.1));
+            exact.extend(row.iter().map(|entry| entry.2));
+            factors.starts.push(factors.columns.len());
         }
-        factors.starts.push(factors.columns.len());
     }
     factors.areas = areas;
     (factors, exact)
+}
+
+/// Rows that are made side by side.
+const ROWS: usize = 4096;
+
+/// The counts by who was met: (who has met it, how often), ascending.
+struct Incoming {
+    starts: Vec<usize>,
+    list: Vec<(u32, u32)>,
+}
+
+impl Incoming {
+    fn new(counts: &[Counts]) -> Self {
+        let mut starts = vec![0usize; counts.len() + 1];
+        for &(met, _) in counts.iter().flat_map(|own| &own.met) {
+            starts[met as usize + 1] += 1;
+        }
+        for place in 1..starts.len() {
+            starts[place] += starts[place - 1];
+        }
+        let mut next = starts.clone();
+        let mut list = vec![(0, 0); starts.last().copied().unwrap_or(0)];
+        for (i, own) in counts.iter().enumerate() {
+            for &(met, n) in &own.met {
+                list[next[met as usize]] = (i as u32, n);
+                next[met as usize] += 1;
+            }
+        }
+        Self { starts, list }
+    }
+
+    fn row(&self, i: usize) -> &[(u32, u32)] {
+        &self.list[self.starts[i]..self.starts[i + 1]]
+    }
 }

@@ -28,5 +28,7 @@ mod patch_tests;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;
+pub(crate) mod shaft;
 mod share_variance;
 pub(crate) mod solver;
+mod visible_part;

@@ -31,6 +31,8 @@ struct Cut {
     divisions: u32,
     front: u32,
     back: Option<u32>,
+    /// Of the front's first patch and the back's: of all, where it does not vary.
+    reflectance: [Vec3; 2],
     /// Where the trees of its cells are listed; [`UNCUT`] if none is cut.
     roots: u32,
 }
@@ -84,7 +86,13 @@ impl Patches {
         let mut roots = Vec::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
             if triangle.superseded {
-                cuts.push(Cut { divisions: 0, front: 0, back: None, roots: UNCUT });
+                cuts.push(Cut {
+                    divisions: 0,
+                    front: 0,
+                    back: None,
+                    reflectance: [Vec3::ZERO; 2],
+                    roots: UNCUT,
+                });
                 continue;
             }
             let divisions = divisions(triangle, side);
@@ -120,7 +128,9 @@ impl Patches {
             };
             let front = add(Side::Front);
             let back = triangle.two_sided.then(|| add(Side::Back));
-            cuts.push(Cut { divisions, front, back, roots: own_roots });
+            let first = |patch: u32| list[patch as usize].reflectance;
+            let reflectance = [first(front), back.map_or(Vec3::ZERO, first)];
+            cuts.push(Cut { divisions, front, back, reflectance, roots: own_roots });
         }
         Self { list, cuts, roots, lines }
     }
@@ -143,6 +153,11 @@ impl Patches {
             }
         }
         Some(first + cell)
+    }
+
+    /// Reflectance of a triangle's side that has the same all over.
+    pub fn reflectance(&self, triangle: u32, side: Side) -> Vec3 {
+        self.cuts[triangle as usize].reflectance[usize::from(side == Side::Back)]
     }
 
     /// Barycentric weights (second, third vertex) of a point of a patch given by weights of its own.

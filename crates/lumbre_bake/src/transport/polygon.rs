@@ -17,7 +17,12 @@ pub(crate) fn point_to_triangle(point: DVec3, normal: DVec3, triangle: &[DVec3; 
     }
     let mut clipped = [DVec3::ZERO; 4];
     let count = clip(&relative, normal, &mut clipped);
-    let corners = &clipped[..count];
+    lambert(normal, &clipped[..count]).clamp(0.0, 1.0)
+}
+
+/// The sum over the edges of a polygon, seen from its front, above the horizon and relative to the point.
+pub(super) fn lambert(normal: DVec3, corners: &[DVec3]) -> f64 {
+    let count = corners.len();
     let mut sum = 0.0;
     for (i, &a) in corners.iter().enumerate() {
         let b = corners[(i + 1) % count];
@@ -28,7 +33,7 @@ pub(crate) fn point_to_triangle(point: DVec3, normal: DVec3, triangle: &[DVec3; 
         }
     }
     // Seen from the front the corners run counter-clockwise about the direction to the eye, so clockwise about ours.
-    (-sum / TAU).clamp(0.0, 1.0)
+    -sum / TAU
 }
 
 /// The part of a triangle above the horizon: at most four corners.

@@ -17,6 +17,13 @@ pub(super) fn share_variance(shares: [f32; GROUPS], mean: f32, samples: u32) -> 
     spread.max(EDGE * chord * (samples.max(1) as f32).powf(-1.5))
 }
 
+/// Variance of the mean of light at so many points of a receiver, by runs of them, that differs by `range`: at least what an edge leaves that
+/// goes right across, with all of the range between its sides.
+pub(super) fn uneven_variance(means: [f32; GROUPS], range: f32, points: u32) -> f32 {
+    let edge = EDGE * range * range * (points.max(1) as f32).powf(-1.5);
+    variance_of_mean(means).max(edge)
+}
+
 /// Strata that a diameter crosses over √N, 1.13 sides of the square that the disc is mapped from, times 1/6.
 const EDGE: f32 = 0.19;
 

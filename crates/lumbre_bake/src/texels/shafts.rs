@@ -1,0 +1,102 @@
+//! What may stand between texels and emissive surfaces: found for tiles of texels, and narrowed down for each. Where it is little, direct
+//! light needs no shadow ray. Not the light: that is `direct`.
+
+use rayon::prelude::*;
+
+use super::footprint::{Texel, receiver};
+use super::tiles::{Tiles, area, positions_of};
+use crate::scene::BakeScene;
+use crate::transport::box_tree::BoxTree;
+use crate::transport::direct::Sources;
+use crate::transport::shaft::{Between, Shaft};
+
+/// What may stand between a tile and an emitter, by numbers.
+struct OfTile {
+    /// Of the emissive surfaces, by the sources' count.
+    part: u32,
+    emitters: Vec<(u32, Vec<u32>)>,
+}
+
+/// What may stand between texels and emissive surfaces.
+pub(crate) struct Shafts<'a> {
+    scene: &'a BakeScene,
+    sources: &'a Sources<'a>,
+    tiles: Vec<Vec<OfTile>>,
+    /// The tile of each covered texel.
+    tile_of: Vec<u32>,
+}
+
+impl<'a> Shafts<'a> {
+    /// For all covered texels.
+    pub fn new(scene: &'a BakeScene, sources: &'a Sources<'a>, texels: &[Texel]) -> Self {
+        let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
+        if sources.emitters.is_empty() {
+            return shafts;
+        }
+        let Tiles { members, tile_of } = Tiles::new(texels);
+        shafts.tile_of = tile_of;
+        let tree = BoxTree::new(&scene.triangles);
+        shafts.tiles = members
+            .par_iter()
+            .map(|members| {
+                let members = || members.iter().map(|&place| &texels[place as usize]);
+                shafts.of_tile(&tree, members).unwrap_or_default()
+            })
+            .collect();
+        shafts
+    }
+
+    /// `None` where rays have to tell.
+    fn of_tile<'t, T: Iterator<Item = &'t Texel>>(
+        &self,
+        tree: &BoxTree,
+        members: impl Fn() -> T,
+    ) -> Option<Vec<OfTile>> {
+        let mut open = members().filter(|texel| !texel.is_hidden());
+        let first = open.next()?;
+        let mut positions = Vec::new();
+        members().for_each(|texel| positions_of(self.scene, texel, &mut positions));
+        let area = area(self.scene, first.triangle, &positions)?;
+        let anchor = receiver(self.scene, &first.point(self.scene, 0.5, 0.5)?);
+        let part = |part: u32| {
+            let emitters = self.sources.emitters_of(part)?;
+            let mut found = Vec::new();
+            for emitter in emitters {
+                if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {
+                    found.push((emitter, shaft.triangles(self.scene, tree)?));
+                }
+            }
+            Some(OfTile { part, emitters: found })
+        };
+        Some(self.sources.parts(&anchor).into_iter().filter_map(part).collect())
+    }
+
+    /// What may stand between a texel, by its number, and those parts of the sources for which that is known.
+    pub fn between(&self, place: usize, texel: &Texel) -> Vec<Between> {
+        let Some(&tile) = self.tile_of.get(place) else { return Vec::new() };
+        let (mut own, mut positions) = (None, Vec::new());
+        let one = |of_tile: &OfTile| {
+            if of_tile.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
+                return Some(Between { part: of_tile.part, emitters: Vec::new() });
+            }
+            if own.is_none() {
+                positions_of(self.scene, texel, &mut positions);
+                own = area(self.scene, texel.triangle, &positions);
+            }
+            let area = own?;
+            let narrowed = |(emitter, blockers): &(u32, Vec<u32>)| {
+                let shaft = Shaft::new(&area, &self.sources.emitters[*emitter as usize])?;
+                let corners = blockers.iter().filter_map(|&index| {
+                    let triangle = &self.scene.triangles[index as usize];
+                    let corners = triangle.corners.map(|corner| corner.as_dvec3());
+                    shaft.may_meet(&corners, f64::from(triangle.extent)).then_some(corners)
+                });
+                Some((*emitter, corners.collect()))
+            };
+            let emitters: Vec<(u32, Vec<_>)> = of_tile.emitters.iter().filter_map(narrowed).collect();
+            let clear = emitters.iter().all(|(_, blockers)| blockers.is_empty());
+            Some(Between { part: of_tile.part, emitters: if clear { Vec::new() } else { emitters } })
+        };
+        self.tiles[tile as usize].iter().filter_map(one).collect()
+    }
+}
