@@ -16,7 +16,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::footprint::Texel;
-use super::gather::{Gathered, SCRAMBLES};
+use super::gather::Gathered;
 use super::smooth::{Estimates, mean, variance};
 use super::surroundings::Surroundings;
 use crate::transport::direct::Direct;
@@ -31,6 +31,8 @@ pub(crate) struct GatherErrors<'a> {
     pub patch_bias: &'a [PatchBias],
     /// Relative, of the solver.
     pub residual_bound: f64,
+    /// By how much the light may have changed since it was gathered; empty where none is kept.
+    pub neglected: &'a [f32],
 }
 
 /// Steps each way, and texels of a step, over which the spread of the scrambles is put together.
@@ -87,6 +89,7 @@ pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>) ->
                     + gather.gathered[index].patch_error().powi(2)
                     + unsolved * unsolved
                     + gather.patch_bias[index].rest
+                    + gather.neglected.get(index).map_or(0.0, |neglected| neglected * neglected)
             });
             direct.variance + by_bounces
         })
@@ -132,14 +135,12 @@ struct Checks {
 }
 
 impl Checks {
-    fn add(&mut self, gathered: &Gathered) {
-        let samples = f64::from(gathered.samples.max(1));
+    /// With the light by bounces that the checked texel's samples tell.
+    fn add(&mut self, gathered: &Gathered, light: Vec3) {
         self.count += f64::from(gathered.checks);
         self.difference += gathered.differences.as_dvec3();
         self.square += f64::from(gathered.squared_differences);
-        let light =
-            gathered.sums.iter().map(|sum| sum.as_dvec3()).sum::<DVec3>() / samples / SCRAMBLES as f64;
-        self.light += light * f64::from(gathered.checks);
+        self.light += light.as_dvec3() * f64::from(gathered.checks);
     }
 
     /// The mean difference, beyond `expected` of it; how much of it is known, in [0, 1]; the square of what chance may have made of it.
@@ -163,13 +164,15 @@ pub(crate) fn patch_bias(
     surroundings: &Surroundings<'_>,
     texels: &[Texel],
     gathered: &[Gathered],
+    raw: &[Estimates],
     reflectance: f64,
 ) -> Vec<PatchBias> {
+    let lights: Vec<Vec3> = raw.par_iter().map(mean).collect();
     let later = (reflectance / (1.0 - reflectance)).powi(2);
     let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
     let mut of_maps = vec![Checks::default(); maps];
-    for (texel, gathered) in texels.iter().zip(gathered) {
-        of_maps[texel.object as usize].add(gathered);
+    for ((texel, gathered), light) in texels.iter().zip(gathered).zip(&lights) {
+        of_maps[texel.object as usize].add(gathered, *light);
     }
     // Per unit of light by bounces.
     let of_maps: Vec<DVec3> = of_maps
@@ -182,7 +185,7 @@ pub(crate) fn patch_bias(
     let around = |texel: &Texel| {
         let mut checks = Checks::default();
         surroundings.of(texel, CHECK_RADIUS).for_each(|(.., other)| {
-            checks.add(&gathered[other]);
+            checks.add(&gathered[other], lights[other]);
         });
         if checks.count < 2.0 {
             return Unsmoothed::default();
