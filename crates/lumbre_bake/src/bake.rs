@@ -168,7 +168,12 @@ fn run(
         return Ok((finish(report, &mut watch), None));
     }
     name_what_is_missing(&sources, &mut report);
-    memory::check_texels(&scene, &layout, options)?;
+    let for_samples = match former {
+        Former::Forget => 0,
+        Former::None => memory::SAMPLES,
+        Former::Samples(_) => memory::SAMPLES + memory::FORMER,
+    };
+    memory::check_texels(&scene, &layout, for_samples, options)?;
 
     watch.stage("direct light", &mut report)?;
     let mut texels = footprints(&scene, &layout);
@@ -178,7 +183,8 @@ fn run(
     (report.hidden_texels, report.rays) = (hidden, rays);
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
-    let plan = Plan::new(&scene, &layout, &texels, texel_side(&scene, &texels), options, &mut report)?;
+    let side = texel_side(&scene, &texels);
+    let plan = Plan::new(&scene, &layout, &texels, side, for_samples, options, &mut report)?;
     let changes = usable.map(|u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels));
     let changes = note_whole(changes, &mut report);
     let known = changes.as_ref().map_or_else(Vec::new, |changes| changes.known_direct(&sources, &texels));

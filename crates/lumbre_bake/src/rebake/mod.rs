@@ -25,6 +25,6 @@ mod samples_file;
 pub(crate) use changes::{Changes, Usable};
 pub use report::RebakeReport;
 pub(crate) use report::rebake_report;
-pub(crate) use samples::Found;
 pub use samples::Samples;
+pub(crate) use samples::{Found, TexelSamples};
 pub use samples_file::SamplesError;

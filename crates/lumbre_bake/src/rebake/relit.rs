@@ -128,7 +128,7 @@ fn hull_distance(a: Sphere, b: Sphere, point: Vec3) -> f32 {
     let (from, to) = (at(0.0), at(length));
     let slope = (b.radius - a.radius) / length;
     // The one contains the other, or they are in one place.
-    if !(slope.abs() < 1.0) {
+    if length == 0.0 || slope.abs() >= 1.0 {
         return from.min(to);
     }
     let along = to_point.dot(axis) / length;
