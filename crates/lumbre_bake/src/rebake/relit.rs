@@ -61,6 +61,10 @@ pub(crate) fn shadowed(sources: &Sources<'_>, texels: &[Texel], boxes: &[Changed
         .map(|members| {
             let shown: Vec<Vec3> =
                 members.iter().flat_map(|&member| shown(scene, &texels[member as usize])).collect();
+            // All of it may be hidden.
+            if shown.is_empty() {
+                return false;
+            }
             let own = Sphere::around(shown.iter().copied());
             sources.iter().any(|source| boxes.iter().any(|between| source.meets(own, *between)))
         })
@@ -134,7 +138,7 @@ fn hull_distance(a: Sphere, b: Sphere, point: Vec3) -> f32 {
     let along = to_point.dot(axis) / length;
     let apart = (to_point.length_squared() - along * along).max(0.0).sqrt();
     let nearest = along + apart * slope / (1.0 - slope * slope).sqrt();
-    from.min(to).min(at(nearest.clamp(0.0, length)))
+    from.min(to).min(at(nearest.max(0.0).min(length)))
 }
 
 #[cfg(test)]
