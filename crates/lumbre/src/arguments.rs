@@ -136,6 +136,9 @@ pub struct Bake {
     /// Leaves out the estimate of the error that the map's resolution leaves.
     #[arg(long)]
     pub no_resolution_error: bool,
+    /// Bakes everything, also what has not changed since the output was baked, and keeps no samples for the next bake.
+    #[arg(long)]
+    pub no_reuse: bool,
     /// How form factors are counted.
     #[arg(long, value_enum, default_value_t = BakeFormFactors::Cosine)]
     pub form_factors: BakeFormFactors,

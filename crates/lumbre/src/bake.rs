@@ -11,8 +11,8 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use bevy_ecs::world::World;
 use lumbre::bake::{
-    BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Solver,
-    bake_with, content_hash,
+    BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
+    SamplesError, Solver, content_hash, rebake,
 };
 use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
@@ -46,7 +46,8 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         interval: asked.checkpoint_every,
         ..Checkpoint::new(checkpoint_path(&asked.output), asked.resume)
     };
-    let report = interruptible(&mut world, &options, &checkpoint, &asked.output)?;
+    let former = if asked.no_reuse { None } else { former_samples(&asked.output) };
+    let (report, samples) = interruptible(&mut world, &options, former.as_ref(), &checkpoint, &asked.output)?;
     let saved = save_with(&mut world, &asked.output, &files)
         .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
@@ -57,6 +58,8 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     }
     let lightmaps: Vec<FileLine> = saved.lightmaps.iter().map(FileLine::from).collect();
     BakeRecord::write(&asked.output, what, &saved.files, &lightmaps, &report)?;
+    // Last: a bake that is continued begins with the samples that it began with.
+    keep_samples(asked, samples.as_ref());
     checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
     print(&report, &lightmaps, asked.json)
 }
@@ -111,13 +114,52 @@ fn save_options(asked: &Bake) -> SaveOptions {
     }
 }
 
+/// `room.baked.glb` has the samples of its texels in `room.baked.bake.samples`.
+fn samples_path(output: &Path) -> PathBuf {
+    output.with_extension("bake.samples")
+}
+
+/// The samples of the output that is there, if they can be read.
+fn former_samples(output: &Path) -> Option<Samples> {
+    let path = samples_path(output);
+    match Samples::read(&path) {
+        Ok(samples) => Some(samples),
+        Err(SamplesError::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => None,
+        Err(error) => {
+            eprintln!("lumbre: warning: {}: {error}; everything is baked", path.display());
+            None
+        }
+    }
+}
+
+/// Keeps the samples for the next bake. Where there are none, for want of time say, those of the bake before are still good.
+fn keep_samples(asked: &Bake, samples: Option<&Samples>) {
+    let path = samples_path(&asked.output);
+    let done = match samples {
+        _ if asked.no_reuse => match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
+            _ => Ok(()),
+        },
+        Some(samples) => samples.write(&path),
+        None => Ok(()),
+    };
+    if let Err(error) = done {
+        // The lightmaps are there; only the next bake has to do everything.
+        eprintln!(
+            "lumbre: warning: {}: {error}; the next bake cannot keep what this one found",
+            path.display()
+        );
+    }
+}
+
 /// Bakes, until the end or the first interruption.
 fn interruptible(
     world: &mut World,
     options: &BakeOptions,
+    former: Option<&Samples>,
     checkpoint: &Checkpoint,
     output: &Path,
-) -> anyhow::Result<BakeReport> {
+) -> anyhow::Result<(BakeReport, Option<Samples>)> {
     if !checkpoint.resume && checkpoint.path.exists() {
         eprintln!(
             "lumbre: note: {}: a checkpoint of an interrupted bake is replaced (--resume would continue it)",
@@ -136,14 +178,14 @@ fn interruptible(
         eprintln!("lumbre: warning: an interruption will end the bake at once: {error}");
     }
     let bar = progress_bar();
-    let baked = bake_with(world, options, Some(checkpoint), &mut |progress| {
+    let baked = rebake(world, options, former, Some(checkpoint), &mut |progress| {
         bar.set_message(progress.stage);
         bar.set_position((progress.fraction * 1000.0) as u64);
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     bar.finish_and_clear();
     match baked {
-        Ok(report) => Ok(report),
+        Ok(done) => Ok(done),
         Err(BakeError::Cancelled { stage }) => {
             bail!(
                 "interrupted during {stage}; {} is as it was; {}",
@@ -220,6 +262,9 @@ fn summary(report: &BakeReport) -> String {
         report.seconds,
         report.threads,
     );
+    if let Some(rebake) = &report.rebake {
+        text.push_str(&format!("{rebake}\n"));
+    }
     if report.probes.resolution != [0; 3] {
         let [x, y, z] = report.probes.resolution;
         text.push_str(&format!(

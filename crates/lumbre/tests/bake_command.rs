@@ -19,15 +19,19 @@ const LUMBRE: &str = env!("CARGO_BIN_EXE_lumbre");
 
 /// A floor, a box and a lamp panel.
 fn level(path: &Path, camera: f64) {
+    level_with_box_at(path, camera, 0.0);
+}
+
+fn level_with_box_at(path: &Path, camera: f64, x: f64) {
     let mut world = World::new();
-    let mut add = |size: Vec3, height: f64, material: Material| {
+    let mut add = |size: Vec3, at: DVec3, material: Material| {
         let mesh = Mesh(Arc::new(lumbre::mesh::shapes::cuboid(size, 1)));
-        world.spawn((mesh, material, StaticObject, Transform::from_xyz(0.0, height, 0.0)));
+        world.spawn((mesh, material, StaticObject, Transform::from_xyz(at.x, at.y, at.z)));
     };
-    add(Vec3::new(4.0, 0.2, 4.0), -0.1, Material::matt(Vec3::new(0.6, 0.5, 0.4)));
-    add(Vec3::new(0.8, 1.0, 0.8), 0.5, Material::matt(Vec3::new(0.8, 0.2, 0.2)));
+    add(Vec3::new(4.0, 0.2, 4.0), DVec3::Y * -0.1, Material::matt(Vec3::new(0.6, 0.5, 0.4)));
+    add(Vec3::new(0.8, 1.0, 0.8), DVec3::new(x, 0.5, 0.0), Material::matt(Vec3::new(0.8, 0.2, 0.2)));
     let glow = Surface { emission: Vec3::splat(8.0), ..Surface::default() };
-    add(Vec3::new(1.0, 0.1, 1.0), 3.0, Material { front: glow, ..Material::default() });
+    add(Vec3::new(1.0, 0.1, 1.0), DVec3::Y * 3.0, Material { front: glow, ..Material::default() });
     let eye = Transform::from_xyz(0.0, 2.5, camera).looking_at(DVec3::ZERO, DVec3::Y);
     world.spawn((Camera::default(), eye));
     lumbre::scene::save(&mut world, path).unwrap();
@@ -86,7 +90,11 @@ fn expected() -> BTreeMap<String, Vec<u8>> {
     let place = place();
     done(&mut place.bake(&[]));
     let files = place.files();
-    assert!(files.len() == 4 && files.contains_key("level.glb"), "{:?}", files.keys());
+    assert!(
+        files.len() == 5 && files.contains_key("level.bake.samples") && files.contains_key("level.glb"),
+        "{:?}",
+        files.keys()
+    );
     files
 }
 
@@ -177,6 +185,44 @@ fn an_unchanged_level_is_left_as_it_is() {
     level(&place.level, 7.0);
     assert!(!again(&[]).0 && place.files() != files);
     assert!(!again(&["--quality", "draft"]).0, "other options");
+}
+
+#[test]
+fn a_box_that_moves_leaves_what_it_cannot_affect() {
+    let place = place();
+    done(&mut place.bake(&[]));
+    let samples = place.output.with_file_name("level.bake.samples");
+    let bake = |x: f64, more: &[&str]| {
+        level_with_box_at(&place.level, 6.0, x);
+        let mut arguments = vec!["--json"];
+        arguments.extend(more);
+        let output = done(&mut place.bake(&arguments));
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        (report["rebake"].clone(), stderr(&output))
+    };
+    let (rebake, _) = bake(0.2, &[]);
+    assert_eq!(rebake["whole"], "", "{rebake}");
+    let count = |of: &str| rebake[of].as_u64().unwrap();
+    assert!(rebake["changed"].as_array().is_some_and(|changed| changed.len() == 1), "{rebake}");
+    assert!(count("gathered") < count("texels") && count("relit") < count("texels"), "{rebake}");
+    assert!(rebake["neglected"].as_f64().unwrap() < 0.003, "{rebake}");
+    // The same in words.
+    level_with_box_at(&place.level, 6.0, 0.3);
+    let said = String::from_utf8(done(&mut place.bake(&[])).stdout).unwrap();
+    assert!(
+        said.contains("baked again what changed:") && said.contains("of the texels gathered anew"),
+        "{said}"
+    );
+
+    // Samples that are damaged are of no use, and that is said.
+    let whole = fs::read(&samples).unwrap();
+    fs::write(&samples, &whole[..whole.len() - 9]).unwrap();
+    let (rebake, said) = bake(0.4, &[]);
+    assert!(rebake.is_null(), "{rebake}");
+    assert!(said.contains("level.bake.samples: it is damaged or cut short; everything is baked"), "{said}");
+    assert!(bake(0.5, &[]).0["whole"] == "", "the next bake has samples again");
+    let (rebake, _) = bake(0.6, &["--no-reuse"]);
+    assert!(rebake.is_null() && !samples.exists(), "{rebake}");
 }
 
 #[test]

@@ -6,12 +6,14 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 
 use crate::checkpoint::Tape;
-use crate::content_hash::hash_of;
+use crate::content_hash::hashes_of;
 use crate::memory::{self, Plan};
 use crate::pages::Pages;
 use crate::probes::Wanted;
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::rebake::change::Change;
+use crate::rebake::{Changes, Found, Samples, Usable, rebake_report};
+use crate::scene::{BakeScene, Canonical, collect, density_of, lay_out_with, lights, sky, world_points};
 use crate::texels::charts::charts;
 use crate::texels::divided_light::DividedLight;
 use crate::texels::error_estimate::variances;
@@ -20,12 +22,15 @@ use crate::texels::footprint::{Texel, footprints};
 use crate::texels::gather::{Outgoing, SCRAMBLES};
 use crate::texels::hidden::remove_hidden;
 use crate::texels::resolution_error::{DensePoint, Light, compare};
+use crate::texels::rounds::{Bounced, Receivers};
 use crate::texels::seams::{Maps, close_seams};
 use crate::texels::straddling::{crossed, straddling};
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::Sources;
 use crate::transport::exchange::Exchange;
-use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, apply};
+use crate::{
+    BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, RebakeReport, apply,
+};
 
 /// Bakes the light of a world's static objects into lightmaps.
 ///
@@ -59,13 +64,51 @@ pub fn bake_with(
     checkpoint: Option<&Checkpoint>,
     progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
 ) -> Result<BakeReport, BakeError> {
+    on_threads(options, || run(world, options, Former::Forget, checkpoint, progress))
+        .map(|(report, _)| report)
+}
+
+/// [`bake_with`] that keeps of a former bake what the scene's changes can hardly have affected, and returns the samples for the next time: none
+/// where there was nothing to bake, or no time for it. The report's [`rebake`](BakeReport::rebake) says what was kept, or why nothing was: then the whole scene
+/// is baked, as it is without `former`. What the light of the kept texels may have changed by is part of the stated error, adds up over
+/// several bakes, and is gathered anew when it is no longer small beside the error asked for.
+///
+/// The same world, options, seed and former samples give the same bits on any number of threads.
+///
+/// # Errors
+/// As [`bake_with`].
+pub fn rebake(
+    world: &mut World,
+    options: &BakeOptions,
+    former: Option<&Samples>,
+    checkpoint: Option<&Checkpoint>,
+    progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+) -> Result<(BakeReport, Option<Samples>), BakeError> {
+    let former = former.map_or(Former::None, Former::Samples);
+    on_threads(options, || run(world, options, former, checkpoint, progress))
+}
+
+/// What is done with samples.
+#[derive(Clone, Copy)]
+enum Former<'a> {
+    /// There are none, and none are kept.
+    Forget,
+    /// There are none yet.
+    None,
+    Samples(&'a Samples),
+}
+
+fn on_threads<T: Send>(
+    options: &BakeOptions,
+    bake: impl FnOnce() -> Result<T, BakeError> + Send,
+) -> Result<T, BakeError> {
     options.check()?;
     match options.threads {
-        None => run(world, options, checkpoint, progress),
+        None => bake(),
         Some(threads) => {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| BakeError::Threads { reason: error.to_string() })?;
-            pool.install(|| run(world, options, checkpoint, progress))
+            pool.install(bake)
         }
     }
 }
@@ -73,19 +116,29 @@ pub fn bake_with(
 fn run(
     world: &mut World,
     options: &BakeOptions,
+    former: Former<'_>,
     checkpoint: Option<&Checkpoint>,
     progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
-) -> Result<BakeReport, BakeError> {
+) -> Result<(BakeReport, Option<Samples>), BakeError> {
     let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
     let mut watch = Watch::new(progress, options.time);
     watch.stage("layout", &mut report)?;
     let objects = collect(world)?;
     let (placed, sky) = (lights(world), sky(world));
     let wanted = Wanted::of(world, &objects);
-    let hash = hash_of(&objects, &placed, sky, &wanted, options);
-    report.content_hash = hash.to_string();
+    let hashes = hashes_of(&objects, &placed, sky, &wanted, options);
+    report.content_hash = hashes.content.to_string();
+    let points =
+        || objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+    let mut space = Canonical::of(points());
+    let usable = match former {
+        Former::Samples(samples) => Some(Usable::new(samples, &hashes, &objects, space, options)),
+        Former::None | Former::Forget => None,
+    };
+    let usable = note_whole(usable, &mut report);
+    let identity = usable.as_ref().map_or(hashes.content, |usable| usable.identity(hashes.content));
     if let Some(checkpoint) = checkpoint {
-        watch.tape = Tape::open(checkpoint, &hash)
+        watch.tape = Tape::open(checkpoint, &identity)
             .map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
     }
     if objects.is_empty() {
@@ -93,12 +146,14 @@ fn run(
         apply::forget_lightmaps(world, &[]);
         apply::place_volume(world, None);
         report.error_reached = true;
-        return Ok(finish(report, &mut watch));
+        return Ok((finish(report, &mut watch), None));
     }
-    let points =
-        objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
-    let space = Canonical::of(points);
-    let layout = lay_out(&objects, space, options, &mut report.warnings)?;
+    let mut density = None;
+    if let Some(usable) = &usable {
+        (space, density) = (usable.space, Some(usable.density));
+    }
+    let density = density.unwrap_or_else(|| density_of(&objects, space, options));
+    let layout = lay_out_with(&objects, space, density, options, &mut report.warnings)?;
 
     watch.stage("hierarchy", &mut report)?;
     let scene = BakeScene::new(&objects, &layout, space, &mut report.warnings)?;
@@ -111,10 +166,15 @@ fn run(
         apply::forget_lightmaps(world, &[]);
         apply::place_volume(world, None);
         report.error_reached = true;
-        return Ok(finish(report, &mut watch));
+        return Ok((finish(report, &mut watch), None));
     }
     name_what_is_missing(&sources, &mut report);
-    memory::check_texels(&scene, &layout, options)?;
+    let for_samples = match former {
+        Former::Forget => 0,
+        Former::None => memory::SAMPLES,
+        Former::Samples(_) => memory::SAMPLES + memory::FORMER,
+    };
+    memory::check_texels(&scene, &layout, for_samples, options)?;
 
     watch.stage("direct light", &mut report)?;
     let mut texels = footprints(&scene, &layout);
@@ -129,12 +189,21 @@ fn run(
     (report.hidden_texels, report.rays) = (hidden, rays);
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
-    let plan = Plan::new(&scene, &layout, &texels, texel_side(&scene, &texels), options, &mut report)?;
-    let direct = lighting::direct_light(&sources, &scene, &layout, &texels, options, &mut watch)?;
-    report.rays += direct.iter().map(|direct| u64::from(direct.rays)).sum::<u64>();
+    let side = texel_side(&scene, &texels);
+    let plan = Plan::new(&scene, &layout, &texels, side, for_samples, options, &mut report)?;
+    let changes = usable.map(|u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels));
+    let changes = note_whole(changes, &mut report);
+    let known = changes.as_ref().map_or_else(Vec::new, |changes| changes.known_direct(&sources, &texels));
+    let direct = lighting::direct_light(&sources, &layout, &texels, &known, options, &mut watch)?;
+    let relit = |index: usize| known.get(index).is_none_or(Option::is_none);
+    let new = direct.iter().enumerate().filter(|(index, _)| relit(*index));
+    report.rays += new.map(|(_, direct)| u64::from(direct.rays)).sum::<u64>();
     let baked: Vec<Vec3> = direct.iter().map(|direct| direct.baked).collect();
 
-    let exchange = Exchange::new(&scene, &sources, options, &plan, &mut watch, &mut report)?;
+    let change =
+        changes.as_ref().map(|changes| Change::new(&scene, &layout, changes, &texels, &direct, sources.sky));
+    let exchange = Exchange::new(&scene, &sources, change.as_ref(), options, &plan, &mut watch, &mut report)?;
+    let mut kept = None;
     let (indirect, volume, points) = match &exchange {
         None => {
             let volume = wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?;
@@ -168,8 +237,12 @@ fn run(
                 run: options.quality.effort().gather[0] / SCRAMBLES as u32,
             };
             let leaked_before = scene.leaks.count();
-            let gathered =
-                rounds::gather(&outgoing, &texels, &charts, &direct, options, &mut watch, &mut report)?;
+            if let Some(change) = &change {
+                kept = Some(change.keep(exchange, &texels, options, &mut watch)?);
+            }
+            let receivers =
+                Receivers { texels: &texels, charts: &charts, direct: &direct, kept: kept.as_ref() };
+            let gathered = rounds::gather(&outgoing, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
             let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
             let light = Light { scene: &scene, sources: &sources, outgoing: Some(&outgoing) };
@@ -179,16 +252,40 @@ fn run(
     };
 
     watch.stage("texels", &mut report)?;
-    let (values, variances): (Vec<Vec3>, Vec<f32>) = match indirect {
-        Some((indirect, variances)) => {
-            let sum = baked.iter().zip(&indirect).map(|(direct, indirect)| *direct + *indirect);
-            (sum.collect(), variances)
+    let (values, bounced): (Vec<Vec3>, Bounced) = match indirect {
+        Some(bounced) => {
+            let sum = baked.iter().zip(&bounced.light).map(|(direct, indirect)| *direct + *indirect);
+            (sum.collect(), bounced)
         }
-        None => (baked, variances(&direct, None, 0.0)),
+        None => (baked, Bounced { variances: variances(&direct, None, 0.0), ..Bounced::default() }),
     };
+    let variances = &bounced.variances;
     note_mean(&texels, &values, &mut report);
+    if let Some(changes) = &changes {
+        let relit = (0..texels.len()).filter(|&index| relit(index) && !texels[index].is_hidden()).count();
+        report.rebake = Some(rebake_report(changes, &texels, relit, kept.as_ref(), &report));
+    }
+    let samples = match former {
+        Former::Forget => None,
+        // Whoever has more time would not want to keep these.
+        _ if report.ended == Ended::Time => None,
+        Former::None | Former::Samples(_) => {
+            let neglected = kept.as_ref().map_or(&[][..], |kept| &kept.neglected);
+            let found = Found {
+                scene: &scene,
+                layout: &layout,
+                texels: &texels,
+                direct: &direct,
+                gathered: &bounced.gathered,
+                bounced: &bounced.light,
+                neglected,
+            };
+            let exitance = exchange.as_ref().map(|e| e.exitance_of(&scene, layout.maps.len()));
+            Some(found.samples(identity, &hashes, &objects, &sources, &exitance.unwrap_or_default()))
+        }
+    };
     if exchange.is_none() {
-        note_direct_error(&texels, &variances, options, &mut report);
+        note_direct_error(&texels, variances, options, &mut report);
         report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
@@ -208,7 +305,18 @@ fn run(
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
     apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));
-    Ok(finish(report, &mut watch))
+    Ok((finish(report, &mut watch), samples))
+}
+
+/// What can be used, or in the report why nothing can.
+fn note_whole<T>(found: Option<Result<T, String>>, report: &mut BakeReport) -> Option<T> {
+    match found? {
+        Ok(found) => Some(found),
+        Err(whole) => {
+            report.rebake = Some(RebakeReport { whole, ..RebakeReport::default() });
+            None
+        }
+    }
 }
 
 fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {

@@ -29,6 +29,16 @@ impl ContentHash {
     pub fn bytes(&self) -> &[u8; 32] {
         &self.0
     }
+
+    /// From its bytes.
+    pub(crate) fn of_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// The hash of what this stands for, made from what `other` stands for.
+    pub(crate) fn made_from(&self, other: &Self) -> Self {
+        Self(*blake3::Hasher::new().update(&self.0).update(&other.0).finalize().as_bytes())
+    }
 }
 
 impl fmt::Display for ContentHash {
@@ -51,23 +61,54 @@ pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentH
     let objects = collect(world)?;
     let placed = lights(world);
     let wanted = Wanted::of(world, &objects);
-    Ok(hash_of(&objects, &placed, sky(world), &wanted, options))
+    Ok(hashes_of(&objects, &placed, sky(world), &wanted, options).content)
 }
 
-/// The hash of what was collected already.
-pub(crate) fn hash_of(
+/// The hash of everything, and those of its parts.
+#[derive(Clone, Debug)]
+pub(crate) struct Hashes {
+    pub content: ContentHash,
+    /// Of each object in its place.
+    pub objects: Vec<ContentHash>,
+    /// Of all lights and the sky.
+    pub lights: ContentHash,
+    /// Of the options that a texel's samples depend on, and of the baker.
+    pub sampling: ContentHash,
+}
+
+/// The hashes of what was collected already.
+pub(crate) fn hashes_of(
     objects: &[Object],
     lights: &[PlacedLight],
     sky: Vec3,
     wanted: &Wanted,
     options: &BakeOptions,
-) -> ContentHash {
+) -> Hashes {
     let mut images = Images::default();
+    let object_hashes: Vec<ContentHash> =
+        objects.iter().map(|object| object_hash(object, &mut images)).collect();
+    let light_hashes: Vec<ContentHash> = lights.iter().map(light_hash).collect();
+    let mut hasher = Hasher::new("lights");
+    hasher.hashes(&light_hashes);
+    hasher.color(&sky);
+    let of_lights = hasher.finish();
+    let mut hasher = Hasher::new("sampling");
+    let of_samples = BakeOptions::default();
+    hasher.options(&BakeOptions {
+        atlas_size: of_samples.atlas_size,
+        seams: of_samples.seams,
+        resolution_error: of_samples.resolution_error,
+        probes: of_samples.probes,
+        probe_spacing: of_samples.probe_spacing,
+        memory: of_samples.memory,
+        ..*options
+    });
+    let sampling = hasher.finish();
     let mut hasher = Hasher::new("lumbre bake");
     hasher.options(options);
     hasher.number(objects.len() as u64);
-    for object in objects {
-        hasher.hashes(&[object_hash(object, &mut images)]);
+    for hash in &object_hashes {
+        hasher.hashes(&[*hash]);
     }
     // Objects that share their meshes share their unwrap.
     let mut numbers: HashMap<*const TriangleMesh, u64> = HashMap::new();
@@ -75,7 +116,7 @@ pub(crate) fn hash_of(
         let next = numbers.len() as u64;
         hasher.number(*numbers.entry(Arc::as_ptr(&part.mesh)).or_insert(next));
     }
-    hasher.hashes(&lights.iter().map(light_hash).collect::<Vec<_>>());
+    hasher.hashes(&light_hashes);
     hasher.color(&sky);
     hasher.number(wanted.are(options).is_ok().into());
     if wanted.are(options).is_ok() {
@@ -86,7 +127,7 @@ pub(crate) fn hash_of(
         hasher.number(wanted.real_time.len() as u64);
         wanted.real_time.iter().for_each(|&own| hasher.number(own.into()));
     }
-    hasher.finish()
+    Hashes { content: hasher.finish(), objects: object_hashes, lights: of_lights, sampling }
 }
 
 /// The hash of an object in its place.

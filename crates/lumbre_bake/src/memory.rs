@@ -4,6 +4,7 @@
 use std::mem::size_of;
 
 use crate::error::mebibytes;
+use crate::rebake::TexelSamples;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::texels::footprint::{Footprint, FootprintPoint, Texel};
 use crate::texels::gather::Gathered;
@@ -51,22 +52,31 @@ const GUIDED_PATCH: u64 = (4 + 8 + 4 + size_of::<Patch>() + 16 + 24 + 8 + 8 + 8 
 /// Of a pair of regions: the one and the probability, in lists that may have grown to twice their length. A ray makes two.
 const GUIDE_PAIR: u64 = 2 * 2 * (4 + 4);
 
+/// Of a covered texel, for the next bake: its samples.
+pub(crate) const SAMPLES: u64 = size_of::<TexelSamples>() as u64;
+
+/// Of a covered texel, by a former bake: its samples, and of those what stays as it is; its change, and its light and direct light before.
+pub(crate) const FORMER: u64 =
+    (size_of::<TexelSamples>() + size_of::<Gathered>() + size_of::<Option<Direct>>() + 8 + 4 + 4 + 2 * 12)
+        as u64;
+
 /// What nothing counts: threads, buffers, the checkpoint's block.
 const REST: u64 = 32 << 20;
 
-/// Refuses what cannot fit before its texels are listed.
+/// Refuses what cannot fit before its texels are listed. `samples` are the bytes of a covered texel for samples of this bake and a former one.
 ///
 /// # Errors
 /// [`BakeError::Memory`].
 pub(crate) fn check_texels(
     scene: &BakeScene,
     layout: &LightmapLayout,
+    samples: u64,
     options: &BakeOptions,
 ) -> Result<(), BakeError> {
     let Some(limit) = options.memory else { return Ok(()) };
     let area = |t: &SceneTriangle| f64::from((t.uv[1] - t.uv[0]).perp_dot(t.uv[2] - t.uv[0]).abs()) / 2.0;
     let covered = scene.triangles.iter().map(area).sum::<f64>().min(layout.texels as f64) as u64;
-    let texels = covered * COVERED + layout.texels as u64 * MAPPED;
+    let texels = covered * (COVERED + samples) + layout.texels as u64 * MAPPED;
     let needed = texels + scene.triangles.len() as u64 * TRIANGLE + REST;
     if needed > limit {
         return Err(BakeError::Memory { needed, texels, covered, limit });
@@ -84,6 +94,7 @@ impl Plan {
         layout: &LightmapLayout,
         texels: &[Texel],
         texel_side: f32,
+        samples: u64,
         options: &BakeOptions,
         report: &mut BakeReport,
     ) -> Result<Self, BakeError> {
@@ -98,8 +109,9 @@ impl Plan {
             Footprint::Whole(_) | Footprint::Hidden => 0,
         });
         let points = listed.sum::<u64>();
-        let for_texels =
-            covered * COVERED + points * size_of::<FootprintPoint>() as u64 + layout.texels as u64 * MAPPED;
+        let for_texels = covered * (COVERED + samples)
+            + points * size_of::<FootprintPoint>() as u64
+            + layout.texels as u64 * MAPPED;
         let asked = Patches::count(scene, side);
         let (mut patches, mut fewest) = (asked, false);
         loop {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::SeamReport;
+use crate::{RebakeReport, SeamReport};
 
 /// The time of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,6 +154,8 @@ pub struct BakeReport {
     pub energy_lost: f64,
     /// What closing the seams did; zeros where there were none.
     pub seams: SeamReport,
+    /// What was kept of a former bake; none where there was no such bake to keep from.
+    pub rebake: Option<RebakeReport>,
     /// What was odd in the input, with names, and what was done about it.
     pub warnings: Vec<String>,
     /// Work that the scene did not call for, each with its reason.
@@ -221,6 +223,9 @@ impl std::fmt::Display for BakeReport {
                 "{x} x {y} x {z} probes, {inside} inside geometry, error {:.2} %",
                 100.0 * estimated_error
             )?;
+        }
+        if let Some(rebake) = &self.rebake {
+            writeln!(f, "{rebake}")?;
         }
         for ErrorAtTime { seconds, error } in &self.curve {
             writeln!(f, "  after {seconds:>8.3} s error {:.3} %", 100.0 * error)?;

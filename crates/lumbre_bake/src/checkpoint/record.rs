@@ -82,6 +82,8 @@ macro_rules! fields {
     };
 }
 
+pub(crate) use fields;
+
 fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, seen: Seen });
 fields!(Seen { partly: bool, signature: u32 });
 fields!(Gathered {

@@ -33,6 +33,8 @@ pub(crate) struct LightmapLayout {
     pub maps: Vec<MapLayout>,
     /// Texels of all maps.
     pub texels: usize,
+    /// Texels per canonical unit that were aimed at.
+    pub density: f64,
 }
 
 /// Texels that [`Density::Automatic`] aims at.
@@ -42,21 +44,38 @@ const LARGEST_SIDE: u32 = 8192;
 /// Most texels of all maps: 4 GiB of working memory at some 64 bytes each.
 const MOST_TEXELS: u64 = 1 << 26;
 
-/// Lays out every object.
+/// Texels per canonical unit, exact under a scale of 2^k, unlike metres; 1 where maps have a size instead.
+pub(crate) fn density_of(objects: &[Object], space: Canonical, options: &BakeOptions) -> f64 {
+    let area = || -> f64 { objects.iter().map(|object| Placed::new(object, space).area).sum() };
+    match options.density {
+        Density::Automatic => {
+            let area = area();
+            if area > 0.0 { (AUTOMATIC_TEXELS / area).sqrt() } else { 1.0 }
+        }
+        Density::TexelsPerMeter(density) => density / space.scale,
+        Density::MapSize(_) => 1.0,
+    }
+}
+
+/// Lays out every object, as densely as the options ask.
 pub(crate) fn lay_out(
     objects: &[Object],
     space: Canonical,
     options: &BakeOptions,
     warnings: &mut Vec<String>,
 ) -> Result<LightmapLayout, BakeError> {
-    let area: f64 = objects.iter().map(|object| Placed::new(object, space).area).sum();
-    // Texels per canonical unit: exact under a scale of 2^k, unlike metres.
-    let density = match options.density {
-        Density::Automatic if area > 0.0 => (AUTOMATIC_TEXELS / area).sqrt(),
-        Density::TexelsPerMeter(density) => density / space.scale,
-        _ => 1.0,
-    };
-    let mut layout = LightmapLayout::default();
+    lay_out_with(objects, space, density_of(objects, space, options), options, warnings)
+}
+
+/// Lays out every object, with so many texels per canonical unit.
+pub(crate) fn lay_out_with(
+    objects: &[Object],
+    space: Canonical,
+    density: f64,
+    options: &BakeOptions,
+    warnings: &mut Vec<String>,
+) -> Result<LightmapLayout, BakeError> {
+    let mut layout = LightmapLayout { density, ..LightmapLayout::default() };
     let mut instances: HashMap<Vec<u64>, Made> = HashMap::new();
     let mut texels = 0u64;
     for object in objects {

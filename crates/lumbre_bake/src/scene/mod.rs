@@ -14,7 +14,7 @@ mod texture_coordinates;
 mod triangles;
 
 pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky, under_a_dynamic_object};
-pub(crate) use lightmap_layout::{LightmapLayout, lay_out, world_points};
+pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, lay_out_with, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
 pub(crate) use texture_coordinates::reading_first;

@@ -38,7 +38,7 @@ const FAR_END: f32 = 1.0 - 16.0 / (1 << 24) as f32;
 impl BakeScene {
     /// The first thing on a ray with a direction of unit length. Counts it among the leaks if it ended where none should.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
-        let hit = self.first_surface(origin, direction);
+        let hit = self.first_surface(origin, direction, |_| true);
         match hit {
             SurfaceHit::Back | SurfaceHit::Inside => self.leaks.note(),
             SurfaceHit::None if self.leaks.closed_scene => self.leaks.note(),
@@ -47,9 +47,10 @@ impl BakeScene {
         hit
     }
 
-    fn first_surface(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
+    /// The first thing on a ray among the triangles that `counts` accepts; what is odd is not noted.
+    pub fn first_surface(&self, origin: Vec3, direction: Vec3, counts: impl Fn(u32) -> bool) -> SurfaceHit {
         let ray = Ray::new(origin, direction);
-        let Some(mut hit) = self.closest(&ray, |_| true) else { return SurfaceHit::None };
+        let Some(mut hit) = self.closest(&ray, &counts) else { return SurfaceHit::None };
         let triangle = &self.triangles[hit.triangle as usize];
         if hit.back_face && !triangle.two_sided {
             // Of the two faces of a sheet, the one that looks at the ray.
@@ -57,7 +58,8 @@ impl BakeScene {
             let cosine = triangle.normal.dot(direction).abs().max(1.0 / 1024.0);
             let slack = SAME_PLACE * (hit.distance + triangle.extent) / cosine;
             let near = ray.with_range((hit.distance - slack).max(0.0), hit.distance + slack);
-            let facing = |index: u32| self.triangles[index as usize].normal.dot(direction) < 0.0;
+            let facing =
+                |index: u32| counts(index) && self.triangles[index as usize].normal.dot(direction) < 0.0;
             match self.closest(&near, facing) {
                 Some(front) => hit = front,
                 None if triangle.closed => return SurfaceHit::Inside,

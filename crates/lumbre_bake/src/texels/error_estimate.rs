@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::footprint::Texel;
-use super::gather::{Gathered, SCRAMBLES};
+use super::gather::Gathered;
 use super::smooth::{Estimates, mean, variance};
 use super::surroundings::Surroundings;
 use crate::transport::direct::Direct;
@@ -32,6 +32,8 @@ pub(crate) struct GatherErrors<'a> {
     pub patch_bias: &'a [PatchBias],
     /// Relative, of the solver.
     pub residual_bound: f64,
+    /// By how much the light may have changed since it was gathered; empty where none is kept.
+    pub neglected: &'a [f32],
 }
 
 /// Steps each way, and texels of a step, over which the spread of the scrambles is put together.
@@ -96,6 +98,7 @@ pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, li
                     + gather.gathered[index].patch_error().powi(2)
                     + unsolved * unsolved
                     + gather.patch_bias[index].rest
+                    + gather.neglected.get(index).map_or(0.0, |neglected| neglected * neglected)
             });
             direct.variance + by_bounces + least
         })
@@ -141,15 +144,13 @@ struct Checks {
 }
 
 impl Checks {
-    fn of(gathered: &Gathered) -> Self {
-        let samples = f64::from(gathered.samples.max(1));
-        let light =
-            gathered.sums.iter().map(|sum| sum.as_dvec3()).sum::<DVec3>() / samples / SCRAMBLES as f64;
+    /// With the light by bounces that the checked texel's samples tell.
+    fn of(gathered: &Gathered, light: Vec3) -> Self {
         Self {
             count: f64::from(gathered.checks),
             difference: gathered.differences.as_dvec3(),
             square: f64::from(gathered.squared_differences),
-            light: light * f64::from(gathered.checks),
+            light: light.as_dvec3() * f64::from(gathered.checks),
         }
     }
 
@@ -182,12 +183,14 @@ pub(crate) fn patch_bias(
     surroundings: &Surroundings<'_>,
     texels: &[Texel],
     gathered: &[Gathered],
+    raw: &[Estimates],
     reflectance: f64,
 ) -> Vec<PatchBias> {
     let later = (reflectance / (1.0 - reflectance)).powi(2);
     let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
     let mut of_maps = vec![Checks::default(); maps];
-    let checked: Vec<Checks> = gathered.par_iter().map(Checks::of).collect();
+    let checked: Vec<Checks> =
+        gathered.par_iter().zip(raw).map(|(own, raw)| Checks::of(own, mean(raw))).collect();
     for (texel, checked) in texels.iter().zip(&checked) {
         of_maps[texel.object as usize].add(checked);
     }

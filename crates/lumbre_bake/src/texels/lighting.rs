@@ -7,24 +7,26 @@ use super::footprint::{Texel, receiver};
 use super::shafts::Shafts;
 use crate::progress::Watch;
 use crate::sampling::Sequence;
-use crate::scene::{BakeScene, LightmapLayout};
+use crate::scene::LightmapLayout;
 use crate::transport::direct::{Direct, Seen, Sources};
 use crate::{BakeError, BakeOptions};
 
 /// How far a penumbra is suspected around a texel that saw one, in texels.
 const REACH: u32 = 2;
 
-/// Direct light of every covered texel.
+/// Direct light of every covered texel. What is `known` of a former bake stays as it is; an empty list knows nothing.
 pub(crate) fn direct_light(
     sources: &Sources<'_>,
-    scene: &BakeScene,
     layout: &LightmapLayout,
     texels: &[Texel],
+    known: &[Option<Direct>],
     options: &BakeOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Direct>, BakeError> {
+    let scene = sources.scene;
+    let known = |index: u32| known.get(index as usize).copied().flatten();
     let [few, many, most] = options.quality.effort().direct;
-    let shafts = Shafts::new(scene, sources, texels);
+    let shafts = Shafts::new(scene, sources, texels, |index| known(index).is_none());
     let light = |place: usize, samples: u32| {
         let texel = &texels[place];
         if texel.is_hidden() {
@@ -38,9 +40,17 @@ pub(crate) fn direct_light(
     // A complete map first, whatever time it takes.
     let clock = watch.clock();
     watch.pass(PASS);
-    let mut direct =
-        in_chunks(texels.len(), watch, |index| light(index, if clock.late() { few.min(LATE) } else { few }))?;
-    let again = in_doubt(layout, texels, &direct);
+    let unknown: Vec<u32> = (0..texels.len() as u32).filter(|&index| known(index).is_none()).collect();
+    let found = in_chunks(unknown.len(), watch, |place| {
+        light(unknown[place] as usize, if clock.late() { few.min(LATE) } else { few })
+    })?;
+    let mut direct: Vec<Direct> =
+        (0..texels.len() as u32).map(|index| known(index).unwrap_or_default()).collect();
+    for (&index, found) in unknown.iter().zip(found) {
+        direct[index as usize] = found;
+    }
+    let mut again = in_doubt(layout, texels, &direct);
+    again.retain(|&index| known(index).is_none());
     watch.pass(PASS);
     let better = in_chunks_in_time(again.len(), watch, |place| light(again[place] as usize, many))?;
     replace(&mut direct, &again, better);

@@ -13,6 +13,7 @@ use super::late::from_patches;
 use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
 use crate::progress::Watch;
+use crate::rebake::kept::Kept;
 use crate::transport::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
@@ -29,28 +30,51 @@ const MOST_OF_A_ROUND: f64 = 8.0;
 /// A round that leaves more than this of the squared error that it was to lower was the last.
 const STALLED: f64 = 0.95;
 
-/// Irradiance by bounces of every covered texel, and the variance of what the map then holds, mean of the channels.
+/// What the rounds have found, for every covered texel.
+#[derive(Default)]
+pub(crate) struct Bounced {
+    /// Irradiance by bounces.
+    pub light: Vec<Vec3>,
+    /// Variance of what the map then holds, mean of the channels.
+    pub variances: Vec<f32>,
+    pub gathered: Vec<Gathered>,
+}
+
+/// The covered texels, as the gather needs them.
+#[derive(Clone, Copy)]
+pub(crate) struct Receivers<'a> {
+    pub texels: &'a [Texel],
+    pub charts: &'a [u32],
+    pub direct: &'a [Direct],
+    /// Of a former bake.
+    pub kept: Option<&'a Kept>,
+}
+
+/// Gathers the light by bounces, beginning with what is kept of a former bake.
 pub(crate) fn gather(
     outgoing: &Outgoing<'_>,
-    texels: &[Texel],
-    charts: &[u32],
-    direct: &[Direct],
+    receivers: Receivers<'_>,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
-) -> Result<(Vec<Vec3>, Vec<f32>), BakeError> {
+) -> Result<Bounced, BakeError> {
+    let Receivers { texels, charts, direct, kept } = receivers;
     let [first, most] = options.quality.effort().gather.map(|samples| samples / SCRAMBLES as u32);
-    let mut gathered = vec![Gathered::default(); texels.len()];
+    let nothing = || vec![Gathered::default(); texels.len()];
+    let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
     let open_texels = (0..texels.len() as u32).filter(|&index| !texels[index as usize].is_hidden());
     let open = open_texels.clone().count().max(1) as f64;
     let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
     let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
     let surroundings = Surroundings::new(outgoing.scene, outgoing.layout, texels, charts);
-    let mut wanted: Vec<Allotment> =
-        open_texels.clone().map(|index| Allotment { index, samples: first }).collect();
+    let mut wanted: Vec<Allotment> = open_texels
+        .clone()
+        .filter(|&index| gathered[index as usize].samples == 0)
+        .map(|index| Allotment { index, samples: first })
+        .collect();
     let mut helped_before = f64::INFINITY;
     let mut round = 0;
-    let (estimates, variances) = loop {
+    let (light, variances) = loop {
         watch.pass(PASS);
         let found = in_chunks_in_time(wanted.len(), watch, |place| {
             let Allotment { index, samples } = wanted[place];
@@ -75,7 +99,8 @@ pub(crate) fn gather(
             false => (raw.clone(), vec![0.0; texels.len()]),
         };
         watch.advance(1.0)?;
-        let patch_bias = patch_bias(&surroundings, texels, &gathered, outgoing.patches.mean_reflectance());
+        let patch_bias =
+            patch_bias(&surroundings, texels, &gathered, &raw, outgoing.patches.mean_reflectance());
         let spread = spread(&surroundings, texels, &estimates);
         let errors = GatherErrors {
             gathered: &gathered,
@@ -84,6 +109,7 @@ pub(crate) fn gather(
             smoothing_bias: &smoothing_bias,
             patch_bias: &patch_bias,
             residual_bound: report.residual_bound,
+            neglected: kept.map_or(&[], |kept| &kept.neglected),
         };
         let total = mean_direct + estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
         let variances = variances(direct, Some(&errors), total as f32);
@@ -120,7 +146,7 @@ pub(crate) fn gather(
     let cast = gathered.iter().filter(|own| own.rays > 0);
     let cast: u64 = cast.map(|own| u64::from(own.samples) * SCRAMBLES as u64).sum();
     report.gather_rays = cast as f64 / open;
-    Ok((estimates, variances))
+    Ok(Bounced { light, variances, gathered })
 }
 
 /// The estimates without what is known to be the patches' fault.

@@ -27,8 +27,13 @@ pub(crate) struct Shafts<'a> {
 }
 
 impl<'a> Shafts<'a> {
-    /// For all covered texels.
-    pub fn new(scene: &'a BakeScene, sources: &'a Sources<'a>, texels: &[Texel]) -> Self {
+    /// For all covered texels; tiles of which none is wanted (by its number) are left out.
+    pub fn new(
+        scene: &'a BakeScene,
+        sources: &'a Sources<'a>,
+        texels: &[Texel],
+        wanted: impl Fn(u32) -> bool + Sync,
+    ) -> Self {
         let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
         if sources.emitters.is_empty() {
             return shafts;
@@ -39,6 +44,9 @@ impl<'a> Shafts<'a> {
         shafts.tiles = members
             .par_iter()
             .map(|members| {
+                if !members.iter().any(|&place| wanted(place)) {
+                    return Vec::new();
+                }
                 let members = || members.iter().map(|&place| &texels[place as usize]);
                 shafts.of_tile(&tree, members).unwrap_or_default()
             })

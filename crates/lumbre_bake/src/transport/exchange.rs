@@ -12,6 +12,7 @@ use super::patches::{Patch, Patches};
 use super::solver::{self, Solver};
 use crate::memory::Plan;
 use crate::progress::Watch;
+use crate::rebake::change::Change;
 use crate::sampling::{Sequence, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
@@ -32,6 +33,10 @@ pub(crate) struct Exchange {
     pub near: f32,
     /// Where each patch's light by bounces comes from.
     pub guide: Guide,
+    /// What leaves each patch without emission, W/m².
+    pub exitance: Vec<Vec3>,
+    /// By how much `indirect` has changed since a former bake, mean of the channels; empty without one.
+    pub change: Vec<f32>,
 }
 
 /// Relative residual at which the solver stops: well below what form factors are known to.
@@ -45,6 +50,7 @@ impl Exchange {
     pub fn new(
         scene: &BakeScene,
         sources: &Sources<'_>,
+        change: Option<&Change<'_>>,
         options: &BakeOptions,
         plan: &Plan,
         watch: &mut Watch<'_>,
@@ -104,23 +110,57 @@ impl Exchange {
         let light = (reflectance.as_slice(), first.as_slice());
         let of_size = size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE));
         let indirect_error = noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
-        let leaves = |(index, patch): (usize, &Patch)| {
-            (patch.reflectance * (direct[index] + indirect[index])).element_sum()
-        };
-        let radiosity: Vec<f32> = patches.list.iter().enumerate().map(leaves).collect();
+        let leaves = |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
+        let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(leaves).collect();
+        let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
         let guide = Guide::new(scene, &patches, side, &factors, &radiosity, &sky);
-        Ok(Some(Self { patches, direct, indirect, indirect_error, near: 2.0 * side, guide }))
+        let change = match change {
+            Some(change) => {
+                change.of_patches(&patches, &exitance, &factors, options.solver, options, watch)?
+            }
+            None => Vec::new(),
+        };
+        Ok(Some(Self {
+            patches,
+            direct,
+            indirect,
+            indirect_error,
+            near: 2.0 * side,
+            guide,
+            exitance,
+            change,
+        }))
     }
 }
 
 impl Exchange {
+    /// What leaves each object without emission, mean over its area, W/m².
+    pub fn exitance_of(&self, scene: &BakeScene, objects: usize) -> Vec<Vec3> {
+        let mut sums = vec![(Vec3::ZERO, 0.0f32); objects];
+        for (patch, exitance) in self.patches.list.iter().zip(&self.exitance) {
+            let (sum, area) = &mut sums[scene.triangles[patch.triangle as usize].object as usize];
+            *sum += patch.area * *exitance;
+            *area += patch.area;
+        }
+        sums.into_iter().map(|(sum, area)| sum / area.max(f32::MIN_POSITIVE)).collect()
+    }
+
     /// Of surfaces that reflect nothing.
     fn black(scene: &BakeScene, patches: Patches, side: f32) -> Self {
         let none = vec![Vec3::ZERO; patches.list.len()];
         let zeros = vec![0.0; patches.list.len()];
         let exact = vec![Vec2::ZERO; patches.list.len()];
         let guide = Guide::new(scene, &patches, side, &FormFactors::none(&patches), &zeros, &none);
-        Self { direct: none.clone(), indirect: none, indirect_error: exact, near: 2.0 * side, patches, guide }
+        Self {
+            direct: none.clone(),
+            indirect: none.clone(),
+            indirect_error: exact,
+            near: 2.0 * side,
+            patches,
+            guide,
+            exitance: none,
+            change: Vec::new(),
+        }
     }
 }
 

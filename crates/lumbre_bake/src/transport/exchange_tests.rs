@@ -50,7 +50,7 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let mut report = BakeReport::default();
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let plan = Plan { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
-    let exchange = Exchange::new(&scene, &sources, &options, &plan, &mut watch, &mut report).unwrap();
+    let exchange = Exchange::new(&scene, &sources, None, &options, &plan, &mut watch, &mut report).unwrap();
     (exchange.expect("light bounces").indirect, report)
 }
 

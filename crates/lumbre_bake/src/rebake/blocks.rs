@@ -1,0 +1,33 @@
+//! Square blocks of texels of one map, to be asked as a whole. Not what they are asked.
+
+use std::collections::HashMap;
+
+use crate::texels::footprint::Texel;
+
+/// Blocks of texels that are not hidden.
+pub(crate) struct Blocks {
+    /// Of each block, its texels, by their place in the list.
+    pub members: Vec<Vec<u32>>,
+    /// Of each texel, its block; hidden ones are of some block too.
+    pub of: Vec<u32>,
+}
+
+impl Blocks {
+    /// Of `side` texels a side.
+    pub fn new(texels: &[Texel], side: u32) -> Self {
+        let mut numbers: HashMap<(u32, u32, u32), u32> = HashMap::new();
+        let mut blocks = Self { members: Vec::new(), of: Vec::with_capacity(texels.len()) };
+        for (index, texel) in texels.iter().enumerate() {
+            let number =
+                *numbers.entry((texel.object, texel.x / side, texel.y / side)).or_insert_with(|| {
+                    blocks.members.push(Vec::new());
+                    blocks.members.len() as u32 - 1
+                });
+            blocks.of.push(number);
+            if !texel.is_hidden() {
+                blocks.members[number as usize].push(index as u32);
+            }
+        }
+        blocks
+    }
+}

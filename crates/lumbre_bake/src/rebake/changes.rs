@@ -1,0 +1,239 @@
+//! What differs between a scene and the one that samples are of: objects that moved, came or went, with the boxes around them then and now,
+//! and the lights. Not what that does to the light.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use super::relit::shadowed;
+use super::samples::{Content, ObjectSamples, Samples, TexelSamples, fingerprint, first_triangles};
+use crate::BakeOptions;
+use crate::content_hash::{ContentHash, Hashes};
+use crate::scene::{BakeScene, Canonical, LightmapLayout, Object, density_of};
+use crate::texels::footprint::Texel;
+use crate::transport::direct::{Direct, Sources};
+
+/// More changed objects than this are as good as a new scene.
+const MOST_CHANGED: usize = 64;
+/// The density and the middle of a scene may be off by so much of the density and of the scene's size before everything is laid out anew.
+const DENSITY_SLACK: f64 = 0.05;
+const CENTER_SLACK: f64 = 0.25;
+
+/// A box that a changed object filled, or fills now; canonical units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ChangedBox {
+    pub low: Vec3,
+    pub high: Vec3,
+    /// For what is gone: what left it, W/m². None for what is here now.
+    pub left: Option<Vec3>,
+}
+
+impl ChangedBox {
+    /// Of the sphere around it.
+    pub fn center(&self) -> Vec3 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// Of the sphere around it.
+    pub fn radius(&self) -> f32 {
+        0.5 * (self.high - self.low).length()
+    }
+}
+
+/// A former bake whose samples can be used, before the scene is laid out.
+pub(crate) struct Usable<'a> {
+    pub former: &'a Content,
+    pub space: Canonical,
+    pub density: f64,
+}
+
+impl<'a> Usable<'a> {
+    /// In `space`, where a whole bake would work.
+    ///
+    /// # Errors
+    /// Why they cannot be used.
+    pub fn new(
+        samples: &'a Samples,
+        hashes: &Hashes,
+        objects: &[Object],
+        space: Canonical,
+        options: &BakeOptions,
+    ) -> Result<Self, String> {
+        let former = &samples.0;
+        if former.sampling != hashes.sampling {
+            return Err(
+                "the former bake had other options (error, density, quality, seed, …) or another version of the baker".into()
+            );
+        }
+        let moved = ((space.center - former.space.center) * former.space.scale).abs().max_element();
+        if space.scale != former.space.scale || moved > CENTER_SLACK {
+            return Err("the scene is larger or smaller than it was, or somewhere else".into());
+        }
+        let density = density_of(objects, former.space, options);
+        if (density / former.density - 1.0).abs() > DENSITY_SLACK {
+            return Err("the density follows the scene's area, which has changed".into());
+        }
+        Ok(Self { former, space: former.space, density: former.density })
+    }
+
+    /// Of a bake of `content` that keeps these. Where nothing has changed, everything is kept, and so are its bits.
+    pub fn identity(&self, content: ContentHash) -> ContentHash {
+        if self.former.content == content {
+            self.former.identity
+        } else {
+            content.made_from(&self.former.identity)
+        }
+    }
+}
+
+/// What differs, and what is known of the rest.
+pub(crate) struct Changes<'a> {
+    pub former: &'a Content,
+    /// Per object, whether it is new, or another than it was.
+    pub changed: Vec<bool>,
+    pub boxes: Vec<ChangedBox>,
+    /// Direct light is different everywhere.
+    pub lights: bool,
+    /// For people.
+    pub names: Vec<String>,
+    /// Per covered texel, its samples, if it shows what it showed.
+    pub known: Vec<Option<&'a TexelSamples>>,
+    /// Per texel of all maps, the irradiance that the former bake found there, W/m²; NaN where it is not known.
+    pub former_light: Vec<Vec3>,
+}
+
+impl<'a> Changes<'a> {
+    /// Finds them.
+    ///
+    /// # Errors
+    /// Why it is not worth keeping anything.
+    pub fn find(
+        usable: &Usable<'a>,
+        hashes: &Hashes,
+        objects: &[Object],
+        sources: &Sources<'_>,
+        layout: &LightmapLayout,
+        texels: &[Texel],
+    ) -> Result<Self, String> {
+        let (scene, former) = (sources.scene, usable.former);
+        let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
+        // Of several that are the same, the first is taken first.
+        for object in former.objects.iter().rev() {
+            by_hash.entry(object.hash).or_default().push(object);
+        }
+        let same: Vec<Option<&'a ObjectSamples>> = hashes
+            .objects
+            .iter()
+            .zip(&layout.maps)
+            .map(|(hash, map)| {
+                by_hash
+                    .get_mut(hash)?
+                    .pop_if(|object| (object.width, object.height) == (map.width, map.height))
+            })
+            .collect();
+        let gone: Vec<&ObjectSamples> = former
+            .objects
+            .iter()
+            .filter(|object| !same.iter().flatten().any(|kept| std::ptr::eq(*kept, *object)))
+            .collect();
+        let changed: Vec<bool> = same.iter().map(Option::is_none).collect();
+        let here = changed.iter().filter(|changed| **changed).count();
+        if here + gone.len() > MOST_CHANGED {
+            return Err(format!("{} objects have changed or moved", here.max(gone.len())));
+        }
+        let emits = emitting(scene, sources, layout);
+        let of_lamps = emits.iter().zip(&changed).any(|(emits, changed)| *emits && *changed)
+            || gone.iter().any(|o| o.emits);
+        let of_lights = former.lights != hashes.lights;
+        let bounds = bounds(scene, layout);
+        let now = (0..objects.len()).filter(|&object| changed[object]);
+        let now = now.map(|object| ChangedBox { low: bounds[object].0, high: bounds[object].1, left: None });
+        let then = gone.iter().map(|o| ChangedBox { low: o.low, high: o.high, left: Some(o.exitance) });
+        let boxes = now.chain(then).filter(|b| b.low.cmple(b.high).all()).collect();
+        let names = names(objects, &changed, &gone, of_lights);
+        let (known, former_light) = known(scene, layout, texels, &same);
+        Ok(Self { former, changed, boxes, lights: of_lamps || of_lights, names, known, former_light })
+    }
+}
+
+impl Changes<'_> {
+    /// The direct light that cannot have changed, per covered texel.
+    pub fn known_direct(&self, sources: &Sources<'_>, texels: &[Texel]) -> Vec<Option<Direct>> {
+        if self.lights {
+            return vec![None; texels.len()];
+        }
+        let shadowed = shadowed(sources, texels, &self.boxes);
+        let of = |(known, shadowed): (&Option<&TexelSamples>, bool)| {
+            known.filter(|_| !shadowed).map(|known| known.direct)
+        };
+        self.known.iter().zip(shadowed).map(of).collect()
+    }
+}
+
+/// What is different, by name.
+fn names(objects: &[Object], changed: &[bool], gone: &[&ObjectSamples], lights: bool) -> Vec<String> {
+    let mut names = Vec::new();
+    for (object, _) in objects.iter().zip(changed).filter(|(_, changed)| **changed) {
+        let before = gone.iter().any(|gone| gone.name == object.name);
+        names.push(format!("{} ({})", object.name, if before { "changed" } else { "new" }));
+    }
+    for gone in gone.iter().filter(|gone| {
+        !objects.iter().zip(changed).any(|(object, changed)| *changed && object.name == gone.name)
+    }) {
+        names.push(format!("{} (gone)", gone.name));
+    }
+    if lights {
+        names.push("the lights".into());
+    }
+    names
+}
+
+/// The box around each object, canonical units; empty for one without triangles.
+pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, Vec3)> {
+    let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); layout.maps.len()];
+    for triangle in &scene.triangles {
+        let (low, high) = &mut bounds[triangle.object as usize];
+        for corner in triangle.corners {
+            (*low, *high) = (low.min(corner), high.max(corner));
+        }
+    }
+    bounds
+}
+
+/// Per object, whether some of it shines.
+pub(crate) fn emitting(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<bool> {
+    let mut emits = vec![false; layout.maps.len()];
+    for emitter in &sources.emitters {
+        emits[scene.triangles[emitter.triangle as usize].object as usize] = true;
+    }
+    emits
+}
+
+/// The samples of every covered texel that shows what it showed; and the light of all, per texel of all maps.
+fn known<'a>(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    texels: &[Texel],
+    same: &[Option<&'a ObjectSamples>],
+) -> (Vec<Option<&'a TexelSamples>>, Vec<Vec3>) {
+    let first = first_triangles(scene, layout);
+    let mut light = vec![Vec3::NAN; layout.texels];
+    for (map, object) in layout.maps.iter().zip(same) {
+        for texel in object.iter().flat_map(|object| &object.texels) {
+            if texel.cell < map.width * map.height {
+                light[map.first + texel.cell as usize] = texel.direct.total() + texel.bounced;
+            }
+        }
+    }
+    let known = texels
+        .iter()
+        .map(|texel| {
+            let object = texel.object as usize;
+            let list = &same[object].filter(|_| !texel.is_hidden())?.texels;
+            let cell = texel.y * layout.maps[object].width + texel.x;
+            let own = &list[list.binary_search_by_key(&cell, |own| own.cell).ok()?];
+            (own.footprint == fingerprint(texel, first[object])).then_some(own)
+        })
+        .collect();
+    (known, light)
+}

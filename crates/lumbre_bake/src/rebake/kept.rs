@@ -1,0 +1,61 @@
+//! Which texels keep the light by bounces that the former bake found: those where leaving it as it is adds little to the error asked for. Not
+//! how much it changes: that is `change`.
+
+use super::changes::Changes;
+use crate::texels::footprint::Texel;
+use crate::texels::gather::Gathered;
+
+/// Of the error asked for, what all that is neglected may be together (RMSE), and at most in one texel. What is neglected is systematic, while the rest of
+/// the error is chance: it gets the lesser part.
+const SHARE: f64 = 0.3;
+const MOST: f64 = 0.5;
+
+/// The light by bounces that is kept.
+pub(crate) struct Kept {
+    /// Per covered texel, what it had gathered; nothing where it gathers anew.
+    pub gathered: Vec<Gathered>,
+    /// Per covered texel, by how much its light may have changed, W/m², mean of the channels.
+    pub neglected: Vec<f32>,
+}
+
+impl Kept {
+    /// By the change of each covered texel (W/m², mean of the channels) and the RMSE asked for (W/m²).
+    pub fn choose(changes: &Changes<'_>, texels: &[Texel], change: &[f32], asked: f64) -> Self {
+        let open = texels.iter().filter(|texel| !texel.is_hidden()).count();
+        // With what was neglected before.
+        let all = |index: usize| -> Option<f64> {
+            let known = changes.known[index].filter(|known| known.gathered.samples > 0)?;
+            let all = f64::from(known.neglected + change[index]);
+            (all <= MOST * asked).then_some(all)
+        };
+        let mut candidates: Vec<(f64, usize)> =
+            (0..texels.len()).filter_map(|index| Some((all(index)?, index))).collect();
+        candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let budget = (SHARE * asked).powi(2) * open as f64;
+        let mut kept =
+            Self { gathered: vec![Gathered::default(); texels.len()], neglected: vec![0.0; texels.len()] };
+        let mut spent = 0.0;
+        for (neglected, index) in candidates {
+            spent += neglected * neglected;
+            if spent > budget {
+                break;
+            }
+            if let Some(known) = changes.known[index] {
+                kept.gathered[index] = known.gathered;
+                kept.neglected[index] = neglected as f32;
+            }
+        }
+        kept
+    }
+
+    /// Texels that are kept.
+    pub fn count(&self) -> usize {
+        self.gathered.iter().filter(|own| own.samples > 0).count()
+    }
+
+    /// RMSE over `open` texels that is neglected, W/m².
+    pub fn error(&self, open: usize) -> f64 {
+        let sum: f64 = self.neglected.iter().map(|&own| f64::from(own).powi(2)).sum();
+        (sum / open.max(1) as f64).sqrt()
+    }
+}

@@ -1,0 +1,215 @@
+//! What a bake has found of every texel, before it became a map: what the next bake of a changed scene can keep. Not a file of it: that is
+//! `samples_file`.
+
+use glam::Vec3;
+
+use super::changes::{bounds, emitting};
+use crate::content_hash::{ContentHash, Hashes};
+use crate::sampling::hash;
+use crate::scene::{BakeScene, Canonical, LightmapLayout, Object};
+use crate::texels::footprint::{Footprint, Texel};
+use crate::texels::gather::{Gathered, Weights};
+use crate::transport::direct::{Direct, Sources};
+
+/// The samples of a finished bake, to be given to [`rebake`](crate::rebake) when the scene has changed.
+#[derive(Clone, Debug)]
+pub struct Samples(pub(crate) Content);
+
+/// What is in there.
+#[derive(Clone, Debug)]
+pub(crate) struct Content {
+    /// Of what was baked.
+    pub content: ContentHash,
+    /// Of that, and of the samples that were kept for it.
+    pub identity: ContentHash,
+    pub sampling: ContentHash,
+    pub lights: ContentHash,
+    /// Irradiance of an unhidden sky, W/m².
+    pub sky: Vec3,
+    pub space: Canonical,
+    /// Texels per canonical unit.
+    pub density: f64,
+    pub objects: Vec<ObjectSamples>,
+}
+
+/// Of an object.
+#[derive(Clone, Debug)]
+pub(crate) struct ObjectSamples {
+    pub hash: ContentHash,
+    pub name: String,
+    /// The box around it, canonical units.
+    pub low: Vec3,
+    pub high: Vec3,
+    pub emits: bool,
+    /// What leaves it without emission, mean over its area, W/m².
+    pub exitance: Vec3,
+    pub width: u32,
+    pub height: u32,
+    /// In the order of their cells.
+    pub texels: Vec<TexelSamples>,
+}
+
+/// Of a texel that is not hidden.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TexelSamples {
+    /// Column and row in one number, as in its map.
+    pub cell: u32,
+    /// What it shows of its object, in one number.
+    pub footprint: u32,
+    pub direct: Direct,
+    pub gathered: Gathered,
+    /// Irradiance by bounces that the map showed, W/m².
+    pub bounced: Vec3,
+    /// By how much that may have changed since it was gathered, W/m².
+    pub neglected: f32,
+}
+
+impl Samples {
+    /// The hash of what was baked, and of all that was kept for it from former bakes.
+    pub fn identity(&self) -> &ContentHash {
+        &self.0.identity
+    }
+
+    /// Texels of which there are samples.
+    pub fn texels(&self) -> usize {
+        self.0.objects.iter().map(|object| object.texels.len()).sum()
+    }
+}
+
+impl Gathered {
+    /// As if every sample had weighed the same: the estimates stay what they are, and what is gathered later adds to them.
+    pub fn settled(&self) -> Self {
+        let count = self.samples as f32;
+        let sums = self.estimates().map(|estimate| estimate * count);
+        Self { sums, weights: sums.map(|sum| Weights::of_equal(sum, self.samples)), rays: 0, ..*self }
+    }
+}
+
+impl Weights {
+    /// Of samples that all weighed 1 and brought the same light.
+    pub fn of_equal(sum: Vec3, samples: u32) -> Self {
+        let count = samples as f32;
+        let light_squares = (sum.element_sum() / 3.0).powi(2) / count.max(1.0);
+        Self { sum: count, squares: count, products: sum, light_squares }
+    }
+}
+
+/// What a texel shows, in one number: the same as long as its object and what hides it are the same. `first` is the first triangle of its
+/// object.
+pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
+    let fold = |sum: u32, word: u32| hash(sum ^ word).wrapping_mul(0x9e37_79b9);
+    match &texel.footprint {
+        Footprint::Hidden => 0,
+        Footprint::Whole(triangle) => fold(1, triangle - first),
+        Footprint::Points(points) => points.iter().fold(2, |sum, point| {
+            let (u, v) = point.at;
+            let sum = fold(sum, point.triangle - first);
+            let sum = fold(fold(sum, u.to_bits()), v.to_bits());
+            fold(fold(sum, point.offset.x.to_bits()), point.offset.y.to_bits())
+        }),
+    }
+}
+
+/// The first triangle of each object.
+pub(crate) fn first_triangles(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
+    let mut first = vec![u32::MAX; layout.maps.len()];
+    for (index, triangle) in scene.triangles.iter().enumerate() {
+        let first = &mut first[triangle.object as usize];
+        *first = (*first).min(index as u32);
+    }
+    first
+}
+
+/// What a bake has found, sorted by object. `neglected` is empty where nothing was kept.
+pub(crate) struct Found<'a> {
+    pub scene: &'a BakeScene,
+    pub layout: &'a LightmapLayout,
+    pub texels: &'a [Texel],
+    pub direct: &'a [Direct],
+    pub gathered: &'a [Gathered],
+    pub bounced: &'a [Vec3],
+    pub neglected: &'a [f32],
+}
+
+impl Found<'_> {
+    /// The samples of the whole. `exitance` is that of each object, or empty.
+    pub fn samples(
+        &self,
+        identity: ContentHash,
+        hashes: &Hashes,
+        objects: &[Object],
+        sources: &Sources<'_>,
+        exitance: &[Vec3],
+    ) -> Samples {
+        let bounds = bounds(self.scene, self.layout);
+        let emits = emitting(self.scene, sources, self.layout);
+        let of_object = |(index, texels): (usize, Vec<TexelSamples>)| ObjectSamples {
+            hash: hashes.objects[index],
+            name: objects[index].name.clone(),
+            low: bounds[index].0,
+            high: bounds[index].1,
+            emits: emits[index],
+            exitance: exitance.get(index).copied().unwrap_or_default(),
+            width: self.layout.maps[index].width,
+            height: self.layout.maps[index].height,
+            texels,
+        };
+        Samples(Content {
+            content: hashes.content,
+            identity,
+            sampling: hashes.sampling,
+            lights: hashes.lights,
+            sky: sources.sky,
+            space: self.scene.space,
+            density: self.layout.density,
+            objects: self.by_object().into_iter().enumerate().map(of_object).collect(),
+        })
+    }
+
+    /// The texels of every object.
+    fn by_object(&self) -> Vec<Vec<TexelSamples>> {
+        let first = first_triangles(self.scene, self.layout);
+        let mut sorted: Vec<Vec<TexelSamples>> = vec![Vec::new(); self.layout.maps.len()];
+        for (index, texel) in self.texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
+            let object = texel.object as usize;
+            sorted[object].push(TexelSamples {
+                cell: texel.y * self.layout.maps[object].width + texel.x,
+                footprint: fingerprint(texel, first[object]),
+                direct: self.direct[index],
+                gathered: self.gathered.get(index).map_or_else(Gathered::default, Gathered::settled),
+                bounced: self.bounced.get(index).copied().unwrap_or_default(),
+                neglected: self.neglected.get(index).copied().unwrap_or_default(),
+            });
+        }
+        sorted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settled_samples_have_the_same_estimates() {
+        let light = |s: usize| Vec3::new(1.0 + s as f32, 2.0, 0.5 * s as f32);
+        let weigh = |s: usize| Weights {
+            sum: 3.0 + 0.5 * s as f32,
+            squares: 4.5,
+            products: light(s) * 1.3,
+            light_squares: 2.0,
+        };
+        let gathered = Gathered {
+            sums: std::array::from_fn(light),
+            weights: std::array::from_fn(weigh),
+            samples: 4,
+            rays: 99,
+            ..Gathered::default()
+        };
+        let settled = gathered.settled();
+        for (a, b) in gathered.estimates().iter().zip(settled.estimates()) {
+            assert!((*a - b).length() <= 1e-6 * a.length(), "{a} {b}");
+        }
+        assert_eq!(settled.rays, 0);
+        assert!(Gathered::default().settled().estimates().iter().all(|e| *e == Vec3::ZERO));
+    }
+}
