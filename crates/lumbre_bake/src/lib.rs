@@ -40,6 +40,7 @@ mod checkpoint;
 mod content_hash;
 mod error;
 mod memory;
+mod notes;
 mod options;
 mod pages;
 mod probes;

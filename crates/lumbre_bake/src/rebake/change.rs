@@ -3,6 +3,7 @@
 //! estimate, one bounce later. Not exact: boxes count as filled, and what they hid is taken to be as bright as it was.
 
 use std::f32::consts::{PI, TAU};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
 
@@ -28,6 +29,8 @@ const RAYS: u32 = 32;
 pub(crate) const BLOCK: u32 = 4;
 /// What the seed is hashed with.
 const PURPOSE: u32 = 50;
+/// What is nearer to a box than this share of its size has changed for certain.
+const BESIDE: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
@@ -42,6 +45,7 @@ pub(crate) struct Change<'a> {
     pub sky: Vec3,
     /// The changed boxes as spheres: centre, radius.
     cones: Vec<(Vec3, f32)>,
+    rays: AtomicU64,
 }
 
 /// What leaves the patches now, and the change of what they receive by bounces, if it is known yet.
@@ -101,7 +105,12 @@ impl<'a> Change<'a> {
             }
         }
         let cones = changes.boxes.iter().map(|b| (b.center(), b.radius())).collect();
-        Self { scene, layout, changes, direct: change, sky, cones }
+        Self { scene, layout, changes, direct: change, sky, cones, rays: AtomicU64::new(0) }
+    }
+
+    /// Rays cast so far.
+    pub fn rays(&self) -> u64 {
+        self.rays.load(Ordering::Relaxed)
     }
 
     /// The change of what each patch receives by bounces, W/m², mean of the channels: Δ = S + F ρ Δ, with the change S that is seen at first hand.
@@ -219,8 +228,12 @@ impl<'a> Change<'a> {
         Ok(Kept::choose(self.changes, texels, &change, asked))
     }
 
+    /// Whether a point is in a changed box, or next to it.
     fn is_within(&self, position: Vec3) -> bool {
-        self.cones.iter().any(|(center, radius)| center.distance(position) <= *radius)
+        self.changes
+            .boxes
+            .iter()
+            .any(|b| position.clamp(b.low, b.high).distance(position) <= BESIDE * b.radius())
     }
 
     /// The change of what a receiver gets by bounces, with the light as it is known: half the rays by the cosine, half into the cones about what
@@ -277,8 +290,10 @@ impl<'a> Change<'a> {
         let is_new =
             |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].object as usize];
         let now = self.scene.first_surface(origin, direction, |_| true);
+        self.rays.fetch_add(1, Ordering::Relaxed);
         let (shows_new, behind) = match now {
             SurfaceHit::Lit { triangle, .. } if is_new(triangle) => {
+                self.rays.fetch_add(1, Ordering::Relaxed);
                 (true, self.scene.first_surface(origin, direction, |triangle| !is_new(triangle)))
             }
             _ => (false, now),

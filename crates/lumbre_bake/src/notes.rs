@@ -1,0 +1,82 @@
+//! What a bake writes into its report on the way. Not what it computes.
+
+use crate::progress::Watch;
+use crate::texels::footprint::Texel;
+use crate::transport::direct::Sources;
+use crate::{BakeOptions, BakeReport, ErrorAtTime, RebakeReport};
+use glam::Vec3;
+
+/// Ends the last stage.
+pub(crate) fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeReport {
+    watch.end_stage(&mut report);
+    // What is still to be done with the result may be interrupted too.
+    watch.tape.flush();
+    report.seconds = watch.seconds();
+    // From here on there is a map of that error.
+    if !report.curve.is_empty() {
+        report.curve.push(ErrorAtTime { seconds: report.seconds, error: report.estimated_error });
+    }
+    report.resumed_seconds = watch.tape.resumed;
+    report.warnings.append(&mut watch.tape.warnings);
+    let casting: f64 = report
+        .stages
+        .iter()
+        .filter(|stage| {
+            ["direct light", "form factors", "final gather", "probes", "resolution"]
+                .contains(&stage.stage.as_str())
+        })
+        .map(|stage| stage.seconds)
+        .sum();
+    report.mega_rays_per_second = if casting > 0.0 { report.rays as f64 * 1e-6 / casting } else { 0.0 };
+    report
+}
+
+/// The kinds of light that the scene has none of.
+pub(crate) fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {
+    if sources.emitters.is_empty() {
+        report.skipped.push("area light: no surface emits".into());
+    }
+    if !sources.has_sky() {
+        report.skipped.push("sky light: the scene has no sky".into());
+    }
+    if sources.lights.is_empty() {
+        report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());
+    }
+}
+
+/// The mean over the texels that are not hidden.
+pub(crate) fn note_mean(texels: &[Texel], values: &[Vec3], report: &mut BakeReport) {
+    let (mut sum, mut count) = (glam::DVec3::ZERO, 0u32);
+    for (_, value) in texels.iter().zip(values).filter(|(texel, _)| !texel.is_hidden()) {
+        sum += value.as_dvec3();
+        count += 1;
+    }
+    report.mean_irradiance = (sum / f64::from(count.max(1))).to_array();
+}
+
+/// The error of a map without bounces.
+pub(crate) fn note_direct_error(
+    texels: &[Texel],
+    variances: &[f32],
+    options: &BakeOptions,
+    report: &mut BakeReport,
+) {
+    let open = texels.iter().zip(variances).filter(|(texel, _)| !texel.is_hidden());
+    let (sum, count) =
+        open.fold((0.0, 0u32), |(sum, count), (_, variance)| (sum + f64::from(*variance), count + 1));
+    let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
+    let error = (sum / f64::from(count.max(1))).sqrt();
+    report.estimated_error = if mean > 0.0 { error / mean } else { 0.0 };
+    report.error_reached = report.estimated_error <= options.error;
+}
+
+/// What can be used, or in the report why nothing can.
+pub(crate) fn note_whole<T>(found: Option<Result<T, String>>, report: &mut BakeReport) -> Option<T> {
+    match found? {
+        Ok(found) => Some(found),
+        Err(whole) => {
+            report.rebake = Some(RebakeReport { whole, ..RebakeReport::default() });
+            None
+        }
+    }
+}
