@@ -29,9 +29,7 @@ use crate::texels::straddling::{crossed, straddling};
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::Sources;
 use crate::transport::exchange::Exchange;
-use crate::{
-    BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, RebakeReport, apply,
-};
+use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, apply};
 
 /// Bakes the light of a world's static objects into lightmaps.
 ///
