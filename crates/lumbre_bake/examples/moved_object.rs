@@ -43,9 +43,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         place.translation += by;
         Ok(world)
     };
+    let (after, whole) = (moved()?, moved()?);
     let (_, first, samples) = baked(input::world_of(Path::new(input))?, None, &options)?;
-    let (again, kept, _) = baked(moved()?, samples.as_ref(), &options)?;
-    let (whole, all, _) = baked(moved()?, None, &options)?;
+    let (again, kept, _) = baked(after, samples.as_ref(), &options)?;
+    let (whole, all, _) = baked(whole, None, &options)?;
     let mut apart = (0.0, 0.0, 0.0);
     for (a, b) in again.iter().zip(&whole).filter(|(a, b)| a.1.is_finite() && b.1.is_finite()) {
         apart.0 += (a.0 - b.0).length_squared() / 3.0;

@@ -9,6 +9,7 @@
 //!            triangles, BVH     emitters, lights ─► direct light        final gather, rounds
 //!            materials                                                  smooth ─► fill
 //!                                                                      probes: grid ─► light ─► fill ──► IrradianceVolume
+//!   Samples of a former bake ─► rebake: what changed ─► which texels keep their direct light, and their bounces ─► Samples
 //! ```
 //!
 //! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per

@@ -1,4 +1,4 @@
-//! The example runs and does what it says.
+//! The examples run and do what they say.
 
 use std::process::Command;
 use std::sync::Arc;
@@ -7,6 +7,28 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 use lumbre_optics::{Light, Material};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
+
+/// Cargo builds examples beside the tests.
+fn example(name: &str) -> Command {
+    let mut folder = std::env::current_exe().unwrap();
+    folder.pop();
+    folder.set_file_name("examples");
+    Command::new(folder.join(name).with_extension(std::env::consts::EXE_EXTENSION))
+}
+
+#[test]
+fn moved_object_tells_what_was_kept() {
+    let scene = ["rooms_0", "small crate", "0.1", "0", "0.1"];
+    let coarse = ["--error", "0.1", "--texels-per-meter", "3"];
+    let ran = example("moved_object").args(scene).args(coarse).output().unwrap();
+    let said = String::from_utf8_lossy(&ran.stdout);
+    assert!(ran.status.success(), "{said}{}", String::from_utf8_lossy(&ran.stderr));
+    assert!(said.contains("baked again what changed: small crate (changed)"), "{said}");
+    assert!(said.contains("again and whole are"), "{said}");
+    let unknown = example("moved_object").args(["rooms_0", "piano", "0", "0", "0"]).output().unwrap();
+    assert!(!unknown.status.success());
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("has no object piano"));
+}
 
 #[test]
 fn bake_file_bakes_a_file() {
@@ -20,13 +42,8 @@ fn bake_file_bakes_a_file() {
     world.spawn((lamp, Transform::from_xyz(0.0, 2.0, 0.0)));
     lumbre_scene::save(&mut world, &input).unwrap();
 
-    // Cargo builds examples beside the tests.
-    let mut example = std::env::current_exe().unwrap();
-    example.pop();
-    example.set_file_name("examples");
-    let example = example.join("bake_file").with_extension(std::env::consts::EXE_EXTENSION);
-    let arguments = ["--draft", "--map-size", "16"];
-    let ran = Command::new(example).args([&input, &output]).args(arguments).output().unwrap();
+    let ran =
+        example("bake_file").args([&input, &output]).args(["--draft", "--map-size", "16"]).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
 
     let mut baked = World::new();
