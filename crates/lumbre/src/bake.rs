@@ -35,7 +35,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
             .with_context(|| format!("{} cannot be read", asked.input.display()))?,
         time: options.time.as_ref().map(Duration::as_secs_f64),
     };
-    if let Some(record) = BakeRecord::unchanged(&asked.output, &what) {
+    if let Some(record) = BakeRecord::unchanged(&asked.output, &what).filter(|_| !asked.no_reuse) {
         eprintln!(
             "lumbre: note: {}: unchanged: it is of this level and these options already",
             asked.output.display()

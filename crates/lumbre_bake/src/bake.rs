@@ -72,7 +72,11 @@ pub fn bake_with(
 /// is baked, as it is without `former`. What the light of the kept texels may have changed by is part of the stated error, adds up over
 /// several bakes, and is gathered anew when it is no longer small beside the error asked for.
 ///
-/// The same world, options, seed and former samples give the same bits on any number of threads.
+/// The same world, options, seed and former samples give the same bits on any number of threads; those of [`bake_with`] where there is nothing
+/// to keep, unless [`BakeOptions::memory`] is short: samples take some of it.
+///
+/// Objects are recognised by name, mesh, material and place as they were before the bake, which gives meshes new coordinates: to keep something, an
+/// editor gives back the meshes that it had, or loads the level anew.
 ///
 /// # Errors
 /// As [`bake_with`].
@@ -136,6 +140,9 @@ fn run(
     };
     let usable = note_whole(usable, &mut report);
     let identity = usable.as_ref().map_or(hashes.content, |usable| usable.identity(hashes.content));
+    // What is kept takes memory, too: within a limit, other patches may fit.
+    let limited = options.memory.is_some() && !matches!(former, Former::Forget);
+    let identity = if limited { identity.made_from(&hashes.sampling) } else { identity };
     if let Some(checkpoint) = checkpoint {
         watch.tape = Tape::open(checkpoint, &identity)
             .map_err(|source| BakeError::Checkpoint { path: checkpoint.path.clone(), source })?;
@@ -168,10 +175,10 @@ fn run(
         return Ok((finish(report, &mut watch), None));
     }
     name_what_is_missing(&sources, &mut report);
-    let for_samples = match former {
-        Former::Forget => 0,
-        Former::None => memory::SAMPLES,
-        Former::Samples(_) => memory::SAMPLES + memory::FORMER,
+    let for_samples = match (former, &usable) {
+        (Former::Forget, _) => 0,
+        (Former::None | Former::Samples(_), None) => memory::SAMPLES,
+        (_, Some(_)) => memory::SAMPLES + memory::FORMER,
     };
     memory::check_texels(&scene, &layout, for_samples, options)?;
 
@@ -191,8 +198,8 @@ fn run(
     let side = texel_side(&scene, &texels);
     let plan = Plan::new(&scene, &layout, &texels, side, for_samples, options, &mut report)?;
     let changes = usable.map(|u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels));
-    let changes = note_whole(changes, &mut report);
-    let known = changes.as_ref().map_or_else(Vec::new, |changes| changes.known_direct(&sources, &texels));
+    let known =
+        changes.as_ref().map_or_else(Vec::new, |changes| changes.known_direct(&sources, &texels, &charts));
     let direct = lighting::direct_light(&sources, &layout, &texels, &known, options, &mut watch)?;
     let relit = |index: usize| known.get(index).is_none_or(Option::is_none);
     let new = direct.iter().enumerate().filter(|(index, _)| relit(*index));
@@ -200,7 +207,7 @@ fn run(
     let baked: Vec<Vec3> = direct.iter().map(|direct| direct.baked).collect();
 
     let change =
-        changes.as_ref().map(|changes| Change::new(&scene, &layout, changes, &texels, &direct, sources.sky));
+        changes.as_ref().map(|changes| Change::new(&sources, &layout, changes, &texels, &charts, &direct));
     let exchange = Exchange::new(&scene, &sources, change.as_ref(), options, &plan, &mut watch, &mut report)?;
     let mut kept = None;
     let (indirect, volume, points) = match &exchange {
@@ -238,7 +245,6 @@ fn run(
             let leaked_before = scene.leaks.count();
             if let Some(change) = &change {
                 kept = Some(change.keep(exchange, &texels, options, &mut watch)?);
-                report.rays += change.rays();
             }
             let receivers =
                 Receivers { texels: &texels, charts: &charts, direct: &direct, kept: kept.as_ref() };
@@ -302,6 +308,8 @@ fn run(
     watch.advance(1.0)?;
     let pages = Pages::new(&layout, options.atlas_size, options.gap);
     apply::apply(world, &objects, &layout, &filled, &errors, &pages);
+    report.rays +=
+        change.as_ref().zip(exchange.as_ref()).map_or(0, |(change, exchange)| change.rays(exchange));
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
     apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));

@@ -57,7 +57,7 @@ pub(crate) const SAMPLES: u64 = size_of::<TexelSamples>() as u64;
 
 /// Of a covered texel, by a former bake: its samples, and of those what stays as it is; its change, and its light and direct light before.
 pub(crate) const FORMER: u64 =
-    (size_of::<TexelSamples>() + size_of::<Gathered>() + size_of::<Option<Direct>>() + 8 + 4 + 4 + 2 * 12)
+    (size_of::<TexelSamples>() + size_of::<Gathered>() + size_of::<Option<Direct>>() + 8 + 4 + 4 + 4 * 12)
         as u64;
 
 /// What nothing counts: threads, buffers, the checkpoint's block.

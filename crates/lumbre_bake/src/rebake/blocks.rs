@@ -1,4 +1,4 @@
-//! Square blocks of texels of one map, to be asked as a whole. Not what they are asked.
+//! Square blocks of texels of one chart, to be asked as a whole. Not what they are asked.
 
 use std::collections::HashMap;
 
@@ -13,13 +13,14 @@ pub(crate) struct Blocks {
 }
 
 impl Blocks {
-    /// Of `side` texels a side.
-    pub fn new(texels: &[Texel], side: u32) -> Self {
-        let mut numbers: HashMap<(u32, u32, u32), u32> = HashMap::new();
+    /// Of `side` texels a side; `charts` tells the chart of each triangle.
+    pub fn new(texels: &[Texel], charts: &[u32], side: u32) -> Self {
+        let mut numbers: HashMap<(u32, u32, u32, u32), u32> = HashMap::new();
         let mut blocks = Self { members: Vec::new(), of: Vec::with_capacity(texels.len()) };
         for (index, texel) in texels.iter().enumerate() {
+            let chart = charts[texel.triangle as usize];
             let number =
-                *numbers.entry((texel.object, texel.x / side, texel.y / side)).or_insert_with(|| {
+                *numbers.entry((texel.object, chart, texel.x / side, texel.y / side)).or_insert_with(|| {
                     blocks.members.push(Vec::new());
                     blocks.members.len() as u32 - 1
                 });

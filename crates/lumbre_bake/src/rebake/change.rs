@@ -1,22 +1,25 @@
 //! How the light by bounces changes: a linear estimate. What leaves a surface is what it was, but for three things: rays that pass through a
 //! box see or do not see the changed object in it; direct light has changed where it was computed anew; and what bounces has changed by the same
-//! estimate, one bounce later. Not exact: boxes count as filled, and what they hid is taken to be as bright as it was.
+//! estimate, one bounce later. By channel, between bounds: a box that was filled may or may not have been in a ray's way, and may have shown its
+//! brightest or its darkest side. Bounds add up by themselves, so that what is more here and less there cancels only where that is certain.
+//! Not exact: what is sampled has the error of its samples, of which one standard error counts.
 
 use std::f32::consts::{PI, TAU};
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::blocks::Blocks;
 use super::changes::{ChangedBox, Changes};
 use super::kept::Kept;
+use super::relit::Ways;
 use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about, frame, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texels::chunks::in_chunks;
 use crate::texels::footprint::{Texel, receiver};
-use crate::transport::direct::{Direct, Receiver};
+use crate::transport::direct::{Direct, Receiver, Sources};
 use crate::transport::exchange::Exchange;
 use crate::transport::form_factors::FormFactors;
 use crate::transport::patches::{Patch, Patches};
@@ -26,7 +29,7 @@ use crate::{BakeError, BakeOptions};
 /// Rays of a patch and of a block of texels; every other one towards what has changed.
 const RAYS: u32 = 32;
 /// Texels along the side of a block.
-pub(crate) const BLOCK: u32 = 4;
+const BLOCK: u32 = 4;
 /// What the seed is hashed with.
 const PURPOSE: u32 = 50;
 /// What is nearer to a box than this share of its size has changed for certain.
@@ -34,53 +37,75 @@ const BESIDE: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
+/// The least and the most of something, by channel.
+type Range = [Vec3; 2];
+
 /// The light before and now, as far as it is needed to tell the difference.
 pub(crate) struct Change<'a> {
-    pub scene: &'a BakeScene,
-    pub layout: &'a LightmapLayout,
-    pub changes: &'a Changes<'a>,
+    scene: &'a BakeScene,
+    layout: &'a LightmapLayout,
+    changes: &'a Changes<'a>,
+    blocks: Blocks,
     /// Per texel of all maps, by how much direct light (mixed lights included) has changed, W/m².
-    pub direct: Vec<Vec3>,
+    direct: Vec<Vec3>,
+    /// Mean of the direct light that is baked now, and of the channels.
+    mean_direct: f64,
     /// Irradiance of an unhidden sky now, W/m².
-    pub sky: Vec3,
+    sky: Vec3,
     /// The changed boxes as spheres: centre, radius.
     cones: Vec<(Vec3, f32)>,
-    rays: AtomicU64,
+    ways: Ways,
 }
 
 /// What leaves the patches now, and the change of what they receive by bounces, if it is known yet.
 #[derive(Clone, Copy)]
-pub(crate) struct PatchLight<'a> {
-    pub patches: &'a Patches,
+struct PatchLight<'a> {
+    patches: &'a Patches,
     /// W/m², without emission.
-    pub exitance: &'a [Vec3],
-    /// W/m², mean of the channels; empty if not known.
-    pub change: &'a [f32],
+    exitance: &'a [Vec3],
+    /// W/m²; empty if not known.
+    change: &'a [Range],
+    /// Backs, which no texel shows, whose direct light may be another than it was.
+    unknown: &'a [bool],
 }
 
-/// A mean of samples and its standard error.
+/// Means of samples of both bounds and their standard errors.
 #[derive(Clone, Copy, Debug, Default)]
 struct Estimate {
-    sum: f64,
-    squares: f64,
+    sums: [DVec3; 2],
+    squares: [DVec3; 2],
     count: f64,
+    /// Some sample may be anything.
+    unknown: bool,
 }
 
 impl Estimate {
-    fn add(&mut self, value: f32) {
-        self.sum += f64::from(value);
-        self.squares += f64::from(value * value);
+    fn add(&mut self, range: Range, weight: f32) {
+        for (bound, value) in range.into_iter().enumerate() {
+            let value = (value * weight).as_dvec3();
+            self.sums[bound] += value;
+            self.squares[bound] += value * value;
+        }
         self.count += 1.0;
     }
 
-    fn mean(&self) -> f32 {
-        (self.sum / self.count.max(1.0)) as f32
+    fn means(&self) -> Range {
+        self.sums.map(|sum| (sum / self.count.max(1.0)).as_vec3())
     }
 
-    fn standard_error(&self) -> f32 {
-        let mean = self.sum / self.count.max(1.0);
-        let variance = (self.squares / self.count.max(1.0) - mean * mean).max(0.0);
-        (variance / self.count.max(1.0)).sqrt() as f32
+    /// The largest change within the bounds, with one standard error: root mean square of the channels.
+    fn most(&self) -> f32 {
+        if self.unknown {
+            return f32::INFINITY;
+        }
+        let count = self.count.max(1.0);
+        let most = self.sums.iter().zip(&self.squares).map(|(sum, squares)| {
+            let mean = *sum / count;
+            let variance = (*squares / count - mean * mean).max(DVec3::ZERO) / count;
+            mean.abs() + DVec3::from_array(variance.to_array().map(f64::sqrt))
+        });
+        let most = most.fold(DVec3::ZERO, DVec3::max);
+        (most.length_squared() / 3.0).sqrt() as f32
     }
 }
 
@@ -91,12 +116,12 @@ fn grey(light: Vec3) -> f32 {
 impl<'a> Change<'a> {
     /// From the direct light of every covered texel as it is now.
     pub fn new(
-        scene: &'a BakeScene,
+        sources: &Sources<'a>,
         layout: &'a LightmapLayout,
         changes: &'a Changes<'a>,
         texels: &[Texel],
+        charts: &[u32],
         direct: &[Direct],
-        sky: Vec3,
     ) -> Self {
         let mut change = vec![Vec3::ZERO; layout.texels];
         for ((texel, now), known) in texels.iter().zip(direct).zip(&changes.known) {
@@ -104,16 +129,31 @@ impl<'a> Change<'a> {
                 change[texel.index as usize] = now.total() - known.direct.total();
             }
         }
-        let cones = changes.boxes.iter().map(|b| (b.center(), b.radius())).collect();
-        Self { scene, layout, changes, direct: change, sky, cones, rays: AtomicU64::new(0) }
+        let open = texels.iter().zip(direct).filter(|(texel, _)| !texel.is_hidden());
+        let (sum, count) =
+            open.fold((0.0, 0u32), |(sum, count), (_, own)| (sum + f64::from(grey(own.baked)), count + 1));
+        Self {
+            scene: sources.scene,
+            layout,
+            changes,
+            blocks: Blocks::new(texels, charts, BLOCK),
+            direct: change,
+            mean_direct: sum / f64::from(count.max(1)),
+            sky: sources.sky,
+            cones: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
+            ways: Ways::new(sources, &changes.boxes),
+        }
     }
 
-    /// Rays cast so far.
-    pub fn rays(&self) -> u64 {
-        self.rays.load(Ordering::Relaxed)
+    /// About how many rays the estimate takes.
+    pub fn rays(&self, exchange: &Exchange) -> u64 {
+        let asked =
+            if exchange.change.is_empty() { 0 } else { exchange.change.len() + self.blocks.members.len() };
+        u64::from(RAYS) * asked as u64
     }
 
-    /// The change of what each patch receives by bounces, W/m², mean of the channels: Δ = S + F ρ Δ, with the change S that is seen at first hand.
+    /// The change of what each patch receives by bounces, W/m²: Δ = S + F ρ Δ, with the change S that is seen at first hand. Nothing in it is
+    /// negative, so that bounds of the one are bounds of the other.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -125,15 +165,19 @@ impl<'a> Change<'a> {
         solver: Solver,
         options: &BakeOptions,
         watch: &mut Watch<'_>,
-    ) -> Result<Vec<f32>, BakeError> {
-        let light = PatchLight { patches, exitance, change: &[] };
+    ) -> Result<Vec<Range>, BakeError> {
+        if self.changes.none {
+            return Ok(Vec::new());
+        }
+        let unknown = self.unknown_backs(patches);
+        let light = PatchLight { patches, exitance, change: &[], unknown: &unknown };
         let is_new = |patch: &Patch| {
             self.changes.changed[self.scene.triangles[patch.triangle as usize].object as usize]
         };
-        let first = in_chunks(patches.list.len(), watch, |index| {
+        let first: Vec<(Vec3, Vec3)> = in_chunks(patches.list.len(), watch, |index| {
             let patch = &patches.list[index];
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
-                return 0.0f32;
+                return (Vec3::ZERO, Vec3::ZERO);
             }
             let sequence = Sequence::new(options.seed, PURPOSE, index as u32);
             let triangle = &self.scene.triangles[patch.triangle as usize];
@@ -144,65 +188,47 @@ impl<'a> Change<'a> {
                 let normal = triangle.side_normal(patch.side);
                 Some(Receiver { position, origin, geometric_normal: normal, normal })
             };
-            self.seen(sequence, &|_, x, y| point(x, y), light).mean()
+            self.seen(sequence, &|_, x, y| point(x, y), light).means().into()
         })?;
-        // What changed objects themselves receive is not a change of theirs.
-        let reflectance: Vec<f64> = patches
-            .list
-            .iter()
-            .map(|patch| if is_new(patch) { 0.0 } else { f64::from(grey(patch.reflectance)) })
+        let bound = |which: usize, patch: usize| if which == 0 { first[patch].0 } else { first[patch].1 };
+        let solved: Vec<Vec<f64>> = (0..6usize)
+            .into_par_iter()
+            .map(|job| {
+                let (which, channel) = (job / 3, job % 3);
+                // What changed objects themselves receive is not a change of theirs.
+                let of_patch = |patch: &Patch| f64::from(patch.reflectance[channel]);
+                let reflectance: Vec<f64> = patches
+                    .list
+                    .iter()
+                    .map(|patch| if is_new(patch) { 0.0 } else { of_patch(patch) })
+                    .collect();
+                // The solver knows light only: what is more and what is less, apart.
+                let [more, less] = [1.0f64, -1.0].map(|sign| {
+                    let emission: Vec<f64> = reflectance
+                        .iter()
+                        .enumerate()
+                        .map(|(patch, rho)| rho * (sign * f64::from(bound(which, patch)[channel])).max(0.0))
+                        .collect();
+                    gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
+                });
+                more.iter().zip(&less).map(|(more, less)| more - less).collect()
+            })
             .collect();
-        // The solver knows light only: what is more and what is less, apart.
-        let [more, less] = [1.0f64, -1.0].map(|sign| {
-            let emission: Vec<f64> = first
-                .iter()
-                .zip(&reflectance)
-                .map(|(&first, rho)| rho * (sign * f64::from(first)).max(0.0))
-                .collect();
-            gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
-        });
-        Ok(first
-            .iter()
-            .zip(more.iter().zip(&less))
-            .map(|(&first, (more, less))| first + (more - less) as f32)
-            .collect())
+        let of_patch = |which: usize, patch: usize| {
+            let [red, green, blue] = [0, 1, 2].map(|channel| solved[3 * which + channel][patch]);
+            bound(which, patch) + DVec3::new(red, green, blue).as_vec3()
+        };
+        Ok((0..patches.list.len()).map(|patch| [of_patch(0, patch), of_patch(1, patch)]).collect())
     }
 
-    /// By how much the light by bounces may have changed at every covered texel, W/m², mean of the channels: the mean over its block, with one standard
-    /// error. Infinite within what has changed.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
-    pub fn of_texels(
-        &self,
-        texels: &[Texel],
-        light: PatchLight<'_>,
-        options: &BakeOptions,
-        watch: &mut Watch<'_>,
-    ) -> Result<Vec<f32>, BakeError> {
-        let blocks = Blocks::new(texels, BLOCK);
-        let found = in_chunks(blocks.members.len(), watch, |block| {
-            let members: Vec<&Texel> =
-                blocks.members[block].iter().map(|&member| &texels[member as usize]).collect();
-            if members.is_empty() {
-                return 0.0f32;
-            }
-            let sequence = Sequence::new(options.seed, PURPOSE + 1, block as u32);
-            let point = |ray: u32, x, y| {
-                let texel = members[ray as usize % members.len()];
-                texel.point(self.scene, x, y).map(|point| receiver(self.scene, &point))
-            };
-            let within = members.iter().any(|texel| {
-                let point = texel.point(self.scene, 0.5, 0.5);
-                point.is_some_and(|point| self.is_within(receiver(self.scene, &point).position))
-            });
-            if within {
-                return f32::INFINITY;
-            }
-            let seen = self.seen(sequence, &point, light);
-            seen.mean().abs() + seen.standard_error()
-        })?;
-        Ok(blocks.of.iter().map(|&block| found[block as usize]).collect())
+    /// Per patch, whether it is a back whose direct light may have changed: no texel tells by how much.
+    fn unknown_backs(&self, patches: &Patches) -> Vec<bool> {
+        let is_unknown = |patch: &Patch| {
+            patch.side == Side::Back
+                && patch.reflectance != Vec3::ZERO
+                && (self.changes.lights || self.ways.cross(&patches.corners(self.scene, patch)))
+        };
+        patches.list.par_iter().map(is_unknown).collect()
     }
 
     /// What is kept of the light by bounces.
@@ -216,16 +242,51 @@ impl<'a> Change<'a> {
         options: &BakeOptions,
         watch: &mut Watch<'_>,
     ) -> Result<Kept, BakeError> {
+        if self.changes.none {
+            return Ok(Kept::all(self.changes));
+        }
         let Exchange { patches, exitance, change, .. } = exchange;
-        let light = PatchLight { patches, exitance, change };
+        let unknown = self.unknown_backs(patches);
+        let light = PatchLight { patches, exitance, change, unknown: &unknown };
         let change = self.of_texels(texels, light, options, watch)?;
-        // The error asked for is relative to the light that there is: as it was, where that is known.
+        // The error asked for is relative to the light that there is: as it was or as it is, whichever is less.
         let lit = self.changes.known.iter().flatten();
         let (sum, count) = lit.fold((0.0, 0u32), |(sum, count), own| {
             (sum + f64::from(grey(own.direct.baked + own.bounced)), count + 1)
         });
-        let asked = options.error * sum / f64::from(count.max(1));
+        let before = sum / f64::from(count.max(1));
+        let asked = options.error * before.min(self.mean_direct + exchange.mean_indirect());
         Ok(Kept::choose(self.changes, texels, &change, asked))
+    }
+
+    /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the channels: that of its block.
+    /// Infinite within what has changed.
+    fn of_texels(
+        &self,
+        texels: &[Texel],
+        light: PatchLight<'_>,
+        options: &BakeOptions,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<f32>, BakeError> {
+        let found = in_chunks(self.blocks.members.len(), watch, |block| {
+            let members: Vec<&Texel> =
+                self.blocks.members[block].iter().map(|&member| &texels[member as usize]).collect();
+            if members.is_empty() {
+                return 0.0f32;
+            }
+            let sequence = Sequence::new(options.seed, PURPOSE + 1, block as u32);
+            // Each is asked in both ways in turn.
+            let point = |ray: u32, x, y| {
+                let texel = members[ray as usize / 2 % members.len()];
+                texel.point(self.scene, x, y).map(|point| receiver(self.scene, &point))
+            };
+            let within = members.iter().any(|texel| {
+                let point = texel.point(self.scene, 0.5, 0.5);
+                point.is_some_and(|point| self.is_within(receiver(self.scene, &point).position))
+            });
+            if within { f32::INFINITY } else { self.seen(sequence, &point, light).most() }
+        })?;
+        Ok(self.blocks.of.iter().map(|&block| found[block as usize]).collect())
     }
 
     /// Whether a point is in a changed box, or next to it.
@@ -271,7 +332,7 @@ impl<'a> Change<'a> {
             };
             let cosine = direction.dot(receiver.geometric_normal);
             if cosine <= 0.0 {
-                estimate.add(0.0);
+                estimate.add([Vec3::ZERO; 2], 0.0);
                 continue;
             }
             let by_cosine = cosine / PI;
@@ -280,55 +341,57 @@ impl<'a> Change<'a> {
             let within = within.max(usize::from(aimed));
             let by_caps = if all > 0.0 { within as f32 / (TAU * all) } else { by_cosine };
             let weight = by_cosine / (0.5 * by_cosine + 0.5 * by_caps);
-            estimate.add(weight * self.along(receiver.origin, direction, light));
+            match self.along(receiver.origin, direction, light) {
+                Some(range) => estimate.add(range, weight),
+                None => {
+                    estimate.add([Vec3::ZERO; 2], 0.0);
+                    estimate.unknown = true;
+                }
+            }
         }
         estimate
     }
 
-    /// By how much what comes along a ray has changed, times π.
-    fn along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> f32 {
+    /// By how much what comes along a ray has changed, times π. None if that cannot be told.
+    fn along(&self, origin: Vec3, direction: Vec3, light: PatchLight<'_>) -> Option<Range> {
         let is_new =
             |triangle: u32| self.changes.changed[self.scene.triangles[triangle as usize].object as usize];
+        let is_black = |hit| matches!(hit, SurfaceHit::Back | SurfaceHit::Inside);
         let now = self.scene.first_surface(origin, direction, |_| true);
-        self.rays.fetch_add(1, Ordering::Relaxed);
-        let (shows_new, behind) = match now {
-            SurfaceHit::Lit { triangle, .. } if is_new(triangle) => {
-                self.rays.fetch_add(1, Ordering::Relaxed);
-                (true, self.scene.first_surface(origin, direction, |triangle| !is_new(triangle)))
-            }
-            _ => (false, now),
+        let shows_new = matches!(now, SurfaceHit::Lit { triangle, .. } if is_new(triangle));
+        let behind = match shows_new || is_black(now) {
+            true => self.scene.first_surface(origin, direction, |triangle| !is_new(triangle)),
+            false => now,
         };
         let (was, more, distance) = match behind {
             SurfaceHit::Lit { triangle, side, at, distance } => {
-                let (was, more) = self.at(triangle, side, at, light);
+                let (was, more) = self.at(triangle, side, at, light)?;
                 (was, more, distance)
             }
             SurfaceHit::None => {
                 let was = self.changes.former.sky;
-                (was, grey(self.sky - was), f32::INFINITY)
+                (was, [self.sky - was; 2], f32::INFINITY)
             }
-            SurfaceHit::Back | SurfaceHit::Inside => (Vec3::ZERO, 0.0, f32::INFINITY),
+            SurfaceHit::Back | SurfaceHit::Inside => (Vec3::ZERO, [Vec3::ZERO; 2], f32::INFINITY),
         };
         let arrives = match now {
             SurfaceHit::Lit { triangle, side, at, .. } if shows_new => {
                 let patch = light.patches.at(triangle, side, at);
-                grey(patch.map_or(Vec3::ZERO, |patch| light.exitance[patch as usize]))
+                [patch.map_or(Vec3::ZERO, |patch| light.exitance[patch as usize]); 2]
             }
-            _ => grey(was) + more,
+            // The back of something new.
+            _ if is_black(now) => [Vec3::ZERO; 2],
+            _ => more.map(|more| was + more),
         };
-        // A box that was filled may or may not have been in the way: what differs more counts.
-        let mut change = arrives - grey(was);
-        for left in self.crossed(origin, direction, distance) {
-            let other = arrives - grey(left);
-            if other.abs() > change.abs() {
-                change = other;
-            }
+        let (mut least, mut most) = (was, was);
+        for [darkest, brightest] in self.crossed(origin, direction, distance) {
+            (least, most) = (least.min(darkest), most.max(brightest));
         }
-        change
+        Some([arrives[0] - most, arrives[1] - least])
     }
 
     /// What left the objects whose boxes a ray crosses on its way.
-    fn crossed(&self, origin: Vec3, direction: Vec3, distance: f32) -> impl Iterator<Item = Vec3> {
+    fn crossed(&self, origin: Vec3, direction: Vec3, distance: f32) -> impl Iterator<Item = Range> {
         let crosses = move |b: &ChangedBox| {
             let (mut from, mut to) = (0.0f32, distance);
             for axis in 0..3 {
@@ -344,30 +407,39 @@ impl<'a> Change<'a> {
         self.changes.boxes.iter().filter_map(move |b| b.left.filter(|_| crosses(b)))
     }
 
-    /// What left a point of an unchanged surface before, and by how much more leaves it now, mean of the channels.
-    fn at(&self, triangle: u32, side: Side, (u, v): (f32, f32), light: PatchLight<'_>) -> (Vec3, f32) {
-        let Some(patch) = light.patches.at(triangle, side, (u, v)) else { return (Vec3::ZERO, 0.0) };
-        let reflectance = light.patches.list[patch as usize].reflectance;
-        let bounced = light.change.get(patch as usize).copied().unwrap_or(0.0);
-        let bounced = grey(reflectance) * bounced;
-        // Of what no texel shows, the backs of sheets, the patches tell the light as it is now.
-        let exitance = light.exitance[patch as usize];
-        if side == Side::Back {
-            return (exitance, bounced);
+    /// What left a point of an unchanged surface before, and by how much more leaves it now. None if that cannot be told.
+    fn at(
+        &self,
+        triangle: u32,
+        side: Side,
+        (u, v): (f32, f32),
+        light: PatchLight<'_>,
+    ) -> Option<(Vec3, Range)> {
+        let Some(patch) = light.patches.at(triangle, side, (u, v)) else {
+            return Some((Vec3::ZERO, [Vec3::ZERO; 2]));
+        };
+        let patch = patch as usize;
+        if light.unknown[patch] {
+            return None;
         }
+        let reflectance = light.patches.list[patch].reflectance;
+        let bounced = light.change.get(patch).map_or([Vec3::ZERO; 2], |range| range.map(|c| reflectance * c));
+        // Of what no texel shows the patches tell the light as it is now.
+        let exitance = light.exitance[patch];
         let scene_triangle = &self.scene.triangles[triangle as usize];
         let map = &self.layout.maps[scene_triangle.object as usize];
         let [a, b, c] = scene_triangle.uv;
         let uv = a + (b - a) * u + (c - a) * v;
         let (x, y) = (uv.x as u32, uv.y as u32);
-        if x >= map.width || y >= map.height {
-            return (exitance, bounced);
+        if side == Side::Back || x >= map.width || y >= map.height {
+            return Some((exitance, bounced));
         }
         let texel = map.first + (y * map.width + x) as usize;
         let before = self.changes.former_light[texel];
         // Hidden until now: whatever hid it was a box on the ray's way.
         let was = if before.is_nan() { exitance } else { reflectance * before };
-        (was, bounced + grey(reflectance * self.direct[texel]))
+        let direct = reflectance * self.direct[texel];
+        Some((was, bounced.map(|bounced| bounced + direct)))
     }
 }
 

@@ -9,6 +9,7 @@ use super::relit::shadowed;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples, fingerprint, first_triangles};
 use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
+use crate::sampling::hash;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, Object, density_of};
 use crate::texels::footprint::Texel;
 use crate::transport::direct::{Direct, Sources};
@@ -24,8 +25,8 @@ const CENTER_SLACK: f64 = 0.25;
 pub(crate) struct ChangedBox {
     pub low: Vec3,
     pub high: Vec3,
-    /// For what is gone: what left it, W/m². None for what is here now.
-    pub left: Option<Vec3>,
+    /// For what is gone: the least and the most that left it, W/m². None for what is here now.
+    pub left: Option<[Vec3; 2]>,
 }
 
 impl ChangedBox {
@@ -69,6 +70,11 @@ impl<'a> Usable<'a> {
         if space.scale != former.space.scale || moved > CENTER_SLACK {
             return Err("the scene is larger or smaller than it was, or somewhere else".into());
         }
+        let here = missing(&hashes.objects, former.objects.iter().map(|object| &object.hash));
+        let gone = missing(former.objects.iter().map(|object| &object.hash), &hashes.objects);
+        if here.max(gone) > MOST_CHANGED {
+            return Err(format!("{} objects have changed or moved", here.max(gone)));
+        }
         let density = density_of(objects, former.space, options);
         if (density / former.density - 1.0).abs() > DENSITY_SLACK {
             return Err("the density follows the scene's area, which has changed".into());
@@ -86,9 +92,28 @@ impl<'a> Usable<'a> {
     }
 }
 
+/// How many of the one are not among the other.
+fn missing<'h>(
+    these: impl IntoIterator<Item = &'h ContentHash>,
+    others: impl IntoIterator<Item = &'h ContentHash>,
+) -> usize {
+    let mut left: HashMap<&ContentHash, usize> = HashMap::new();
+    others.into_iter().for_each(|other| *left.entry(other).or_default() += 1);
+    let is_missing = |hash: &&ContentHash| match left.get_mut(hash) {
+        Some(count) if *count > 0 => {
+            *count -= 1;
+            false
+        }
+        _ => true,
+    };
+    these.into_iter().filter(is_missing).count()
+}
+
 /// What differs, and what is known of the rest.
 pub(crate) struct Changes<'a> {
     pub former: &'a Content,
+    /// Nothing differs: all is kept as it is.
+    pub none: bool,
     /// Per object, whether it is new, or another than it was.
     pub changed: Vec<bool>,
     pub boxes: Vec<ChangedBox>,
@@ -104,9 +129,6 @@ pub(crate) struct Changes<'a> {
 
 impl<'a> Changes<'a> {
     /// Finds them.
-    ///
-    /// # Errors
-    /// Why it is not worth keeping anything.
     pub fn find(
         usable: &Usable<'a>,
         hashes: &Hashes,
@@ -114,22 +136,19 @@ impl<'a> Changes<'a> {
         sources: &Sources<'_>,
         layout: &LightmapLayout,
         texels: &[Texel],
-    ) -> Result<Self, String> {
+    ) -> Self {
         let (scene, former) = (sources.scene, usable.former);
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Of several that are the same, the first is taken first.
         for object in former.objects.iter().rev() {
             by_hash.entry(object.hash).or_default().push(object);
         }
+        // Objects that share their mesh share their unwrap, which may be another although they have not changed.
         let same: Vec<Option<&'a ObjectSamples>> = hashes
             .objects
             .iter()
-            .zip(&layout.maps)
-            .map(|(hash, map)| {
-                by_hash
-                    .get_mut(hash)?
-                    .pop_if(|object| (object.width, object.height) == (map.width, map.height))
-            })
+            .zip(layouts(scene, layout))
+            .map(|(hash, layout)| by_hash.get_mut(hash)?.pop_if(|object| object.layout == layout))
             .collect();
         let gone: Vec<&ObjectSamples> = former
             .objects
@@ -137,13 +156,10 @@ impl<'a> Changes<'a> {
             .filter(|object| !same.iter().flatten().any(|kept| std::ptr::eq(*kept, *object)))
             .collect();
         let changed: Vec<bool> = same.iter().map(Option::is_none).collect();
-        let here = changed.iter().filter(|changed| **changed).count();
-        if here + gone.len() > MOST_CHANGED {
-            return Err(format!("{} objects have changed or moved", here.max(gone.len())));
-        }
-        let emits = emitting(scene, sources, layout);
-        let of_lamps = emits.iter().zip(&changed).any(|(emits, changed)| *emits && *changed)
-            || gone.iter().any(|o| o.emits);
+        let shines = emission(scene, sources, layout);
+        let of_lamps =
+            shines.iter().zip(&same).any(|(own, same)| *own != same.map_or(0, |same| same.emission))
+                || gone.iter().any(|gone| gone.emission != 0);
         let of_lights = former.lights != hashes.lights;
         let bounds = bounds(scene, layout);
         let now = (0..objects.len()).filter(|&object| changed[object]);
@@ -152,17 +168,23 @@ impl<'a> Changes<'a> {
         let boxes = now.chain(then).filter(|b| b.low.cmple(b.high).all()).collect();
         let names = names(objects, &changed, &gone, of_lights);
         let (known, former_light) = known(scene, layout, texels, &same);
-        Ok(Self { former, changed, boxes, lights: of_lamps || of_lights, names, known, former_light })
+        let none = former.content == hashes.content;
+        Self { former, none, changed, boxes, lights: of_lamps || of_lights, names, known, former_light }
     }
 }
 
 impl Changes<'_> {
     /// The direct light that cannot have changed, per covered texel.
-    pub fn known_direct(&self, sources: &Sources<'_>, texels: &[Texel]) -> Vec<Option<Direct>> {
+    pub fn known_direct(
+        &self,
+        sources: &Sources<'_>,
+        texels: &[Texel],
+        charts: &[u32],
+    ) -> Vec<Option<Direct>> {
         if self.lights {
             return vec![None; texels.len()];
         }
-        let shadowed = shadowed(sources, texels, &self.boxes);
+        let shadowed = shadowed(sources, texels, charts, &self.boxes);
         let of = |(known, shadowed): (&Option<&TexelSamples>, bool)| {
             known.filter(|_| !shadowed).map(|known| known.direct)
         };
@@ -200,13 +222,34 @@ pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, V
     bounds
 }
 
-/// Per object, whether some of it shines.
-pub(crate) fn emitting(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<bool> {
-    let mut emits = vec![false; layout.maps.len()];
+/// Per object, what of it shines, in one number; 0 for nothing.
+pub(crate) fn emission(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<u32> {
+    let first = first_triangles(scene, layout);
+    let mut emission = vec![0; layout.maps.len()];
     for emitter in &sources.emitters {
-        emits[scene.triangles[emitter.triangle as usize].object as usize] = true;
+        let object = scene.triangles[emitter.triangle as usize].object as usize;
+        let own = emitter.radiance.to_array().map(f32::to_bits);
+        let words = own.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
+        emission[object] = words.fold(emission[object], fold).max(1);
     }
-    emits
+    emission
+}
+
+/// Per object, where its texels are on it, in one number.
+pub(crate) fn layouts(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
+    let mut sums: Vec<u32> = layout.maps.iter().map(|map| fold(fold(0, map.width), map.height)).collect();
+    for triangle in &scene.triangles {
+        let sum = &mut sums[triangle.object as usize];
+        for uv in triangle.uv {
+            *sum = fold(fold(*sum, uv.x.to_bits()), uv.y.to_bits());
+        }
+    }
+    sums
+}
+
+/// A hash of a hash and a word more.
+pub(super) fn fold(sum: u32, word: u32) -> u32 {
+    hash(sum ^ word).wrapping_mul(0x9e37_79b9)
 }
 
 /// The samples of every covered texel that shows what it showed; and the light of all, per texel of all maps.

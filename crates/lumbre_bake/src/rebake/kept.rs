@@ -2,6 +2,7 @@
 //! how much it changes: that is `change`.
 
 use super::changes::Changes;
+use super::samples::TexelSamples;
 use crate::texels::footprint::Texel;
 use crate::texels::gather::Gathered;
 
@@ -46,6 +47,16 @@ impl Kept {
             }
         }
         kept
+    }
+
+    /// All that there is, of a scene that has not changed.
+    pub fn all(changes: &Changes<'_>) -> Self {
+        let gathered =
+            |known: &Option<&TexelSamples>| known.map_or_else(Gathered::default, |own| own.gathered);
+        Self {
+            gathered: changes.known.iter().map(gathered).collect(),
+            neglected: changes.known.iter().map(|known| known.map_or(0.0, |own| own.neglected)).collect(),
+        }
     }
 
     /// Texels that are kept.

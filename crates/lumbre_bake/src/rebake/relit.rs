@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::blocks::Blocks;
 use super::changes::ChangedBox;
 use crate::scene::{Canonical, PlacedLight};
-use crate::texels::footprint::Texel;
+use crate::texels::footprint::{Texel, receiver};
 use crate::texels::tiles::positions_of;
 use crate::transport::direct::Sources;
 use crate::transport::emitters::lamps;
@@ -46,28 +46,57 @@ enum Source {
 const BLOCK: u32 = 8;
 /// Longer than any way through a scene whose coordinates are below 2.25.
 const FAR: f32 = 16.0;
+/// Where a texel of a smooth surface is asked how far it is above its facets.
+const LIFTED: [(f32, f32); 5] = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
 /// What rounding may make of the spheres, relative to the scene.
 const SLACK: f32 = 1e-4;
 
+/// The ways on which a box may stand, or have stood, in the light.
+pub(crate) struct Ways {
+    sources: Vec<Source>,
+    boxes: Vec<Sphere>,
+}
+
+impl Ways {
+    pub fn new(sources: &Sources<'_>, boxes: &[ChangedBox]) -> Self {
+        let boxes = boxes.iter().map(|b| Sphere { center: b.center(), radius: b.radius() + SLACK });
+        Self { sources: spheres(sources), boxes: boxes.collect() }
+    }
+
+    /// Whether that may be so for some of these places, or any between them.
+    pub fn cross(&self, places: &[Vec3]) -> bool {
+        if places.is_empty() {
+            return false;
+        }
+        let own = Sphere::around(places.iter().copied());
+        self.sources.iter().any(|source| self.boxes.iter().any(|between| source.meets(own, *between)))
+    }
+}
+
 /// Per covered texel, whether a box may stand, or have stood, in its light.
-pub(crate) fn shadowed(sources: &Sources<'_>, texels: &[Texel], boxes: &[ChangedBox]) -> Vec<bool> {
+pub(crate) fn shadowed(
+    sources: &Sources<'_>,
+    texels: &[Texel],
+    charts: &[u32],
+    boxes: &[ChangedBox],
+) -> Vec<bool> {
     let scene = sources.scene;
-    let sources = spheres(sources);
-    let boxes: Vec<Sphere> =
-        boxes.iter().map(|b| Sphere { center: b.center(), radius: b.radius() + SLACK }).collect();
-    let blocks = Blocks::new(texels, BLOCK);
+    let ways = Ways::new(sources, boxes);
+    let blocks = Blocks::new(texels, charts, BLOCK);
     let reached: Vec<bool> = blocks
         .members
         .par_iter()
         .map(|members| {
             let mut shown = Vec::new();
-            members.iter().for_each(|&member| positions_of(scene, &texels[member as usize], &mut shown));
-            // All of it may be hidden.
-            if shown.is_empty() {
-                return false;
+            for texel in members.iter().map(|&member| &texels[member as usize]) {
+                positions_of(scene, texel, &mut shown);
+                if !scene.triangles[texel.triangle as usize].flat {
+                    // The smooth surface lies above its facets, most of all in their middle.
+                    let lifted = LIFTED.into_iter().filter_map(|(x, y)| texel.point(scene, x, y));
+                    shown.extend(lifted.map(|point| receiver(scene, &point).position));
+                }
             }
-            let own = Sphere::around(shown.iter().copied());
-            sources.iter().any(|source| boxes.iter().any(|between| source.meets(own, *between)))
+            ways.cross(&shown)
         })
         .collect();
     blocks.of.iter().map(|&block| reached[block as usize]).collect()
@@ -85,10 +114,12 @@ fn spheres(sources: &Sources<'_>) -> Vec<Source> {
 
 impl Source {
     fn of_light(placed: &PlacedLight, space: Canonical) -> Self {
-        let radius = (f64::from(placed.light.radius) * space.scale) as f32;
+        // What is no size counts as none, as in the bake.
+        let size = |size: f32| if size > 0.0 { size } else { 0.0 };
+        let radius = (f64::from(size(placed.light.radius)) * space.scale) as f32;
         match placed.light.kind {
             LightKind::Directional => {
-                Self::Far { towards: -placed.axis.as_vec3(), angle: 0.5 * placed.light.angle }
+                Self::Far { towards: -placed.axis.as_vec3(), angle: 0.5 * size(placed.light.angle) }
             }
             _ => Self::Near(Sphere { center: space.position(placed.position), radius }),
         }

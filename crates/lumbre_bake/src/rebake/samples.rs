@@ -3,9 +3,9 @@
 
 use glam::Vec3;
 
-use super::changes::{bounds, emitting};
+use super::changes::{bounds, emission, fold, layouts};
 use crate::content_hash::{ContentHash, Hashes};
-use crate::sampling::hash;
+
 use crate::scene::{BakeScene, Canonical, LightmapLayout, Object};
 use crate::texels::footprint::{Footprint, Texel};
 use crate::texels::gather::{Gathered, Weights};
@@ -40,11 +40,12 @@ pub(crate) struct ObjectSamples {
     /// The box around it, canonical units.
     pub low: Vec3,
     pub high: Vec3,
-    pub emits: bool,
-    /// What leaves it without emission, mean over its area, W/m².
-    pub exitance: Vec3,
-    pub width: u32,
-    pub height: u32,
+    /// What of it shines, in one number; 0 for nothing.
+    pub emission: u32,
+    /// What leaves it without emission, W/m², by channel: the least and the most of its patches.
+    pub exitance: [Vec3; 2],
+    /// Where its texels are on it, in one number.
+    pub layout: u32,
     /// In the order of their cells.
     pub texels: Vec<TexelSamples>,
 }
@@ -62,6 +63,20 @@ pub(crate) struct TexelSamples {
     pub bounced: Vec3,
     /// By how much that may have changed since it was gathered, W/m².
     pub neglected: f32,
+}
+
+impl TexelSamples {
+    /// Whether all of it are numbers that a bake can go on with.
+    pub fn is_sound(&self) -> bool {
+        let Self { cell: _, footprint: _, direct, gathered, bounced, neglected } = self;
+        let Gathered { sums, patch_errors, differences, squared_differences, inverse_distances, .. } =
+            gathered;
+        let finite = (direct.baked + direct.mixed + *bounced + *differences).is_finite()
+            && (direct.variance + *squared_differences + *inverse_distances).is_finite()
+            && patch_errors.is_finite()
+            && sums.iter().all(|sum| sum.is_finite());
+        finite && direct.variance >= 0.0 && *neglected >= 0.0 && neglected.is_finite()
+    }
 }
 
 impl Samples {
@@ -97,7 +112,6 @@ impl Weights {
 /// What a texel shows, in one number: the same as long as its object and what hides it are the same. `first` is the first triangle of its
 /// object.
 pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
-    let fold = |sum: u32, word: u32| hash(sum ^ word).wrapping_mul(0x9e37_79b9);
     match &texel.footprint {
         Footprint::Hidden => 0,
         Footprint::Whole(triangle) => fold(1, triangle - first),
@@ -132,26 +146,26 @@ pub(crate) struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// The samples of the whole. `exitance` is that of each object, or empty.
+    /// The samples of the whole. `exitance` is the least and most of each object, or empty.
     pub fn samples(
         &self,
         identity: ContentHash,
         hashes: &Hashes,
         objects: &[Object],
         sources: &Sources<'_>,
-        exitance: &[Vec3],
+        exitance: &[[Vec3; 2]],
     ) -> Samples {
         let bounds = bounds(self.scene, self.layout);
-        let emits = emitting(self.scene, sources, self.layout);
+        let emission = emission(self.scene, sources, self.layout);
+        let layouts = layouts(self.scene, self.layout);
         let of_object = |(index, texels): (usize, Vec<TexelSamples>)| ObjectSamples {
             hash: hashes.objects[index],
             name: objects[index].name.clone(),
             low: bounds[index].0,
             high: bounds[index].1,
-            emits: emits[index],
+            emission: emission[index],
             exitance: exitance.get(index).copied().unwrap_or_default(),
-            width: self.layout.maps[index].width,
-            height: self.layout.maps[index].height,
+            layout: layouts[index],
             texels,
         };
         Samples(Content {
@@ -172,14 +186,18 @@ impl Found<'_> {
         let mut sorted: Vec<Vec<TexelSamples>> = vec![Vec::new(); self.layout.maps.len()];
         for (index, texel) in self.texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
             let object = texel.object as usize;
-            sorted[object].push(TexelSamples {
+            let own = TexelSamples {
                 cell: texel.y * self.layout.maps[object].width + texel.x,
                 footprint: fingerprint(texel, first[object]),
                 direct: self.direct[index],
                 gathered: self.gathered.get(index).map_or_else(Gathered::default, Gathered::settled),
                 bounced: self.bounced.get(index).copied().unwrap_or_default(),
                 neglected: self.neglected.get(index).copied().unwrap_or_default(),
-            });
+            };
+            // What overflows is not worth keeping.
+            if own.is_sound() {
+                sorted[object].push(own);
+            }
         }
         sorted
     }

@@ -5,7 +5,7 @@
 //!   version    u32       VERSION; everything is little endian
 //!   checksum  32 bytes   BLAKE3 of all that follows
 //!   content, identity, sampling, lights (32 bytes each), sky, centre, scale, density
-//!   objects, each: hash, name, box, emits, exitance, width, height, texels, each some 150 bytes
+//!   objects, each: hash, name, box, emission, exitance, layout, texels, each some 150 bytes
 //! ```
 //!
 //! Nothing is allocated by a count that the bytes do not hold; a file that is cut short or damaged is named so.
@@ -131,11 +131,9 @@ impl Record for TexelSamples {
         let direct = Direct::read(from)?;
         let gathered: Gathered = Settled::read(from)?.into();
         let (bounced, neglected): (Vec3, f32) = Record::read(from)?;
+        let own = Self { cell, footprint, direct, gathered, bounced, neglected };
         // No bake writes what is not a number; a map of it could not be mended.
-        let finite = (direct.baked + direct.mixed + bounced).is_finite()
-            && (direct.variance + neglected).is_finite()
-            && gathered.sums.iter().all(|sum| sum.is_finite());
-        finite.then_some(Self { cell, footprint, direct, gathered, bounced, neglected })
+        own.is_sound().then_some(own)
     }
 }
 
@@ -144,10 +142,9 @@ fields!(ObjectSamples {
     name: String,
     low: Vec3,
     high: Vec3,
-    emits: bool,
-    exitance: Vec3,
-    width: u32,
-    height: u32,
+    emission: u32,
+    exitance: [Vec3; 2],
+    layout: u32,
     texels: Vec<TexelSamples>,
 });
 
@@ -224,6 +221,11 @@ impl Samples {
         }
         let mut cursor = Cursor(rest);
         let content = Content::read(&mut cursor).filter(|_| cursor.0.is_empty());
+        let content = content.filter(|content| {
+            let Canonical { center, scale } = content.space;
+            let positive = |number: f64| number.is_finite() && number > 0.0;
+            positive(content.density) && positive(scale) && center.is_finite() && content.sky.is_finite()
+        });
         content.map(Self).ok_or(SamplesError::Damaged)
     }
 
@@ -236,9 +238,15 @@ impl Samples {
         self.0.write(&mut content);
         let beside = tape::temporary(path);
         let written = (|| {
-            // Not truncated before it is ours: another process may be writing it.
-            let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&beside)?;
-            lock(&file)?;
+            let mut file = loop {
+                // Not truncated before it is ours: another process may be writing it.
+                let file = OpenOptions::new().write(true).create(true).truncate(false).open(&beside)?;
+                lock(&file)?;
+                // Whoever had it has renamed it meanwhile: then it is the finished file.
+                if is_at(&file, &beside)? {
+                    break file;
+                }
+            };
             file.set_len(0)?;
             file.write_all(MAGIC)?;
             file.write_all(&VERSION.to_le_bytes())?;
@@ -252,6 +260,26 @@ impl Samples {
             let _ = tape::remove_if_there(&beside);
         }
         Ok(written?)
+    }
+}
+
+/// Whether a path still leads to an open file.
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    let there = match std::fs::metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        other => other?,
+    };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let own = file.metadata()?;
+        Ok((own.dev(), own.ino()) == (there.dev(), there.ino()))
+    }
+    #[cfg(not(unix))]
+    {
+        // Elsewhere a file that is open is not renamed.
+        let _ = (file, there);
+        Ok(true)
     }
 }
 

@@ -35,8 +35,8 @@ pub(crate) struct Exchange {
     pub guide: Guide,
     /// What leaves each patch without emission, W/m².
     pub exitance: Vec<Vec3>,
-    /// By how much `indirect` has changed since a former bake, mean of the channels; empty without one.
-    pub change: Vec<f32>,
+    /// By how much `indirect` has changed since a former bake, at least and at most; empty without one.
+    pub change: Vec<[Vec3; 2]>,
 }
 
 /// Relative residual at which the solver stops: well below what form factors are known to.
@@ -134,15 +134,28 @@ impl Exchange {
 }
 
 impl Exchange {
-    /// What leaves each object without emission, mean over its area, W/m².
-    pub fn exitance_of(&self, scene: &BakeScene, objects: usize) -> Vec<Vec3> {
-        let mut sums = vec![(Vec3::ZERO, 0.0f32); objects];
+    /// What leaves each object without emission, W/m²: the least and the most of its patches, by channel. Backs that light does not meet are black.
+    pub fn exitance_of(&self, scene: &BakeScene, objects: usize) -> Vec<[Vec3; 2]> {
+        let mut ranges = vec![[Vec3::INFINITY, Vec3::ZERO]; objects];
         for (patch, exitance) in self.patches.list.iter().zip(&self.exitance) {
-            let (sum, area) = &mut sums[scene.triangles[patch.triangle as usize].object as usize];
-            *sum += patch.area * *exitance;
-            *area += patch.area;
+            let triangle = &scene.triangles[patch.triangle as usize];
+            let [least, most] = &mut ranges[triangle.object as usize];
+            let black_back = !triangle.closed && !triangle.two_sided;
+            *least = least.min(if black_back { Vec3::ZERO } else { *exitance });
+            *most = most.max(*exitance);
         }
-        sums.into_iter().map(|(sum, area)| sum / area.max(f32::MIN_POSITIVE)).collect()
+        let of_nothing =
+            |[least, most]: [Vec3; 2]| [if least.is_finite() { least } else { Vec3::ZERO }, most];
+        ranges.into_iter().map(of_nothing).collect()
+    }
+
+    /// Irradiance by bounces and by the sky, mean over the patches' area and of the channels.
+    pub fn mean_indirect(&self) -> f64 {
+        let sum = |(sum, area): (f64, f64), (patch, light): (&Patch, &Vec3)| {
+            (sum + f64::from(patch.area * light.element_sum() / 3.0), area + f64::from(patch.area))
+        };
+        let (sum, area) = self.patches.list.iter().zip(&self.indirect).fold((0.0, 0.0), sum);
+        if area > 0.0 { sum / area } else { 0.0 }
     }
 
     /// Of surfaces that reflect nothing.
