@@ -10,7 +10,7 @@ use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
 
 /// Cargo builds examples beside the tests.
 fn example(name: &str) -> Command {
-    let mut folder = std::env::current_exe().unwrap();
+    let mut folder = std::env::current_exe().expect("a test knows where it is");
     folder.pop();
     folder.set_file_name("examples");
     Command::new(folder.join(name).with_extension(std::env::consts::EXE_EXTENSION))

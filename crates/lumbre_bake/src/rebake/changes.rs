@@ -97,9 +97,9 @@ fn missing<'h>(
     these: impl IntoIterator<Item = &'h ContentHash>,
     others: impl IntoIterator<Item = &'h ContentHash>,
 ) -> usize {
-    let mut left: HashMap<&ContentHash, usize> = HashMap::new();
-    others.into_iter().for_each(|other| *left.entry(other).or_default() += 1);
-    let is_missing = |hash: &&ContentHash| match left.get_mut(hash) {
+    let mut left: HashMap<ContentHash, usize> = HashMap::new();
+    others.into_iter().for_each(|other| *left.entry(*other).or_default() += 1);
+    let is_missing = |hash: &&ContentHash| match left.get_mut(*hash) {
         Some(count) if *count > 0 => {
             *count -= 1;
             false
