@@ -1,4 +1,4 @@
-//! Bakes a glTF file: `bake_file IN.glb OUT.glb [--map-size N] [--draft] [--error X] [--csv REFERENCE] [--maps FOLDER]`.
+//! Bakes a glTF file: `bake_file IN.glb OUT.glb [--map-size N] [--draft] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
 //! With a reference it prints the error, with a folder it writes each map as a PNG to look at.
 
 use std::error::Error;
@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--map-size" => options.density = Density::MapSize(value()?.parse()?),
             "--texels-per-meter" => options.density = Density::TexelsPerMeter(value()?.parse()?),
             "--error" => options.error = value()?.parse()?,
+            "--time" => options.time = Some(std::time::Duration::try_from_secs_f64(value()?.parse()?)?),
             "--seed" => options.seed = value()?.parse()?,
             "--threads" => options.threads = Some(value()?.parse()?),
             "--draft" => options.quality = Quality::Draft,
