@@ -271,6 +271,11 @@ fn run(
         let relit = (0..texels.len()).filter(|&index| relit(index) && !texels[index].is_hidden()).count();
         report.rebake = Some(rebake_report(changes, &texels, relit, kept.as_ref(), &report));
     }
+    if exchange.is_none() {
+        note_direct_error(&texels, variances, options, &mut report);
+        report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
+        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
+    }
     let samples = match former {
         Former::Forget => None,
         // Whoever has more time would not want to keep these.
@@ -290,11 +295,6 @@ fn run(
             Some(found.samples(identity, &hashes, &objects, &sources, &exitance.unwrap_or_default()))
         }
     };
-    if exchange.is_none() {
-        note_direct_error(&texels, variances, options, &mut report);
-        report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
-        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
-    }
     let known = (values.as_slice(), variances.as_slice());
     let (mut filled, errors) =
         fill(&layout, &texels, &charts, known, options.gap, &mut |done| watch.advance(done))?;

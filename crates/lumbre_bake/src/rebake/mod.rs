@@ -16,6 +16,7 @@
 mod blocks;
 pub(crate) mod change;
 mod changes;
+mod estimate;
 pub(crate) mod kept;
 mod relit;
 mod report;
