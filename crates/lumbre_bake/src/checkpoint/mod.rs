@@ -34,7 +34,7 @@ pub(crate) use record::Record;
 pub(crate) use tape::Tape;
 
 /// The version of the format: another is not read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Where a bake keeps what it has computed, and whether it begins with what is kept there.
 ///

@@ -84,7 +84,7 @@ macro_rules! fields {
 
 pub(crate) use fields;
 
-fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, seen: Seen });
+fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, sampled: bool, seen: Seen });
 fields!(Seen { partly: bool, signature: u32 });
 fields!(Gathered {
     sums: [Vec3; SCRAMBLES],
@@ -201,6 +201,7 @@ mod tests {
             mixed: Vec3::new(f32::INFINITY, 3.5, -2.0),
             variance: 0.1,
             rays: 7,
+            sampled: true,
             seen: Seen { partly: true, signature: 0xdead_beef },
         };
         let cast =
@@ -213,7 +214,7 @@ mod tests {
         let again = Direct::read(&mut cursor).unwrap();
         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
         assert_eq!((bits(again.baked), bits(again.mixed)), (bits(direct.baked), bits(direct.mixed)));
-        assert_eq!((again.rays, again.seen), (direct.rays, direct.seen));
+        assert_eq!((again.rays, again.sampled, again.seen), (direct.rays, direct.sampled, direct.seen));
         let again = Cast::read(&mut cursor).unwrap();
         assert_eq!((&again.met, again.inside, again.count), (&cast.met, cast.inside, cast.count));
         assert!(cursor.0.is_empty());

@@ -26,7 +26,7 @@ use crate::transport::direct::Direct;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
 /// The version of the format: another is not read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CHECKSUM: usize = 32;
 
 /// Why samples cannot be read or written. A bake can do without them.

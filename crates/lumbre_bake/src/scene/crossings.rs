@@ -75,8 +75,19 @@ impl BakeScene {
             .collect()
     }
 
-    /// Of what lies in one place, in the order in which it is met, the first that looks the way that `sign` says; a black one if none does.
+    /// Of what lies in one place, in the order in which it is met, the first that looks the way that `sign` says; a black one if none does,
+    /// or if that way lies the inside of a solid.
     fn face<'a>(&self, place: impl Iterator<Item = &'a Meeting> + Clone, sign: f32) -> Face {
+        let solid = |meeting: &Meeting| self.triangles[meeting.triangle as usize].solid;
+        // Its backs there, but none of its fronts: it has some thickness.
+        let is_inside = |meeting: &Meeting| {
+            let own = solid(meeting);
+            let shows = |other: &Meeting| solid(other) == own && other.cosine * sign > 0.0;
+            own.is_some() && meeting.cosine * sign < 0.0 && !place.clone().any(shows)
+        };
+        if place.clone().any(is_inside) {
+            return Face::Inside;
+        }
         let lit = place.clone().find_map(|meeting| {
             let triangle = &self.triangles[meeting.triangle as usize];
             let front = meeting.cosine * sign > 0.0;

@@ -42,8 +42,8 @@ impl Leaks {
 /// A box.
 pub(crate) type Extent = (Vec3, Vec3);
 
-/// The extents of the closed pieces that look inward: rooms. `pieces` names the closed piece of each triangle, if any.
-pub(crate) fn rooms(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Extent> {
+/// The closed pieces that look inward, with their extents: rooms. `pieces` names the closed piece of each triangle, if any.
+pub(crate) fn rooms(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<(u32, Extent)> {
     let mut order: Vec<(u32, usize)> =
         pieces.iter().enumerate().filter_map(|(index, piece)| Some(((*piece)?, index))).collect();
     order.sort_unstable();
@@ -57,7 +57,7 @@ pub(crate) fn rooms(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Exte
                 (low, high) = (low.min(corner), high.max(corner));
             }
         }
-        (volume < 0.0).then_some((low, high))
+        (volume < 0.0).then_some((same[0].0, (low, high)))
     };
     order.chunk_by(|a, b| a.0 == b.0).filter_map(piece).collect()
 }
@@ -90,7 +90,9 @@ mod tests {
     fn a_room_is_a_closed_piece_that_looks_inward() {
         let block = lumbre_mesh::shapes::cuboid(Vec3::ONE, 1).triangle_positions().unwrap();
         let room: Vec<[Vec3; 3]> = block.iter().map(|&[a, b, c]| [a * 4.0, c * 4.0, b * 4.0]).collect();
-        let found = |triangles: &[[Vec3; 3]]| rooms(triangles, &closed_pieces(triangles));
+        let found = |triangles: &[[Vec3; 3]]| -> Vec<Extent> {
+            rooms(triangles, &closed_pieces(triangles)).into_iter().map(|(_, extent)| extent).collect()
+        };
         assert!(found(&block).is_empty());
         let both = [room.clone(), block].concat();
         assert_eq!(found(&both), [(Vec3::splat(-2.0), Vec3::splat(2.0))]);

@@ -40,7 +40,12 @@ impl Canonical {
 
     /// A world position in canonical units.
     pub fn position(&self, world: DVec3) -> Vec3 {
-        ((world - self.center) * self.scale).as_vec3()
+        self.place(world).as_vec3()
+    }
+
+    /// The same, not rounded.
+    pub fn place(&self, world: DVec3) -> DVec3 {
+        (world - self.center) * self.scale
     }
 
     /// A canonical position in the world, metres.
@@ -76,6 +81,8 @@ pub(crate) struct SceneTriangle {
     pub two_sided: bool,
     /// Part of a closed piece: a ray that meets its back began inside.
     pub closed: bool,
+    /// The closed piece, if it looks outward: what is inside sees nothing, whatever lies against it from outside.
+    pub solid: Option<u32>,
     /// Another triangle in the same place meets the light.
     pub superseded: bool,
 }
@@ -138,7 +145,7 @@ impl BakeScene {
         for (index, object) in objects.iter().enumerate() {
             let first = triangles.len();
             extract(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
-            rooms.extend(mark_closed(&mut triangles[first..]));
+            rooms.extend(mark_closed(&mut triangles, first));
         }
         mark_superseded(&mut triangles, &surfaces, warnings);
         let solid: Vec<[Vec3; 3]> = triangles
@@ -228,6 +235,7 @@ fn extract(
                 vertices,
                 two_sided: part.material.double_sided,
                 closed: false,
+                solid: None,
                 superseded: false,
             });
         }
@@ -243,15 +251,21 @@ fn extract(
     }
 }
 
-/// Marks the closed pieces of an object; returns the extents of those that look inward.
-fn mark_closed(triangles: &mut [SceneTriangle]) -> Vec<Extent> {
+/// Marks the closed pieces of an object whose triangles begin at `first`; returns the extents of those that look inward.
+fn mark_closed(triangles: &mut [SceneTriangle], first: usize) -> Vec<Extent> {
+    // Corners number the pieces.
+    let number = |piece: u32| 3 * first as u32 + piece;
+    let triangles = &mut triangles[first..];
     let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
     let pieces = closed_pieces(&corners);
+    let rooms = rooms(&corners, &pieces);
     for (triangle, piece) in triangles.iter_mut().zip(&pieces) {
         triangle.closed = piece.is_some();
         triangle.two_sided &= piece.is_none();
+        let solid = piece.filter(|piece| rooms.binary_search_by_key(piece, |(room, _)| *room).is_err());
+        triangle.solid = solid.map(number);
     }
-    rooms(&corners, &pieces)
+    rooms.into_iter().map(|(_, extent)| extent).collect()
 }
 
 fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut Vec<String>) {

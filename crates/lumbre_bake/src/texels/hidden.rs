@@ -21,6 +21,8 @@ const PRESSED: f32 = 1.0 / 64.0;
 const PROBES: u32 = 6;
 const TILE_PROBES: u32 = 16;
 const JUDGES: u32 = 8;
+/// So many of those that judge have to see something: where faces touch, one may slip out along them.
+const CLEAR: u32 = 2;
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. `touched` are the
 /// places, in the row of all maps, of texels that something stands on.
@@ -95,7 +97,7 @@ enum Probe {
     Clear,
     /// Something at once.
     Pressed,
-    /// The inside of something, or a back.
+    /// The inside of something, or a back, or the outside of rooms that hold the whole scene.
     Hidden,
 }
 
@@ -104,8 +106,9 @@ fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
     let Some(point) = texel.point(scene, x, y) else { return Probe::Clear };
     let receiver = receiver(scene, &point);
     let direction = cosine_about(receiver.geometric_normal, u, v);
-    match scene.first_hit(receiver.origin, direction) {
+    match scene.telling_hit(receiver.origin, direction) {
         SurfaceHit::Inside | SurfaceHit::Back => Probe::Hidden,
+        SurfaceHit::None if scene.leaks.closed_scene => Probe::Hidden,
         SurfaceHit::Lit { distance, .. } if distance < pressed(scene, texel) => Probe::Pressed,
         SurfaceHit::Lit { .. } | SurfaceHit::None => Probe::Clear,
     }
@@ -158,8 +161,8 @@ fn judge(scene: &BakeScene, texel: &mut Texel) -> (usize, u64) {
     (usize::from(reduced), rays)
 }
 
-/// Half the rays see the inside of something closed, or all see backs or end at once: the point is hidden. With it come the rays cast:
-/// fewer where the others cannot change that.
+/// Half the rays see the inside of something closed or leave a scene that rooms close, or all but one see backs or end at once: the
+/// point is hidden. With it come the rays cast: fewer where the others cannot change that.
 fn in_the_open(
     scene: &BakeScene,
     point: &FootprintPoint,
@@ -171,17 +174,20 @@ fn in_the_open(
     let (mut inside, mut clear) = (0, 0);
     for ray in 0..JUDGES {
         let [u, v, ..] = sequence.point(index * JUDGES + ray, 0);
-        match scene.first_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
+        match scene.telling_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
             SurfaceHit::Inside => inside += 1,
             SurfaceHit::Back => {}
             SurfaceHit::Lit { distance, .. } => clear += u32::from(distance >= pressed),
-            SurfaceHit::None => clear += 1,
+            SurfaceHit::None => {
+                let outside = scene.leaks.closed_scene;
+                *if outside { &mut inside } else { &mut clear } += 1;
+            }
         }
         let cast = ray + 1;
         if 2 * inside >= JUDGES {
             return (false, cast);
         }
-        if 2 * (cast - inside) > JUDGES && clear > 0 {
+        if 2 * (cast - inside) > JUDGES && clear >= CLEAR {
             return (true, cast);
         }
     }

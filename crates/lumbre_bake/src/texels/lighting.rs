@@ -1,5 +1,5 @@
 //! Direct light of every covered texel, in two passes: a few shadow rays everywhere, many where the first pass, there or
-//! next to it, saw a source partly or differently. A penumbra's faint ends are found by their neighbours.
+//! next to it, saw a source partly or differently, unless it was exact. A penumbra's faint ends are found by their neighbours.
 
 use super::allocation::allot;
 use super::chunks::{in_chunks, in_chunks_in_time};
@@ -50,7 +50,7 @@ pub(crate) fn direct_light(
         direct[index as usize] = found;
     }
     let mut again = in_doubt(layout, texels, &direct);
-    again.retain(|&index| known(index).is_none());
+    again.retain(|&index| known(index).is_none() && direct[index as usize].sampled);
     watch.pass(PASS);
     let better = in_chunks_in_time(again.len(), watch, |place| light(again[place] as usize, many))?;
     replace(&mut direct, &again, better);

@@ -11,6 +11,7 @@ pub(crate) mod footprint;
 pub(crate) mod gather;
 pub(crate) mod hidden;
 pub(crate) mod late;
+mod light_ways;
 pub(crate) mod lighting;
 pub(crate) mod plane;
 pub(crate) mod resolution_error;

@@ -1,27 +1,38 @@
-//! What may stand between texels and emissive surfaces: found for tiles of texels, and narrowed down for each. Where it is little, direct
+//! What may stand between texels and what shines on them: found for tiles of texels, and narrowed down for each. Where it is little, direct
 //! light needs no shadow ray. Not the light: that is `direct`.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
-use super::footprint::{Texel, receiver};
+use super::footprint::{Footprint, Texel, receiver};
+use super::light_ways::ways;
 use super::tiles::{Tiles, area, positions_of};
 use crate::scene::BakeScene;
+use crate::transport::between::{BeforePart, Between};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::direct::Sources;
-use crate::transport::shaft::{Between, Shaft};
+use crate::transport::lit_part::{Shown, Way};
+use crate::transport::shaft::Shaft;
 
-/// What may stand between a tile and an emitter, by numbers.
+/// What may stand between a tile and the sources.
+#[derive(Default)]
 struct OfTile {
-    /// Of the emissive surfaces, by the sources' count.
+    parts: Vec<OfPart>,
+    /// By the lights' numbers.
+    lights: Vec<(u32, Way)>,
+}
+
+/// What may stand between a tile and a part of the emissive surfaces, by numbers.
+struct OfPart {
     part: u32,
     emitters: Vec<(u32, Vec<u32>)>,
 }
 
-/// What may stand between texels and emissive surfaces.
+/// What may stand between texels and the sources.
 pub(crate) struct Shafts<'a> {
     scene: &'a BakeScene,
     sources: &'a Sources<'a>,
-    tiles: Vec<Vec<OfTile>>,
+    tiles: Vec<OfTile>,
     /// The tile of each covered texel.
     tile_of: Vec<u32>,
 }
@@ -35,7 +46,7 @@ impl<'a> Shafts<'a> {
         wanted: impl Fn(u32) -> bool + Sync,
     ) -> Self {
         let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
-        if sources.emitters.is_empty() {
+        if sources.emitters.is_empty() && sources.lights.is_empty() {
             return shafts;
         }
         let Tiles { members, tile_of } = Tiles::new(texels);
@@ -45,7 +56,7 @@ impl<'a> Shafts<'a> {
             .par_iter()
             .map(|members| {
                 if !members.iter().any(|&place| wanted(place)) {
-                    return Vec::new();
+                    return OfTile::default();
                 }
                 let members = || members.iter().map(|&place| &texels[place as usize]);
                 shafts.of_tile(&tree, members).unwrap_or_default()
@@ -59,7 +70,7 @@ impl<'a> Shafts<'a> {
         &self,
         tree: &BoxTree,
         members: impl Fn() -> T,
-    ) -> Option<Vec<OfTile>> {
+    ) -> Option<OfTile> {
         let mut open = members().filter(|texel| !texel.is_hidden());
         let first = open.next()?;
         let mut positions = Vec::new();
@@ -71,21 +82,23 @@ impl<'a> Shafts<'a> {
             let mut found = Vec::new();
             for emitter in emitters {
                 if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {
-                    found.push((emitter, shaft.triangles(self.scene, tree)?));
+                    found.push((emitter, shaft.triangles(self.scene, tree, MOST_BLOCKERS)?));
                 }
             }
-            Some(OfTile { part, emitters: found })
+            Some(OfPart { part, emitters: found })
         };
-        Some(self.sources.parts(&anchor).into_iter().filter_map(part).collect())
+        let parts = self.sources.parts(&anchor).into_iter().filter_map(part).collect();
+        Some(OfTile { parts, lights: ways(self.sources, &area, tree) })
     }
 
-    /// What may stand between a texel, by its number, and those parts of the sources for which that is known.
-    pub fn between(&self, place: usize, texel: &Texel) -> Vec<Between> {
-        let Some(&tile) = self.tile_of.get(place) else { return Vec::new() };
+    /// What may stand between a texel, by its number, and those of the sources for which that is known.
+    pub fn between(&self, place: usize, texel: &Texel) -> Between<'_> {
+        let Some(&tile) = self.tile_of.get(place) else { return Between::UNKNOWN };
+        let tile = &self.tiles[tile as usize];
         let (mut own, mut positions) = (None, Vec::new());
-        let one = |of_tile: &OfTile| {
-            if of_tile.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
-                return Some(Between { part: of_tile.part, emitters: Vec::new() });
+        let one = |of_part: &OfPart| {
+            if of_part.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
+                return Some(BeforePart { part: of_part.part, emitters: Vec::new() });
             }
             if own.is_none() {
                 positions_of(self.scene, texel, &mut positions);
@@ -101,10 +114,26 @@ impl<'a> Shafts<'a> {
                 });
                 Some((*emitter, corners.collect()))
             };
-            let emitters: Vec<(u32, Vec<_>)> = of_tile.emitters.iter().filter_map(narrowed).collect();
+            let emitters: Vec<(u32, Vec<_>)> = of_part.emitters.iter().filter_map(narrowed).collect();
             let clear = emitters.iter().all(|(_, blockers)| blockers.is_empty());
-            Some(Between { part: of_tile.part, emitters: if clear { Vec::new() } else { emitters } })
+            Some(BeforePart { part: of_part.part, emitters: if clear { Vec::new() } else { emitters } })
         };
-        self.tiles[tile as usize].iter().filter_map(one).collect()
+        let parts = tile.parts.iter().filter_map(one).collect();
+        let in_shadow = tile.lights.iter().any(|(_, way)| matches!(way, Way::Shadows(..)));
+        Between { parts, lights: &tile.lights, shown: in_shadow.then(|| shown(self.scene, texel)) }
     }
 }
+
+/// What a texel on a plane shows of it.
+fn shown(scene: &BakeScene, texel: &Texel) -> Shown {
+    let mut positions = Vec::new();
+    positions_of(scene, texel, &mut positions);
+    let place = |position: &Vec3| position.as_dvec3();
+    match (&texel.footprint, &positions[..]) {
+        (Footprint::Whole(_), [a, b, d, c]) => Shown::Parallelogram([a, b, c, d].map(place)),
+        _ => Shown::Points(positions.iter().map(place).collect()),
+    }
+}
+
+/// Most triangles that may stand before an emitter: beyond, rays are quicker.
+const MOST_BLOCKERS: usize = 32;

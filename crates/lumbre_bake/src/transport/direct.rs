@@ -5,11 +5,12 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::between::{BeforePart, Between};
+use super::cut_out::Pieces;
 use super::emitter_tree::EmitterTree;
 use super::emitters::{Emitter, emitters, lamps};
-use super::shaft::Between;
 use super::share_variance::{share_variance, uneven_variance};
-use super::visible_part::{Pieces, visible_part};
+use super::visible_part::visible_part;
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -37,6 +38,8 @@ pub(crate) struct Direct {
     pub variance: f32,
     /// Rays cast.
     pub rays: u32,
+    /// Whether samples had a part in it: more would tell more.
+    pub sampled: bool,
     /// What of the sources was seen.
     pub seen: Seen,
 }
@@ -90,7 +93,7 @@ pub(super) fn group_of(sample: u32, samples: u32) -> usize {
 
 /// Exact unoccluded light at evenly spread points of a receiver, in pairs about its middle, so that what is left is of second order
 /// in its size.
-struct Unoccluded {
+pub(super) struct Unoccluded {
     sum: Vec3,
     least: f32,
     most: f32,
@@ -120,7 +123,7 @@ impl Unoccluded {
 
     /// The mean over a receiver, and its squared error: what differs by d of the mean within it leaves d² at second order, and a
     /// sixteenth of that for points four times as dense.
-    fn mean(light: impl Fn(f32, f32) -> Option<Vec3>) -> (Vec3, f32) {
+    pub fn mean(light: impl Fn(f32, f32) -> Option<Vec3>) -> (Vec3, f32) {
         let (mut found, mut count) = Self::at(FEW, &light);
         let mut dense = 1.0;
         if found.most - found.least > UNEVEN * found.most {
@@ -190,14 +193,14 @@ impl<'a> Sources<'a> {
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
     ) -> Direct {
-        self.irradiance_past(&[], sequence, samples, point)
+        self.irradiance_past(&Between::UNKNOWN, sequence, samples, point)
     }
 
-    /// As [`irradiance`](Self::irradiance), without shadow rays to the parts for which it is known what may stand `between`: those are as
+    /// As [`irradiance`](Self::irradiance), without shadow rays to the sources for which it is known what may stand `between`: those are as
     /// exact as the receiver's points.
     pub fn irradiance_past(
         &self,
-        between: &[Between],
+        between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -207,7 +210,7 @@ impl<'a> Sources<'a> {
             let light = self.emitted(between, sequence, samples, point, &mut direct);
             direct.baked += light;
         }
-        self.punctual(sequence, samples, point, &mut direct);
+        self.punctual(between, sequence, samples, point, &mut direct);
         direct
     }
 
@@ -215,7 +218,7 @@ impl<'a> Sources<'a> {
     /// full light and in full shadow of each, and in between its error is that of the share alone.
     fn emitted(
         &self,
-        between: &[Between],
+        between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -236,11 +239,12 @@ impl<'a> Sources<'a> {
                 })
             };
             let known =
-                between.iter().find(|between| between.part == group).and_then(|between| {
-                    match between.emitters.is_empty() {
-                        true => Some(unoccluded()),
-                        false => self.seen_past(between, sequence, (own, set), point, direct),
-                    }
+                between.parts.iter().find(|between| between.part == group).and_then(|between| match between
+                    .emitters
+                    .is_empty()
+                {
+                    true => Some(unoccluded()),
+                    false => self.seen_past(between, sequence, (own, set), point, direct),
                 });
             if let Some((light, variance)) = known {
                 irradiance += light;
@@ -267,7 +271,7 @@ impl<'a> Sources<'a> {
     /// `None` if some point sees it in too many pieces.
     fn seen_past(
         &self,
-        between: &Between,
+        between: &BeforePart,
         sequence: Sequence,
         (samples, set): (u32, u32),
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -277,7 +281,7 @@ impl<'a> Sources<'a> {
         let (mut sums, mut counts) = ([Vec3::ZERO; GROUPS], [0u32; GROUPS]);
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut seen, mut hidden) = (0, 0);
-        let mut room = Pieces::NONE;
+        let mut room = Pieces::new();
         for sample in 0..points {
             let [x, y, ..] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
@@ -298,6 +302,7 @@ impl<'a> Sources<'a> {
             counts[group] += 1;
         }
         direct.seen.add(between.part, seen, hidden);
+        direct.sampled = true;
         let count = counts.iter().sum::<u32>();
         if count == 0 {
             return Some((Vec3::ZERO, 0.0));
@@ -357,6 +362,7 @@ impl<'a> Sources<'a> {
             }
         }
         direct.rays += visible + hidden;
+        direct.sampled = true;
         direct.seen.add(group, visible, hidden);
         let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
         let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));

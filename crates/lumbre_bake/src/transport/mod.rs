@@ -1,12 +1,15 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
+mod arriving;
+pub(crate) mod between;
 pub(crate) mod box_tree;
 mod coarser;
 pub(crate) mod components;
 pub(crate) mod contacts;
 mod contour;
 mod cosine_rays;
+pub(crate) mod cut_out;
 pub(crate) mod cuts;
 pub(crate) mod direct;
 pub(crate) mod emitter_tree;
@@ -21,6 +24,7 @@ mod global_lines;
 pub(crate) mod guide;
 #[cfg(test)]
 mod lambert_integral;
+pub(crate) mod lit_part;
 pub(crate) mod method_study;
 mod near_pairs;
 #[cfg(test)]

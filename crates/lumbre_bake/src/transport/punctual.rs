@@ -1,11 +1,15 @@
-//! Direct light of point, spot and directional lights by shadow rays. A light with a size is a sphere, or a disc on the sky,
-//! of one radiance; its law of distance and its cone are those of its centre. Not emissive surfaces: those are `direct`.
+//! Direct light of point, spot and directional lights, by shadow rays where it is not known what stands between. A light with a size is a
+//! sphere, or a disc on the sky, of one radiance; its law of distance and its cone are those of its centre. Not emissive surfaces: those are
+//! `direct`.
 
-use std::f64::consts::PI;
+use glam::{DVec3, Vec3};
+use lumbre_optics::{BakeMode, LightKind, evaluate_light};
 
-use lumbre_optics::{BakeMode, Light, LightKind, evaluate_light};
-
-use super::direct::{Direct, GROUPS, Receiver, Sources, allotted, group_of, variance_of_mean};
+use super::arriving::{Arriving, arriving, attenuation, of_center};
+use super::between::Between;
+use super::cut_out::{GAP, Pieces};
+use super::direct::{Direct, GROUPS, Receiver, Sources, Unoccluded, allotted, group_of, variance_of_mean};
+use super::lit_part::{Shown, Way};
 use super::share_variance::share_variance;
 use crate::sampling::{Sequence, cosine_direction, frame};
 use crate::scene::{BakeScene, PlacedLight};
@@ -77,64 +81,131 @@ impl Sum {
 
 impl Sources<'_> {
     /// Adds the light of all punctual lights to `direct`: mean over a receiver, by about `samples` shadow rays to each of the
-    /// brightest and as many to the others together.
+    /// brightest and as many to the others together; by none to those for which it is known what may stand `between`.
     pub(super) fn punctual(
         &self,
+        between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) {
-        if self.lights.len() <= OWN {
-            for index in 0..self.lights.len() {
-                self.one(index, sequence, samples, point, direct);
+        if self.has_few_lights() {
+            for index in 0..self.lights.len() as u32 {
+                self.one(index, between, sequence, samples, point, direct);
             }
             return;
         }
-        let Some(mut lights) = self.brightness(point) else { return };
-        if lights.len() > OWN {
-            lights.select_nth_unstable_by(OWN, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        }
-        let others = lights.split_off(OWN.min(lights.len()));
+        let Some(lights) = self.brightness(point) else { return };
+        let (lights, others) = brightest(lights);
         let most = lights.iter().map(|(_, weight)| *weight).fold(f32::MIN_POSITIVE, f32::max);
-        lights.sort_unstable_by_key(|(index, _)| *index);
         for (index, weight) in lights {
-            self.one(index as usize, sequence, allotted(samples, weight / most), point, direct);
+            self.one(index, between, sequence, allotted(samples, weight / most), point, direct);
         }
         self.others(others, sequence, samples, point, direct);
     }
 
+    /// Whether every light has samples of its own.
+    pub fn has_few_lights(&self) -> bool {
+        self.lights.len() <= OWN
+    }
+
+    /// The lights that may reach a receiver, by ascending numbers; of many those that may bring it the most.
+    pub fn brightest_lights(&self, point: &impl Fn(f32, f32) -> Option<Receiver>) -> Vec<u32> {
+        let lights = self.brightness(point).unwrap_or_default();
+        brightest(lights).0.into_iter().map(|(index, _)| index).collect()
+    }
+
     fn one(
         &self,
-        index: usize,
+        index: u32,
+        between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) {
-        let light = &self.lights[index];
-        let mut sum = Sum::default();
-        let sequence = sequence.of(1 + index as u32);
-        let sized = light.light.radius.max(light.light.angle) > 0.0;
-        for sample in 0..samples {
-            let [a, b, c, d] = sequence.point(sample, 0);
-            let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
-            let Some(receiver) = point(x, y) else { continue };
-            if let Some(part) = part(self.scene, light, &receiver, u, v) {
-                sum.add(&part, group_of(sample, samples));
+        let placed = &self.lights[index as usize];
+        let way = between.way(index);
+        let sized = placed.light.radius.max(placed.light.angle) > 0.0;
+        let (mean, variance) = match way {
+            Some(Way::Hidden) => {
+                direct.seen.add(FIRST_ID + index, 0, 1);
+                return;
             }
-        }
-        direct.rays += sum.visible + sum.hidden;
-        direct.seen.add(FIRST_ID + index as u32, sum.visible, sum.hidden);
-        let (mean, variance) = sum.mean(samples);
-        let color = light.light.diffuse;
-        match light.light.bake {
+            Some(way) if !sized => self.past_shadows(index, way, between, point, direct),
+            _ => self.sampled(index, way.is_some(), sequence, samples, point, direct),
+        };
+        let color = placed.light.diffuse;
+        match placed.light.bake {
             BakeMode::Static => {
                 direct.baked += color * mean;
                 direct.variance += (color.element_sum() / 3.0).powi(2) * variance;
             }
             BakeMode::Mixed | BakeMode::Dynamic => direct.mixed += color * mean,
         }
+    }
+
+    /// Mean irradiance of a light per unit of its colour, and its variance, by samples; by no rays if nothing stands between.
+    fn sampled(
+        &self,
+        index: u32,
+        clear: bool,
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) -> (f32, f32) {
+        let light = &self.lights[index as usize];
+        let mut sum = Sum::default();
+        let sequence = sequence.of(1 + index);
+        let sized = light.light.radius.max(light.light.angle) > 0.0;
+        for sample in 0..samples {
+            let [a, b, c, d] = sequence.point(sample, 0);
+            let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
+            let Some(receiver) = point(x, y) else { continue };
+            if let Some(part) = part(self.scene, light, &receiver, (u, v), clear) {
+                sum.add(&part, group_of(sample, samples));
+            }
+        }
+        direct.rays += if clear { 0 } else { sum.visible + sum.hidden };
+        direct.sampled |= !clear || sum.sets;
+        direct.seen.add(FIRST_ID + index, sum.visible, sum.hidden);
+        sum.mean(samples)
+    }
+
+    /// The same for a light without size, exactly but for what differs within a lit piece of the receiver.
+    fn past_shadows(
+        &self,
+        index: u32,
+        way: &Way,
+        between: &Between<'_>,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+        direct: &mut Direct,
+    ) -> (f32, f32) {
+        let light = &self.lights[index as usize];
+        let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
+        let (open, variance) =
+            Unoccluded::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
+        let (Way::Shadows(origin, shadows), Some(shown)) = (way, &between.shown) else {
+            direct.seen.add(FIRST_ID + index, 1, 0);
+            return (open.x, variance);
+        };
+        let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
+        let (mut sum, mut lit, mut room) = (0.0, 0.0, Pieces::new());
+        origin.lit(shown, shadows, &mut room, |place: DVec3, share| {
+            sum += share * f64::from(arriving(&Receiver { position: place.as_vec3(), ..middle }));
+            lit += share;
+        });
+        let (hidden, lit) = (u32::from(lit < 1.0 - GAP), (lit as f32).min(1.0));
+        direct.seen.add(FIRST_ID + index, u32::from(lit > 0.0), hidden);
+        // Pieces have one point each, all of the receiver several.
+        let whole = arriving(&middle);
+        let mean = match shown {
+            Shown::Parallelogram(_) if whole > 0.0 => open.x * (sum / f64::from(whole)) as f32,
+            _ => sum as f32,
+        };
+        (mean, variance * lit * lit)
     }
 
     /// Lights with their weights, each sample to one of them.
@@ -170,7 +241,7 @@ impl Sources<'_> {
             let probability = (ends[at] - start).max(f32::MIN_POSITIVE);
             let u = ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON);
             let light = &self.lights[lights[at].0 as usize];
-            let Some(part) = part(self.scene, light, &receiver, u, v) else { continue };
+            let Some(part) = part(self.scene, light, &receiver, (u, v), false) else { continue };
             if !part.visible {
                 hidden += 1;
                 continue;
@@ -186,6 +257,7 @@ impl Sources<'_> {
             }
         }
         direct.rays += visible + hidden;
+        direct.sampled = true;
         // Which lights these are differs from receiver to receiver: only a part tells of a shadow.
         direct.seen.add(FIRST_ID - 1, visible, hidden);
         direct.variance += variance_of_mean(groups.map(|sum| sum * per_sample * GROUPS as f32));
@@ -228,37 +300,32 @@ impl Sources<'_> {
     }
 }
 
-/// A light's factor at a distance in metres, without the floor that a frame sets at a centimetre: a model of a few centimetres has the
-/// light of one of metres. At the light itself the floor counts.
-fn attenuation(light: &Light, distance: f64) -> f64 {
-    let law = &light.attenuation;
-    let [constant, linear, quadratic] = law.coefficients().as_dvec3().to_array();
-    let factor = 1.0 / (constant + (linear + quadratic * distance) * distance);
-    if !(factor > 0.0 && factor.is_finite() && law.range > 0.0) {
-        return law.factor(distance);
+/// Those of which each has samples of its own, by number, and the others.
+fn brightest(mut lights: Vec<(u32, f32)>) -> (Vec<(u32, f32)>, Vec<(u32, f32)>) {
+    if lights.len() > OWN {
+        lights.select_nth_unstable_by(OWN, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     }
-    let window = (1.0 - (distance / f64::from(law.range)).min(1.0).powi(4)).max(0.0);
-    window * if law.clamp { factor.min(1.0) } else { factor }
+    let others = lights.split_off(OWN.min(lights.len()));
+    lights.sort_unstable_by_key(|(index, _)| *index);
+    (lights, others)
 }
 
 /// What a point of a receiver gets of a light whose disc is sampled at (u, v) of the unit square; `None` where it gets nothing
-/// whatever lies between.
+/// whatever lies between. If all is `clear`, nothing does.
 ///
 /// The disc is that of directions within the sphere's silhouette, sin θ = radius / distance, sampled evenly in its projection onto
 /// the plane across the axis to its centre. With ω the direction, E = strength · ⟨V n·ω / a·ω⟩: a sphere of one radiance gives
 /// exactly n·a where it is whole above the horizon, as a point does.
-fn part(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver, u: f32, v: f32) -> Option<Part> {
+fn part(
+    scene: &BakeScene,
+    placed: &PlacedLight,
+    receiver: &Receiver,
+    (u, v): (f32, f32),
+    clear: bool,
+) -> Option<Part> {
     let light = &placed.light;
-    let position = scene.space.world(receiver.position);
-    let arriving = evaluate_light(light, placed.position, placed.axis, position);
+    let Arriving { axis, distance, strength } = arriving(scene, placed, receiver.position)?;
     let directional = light.kind == LightKind::Directional;
-    let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
-    let weakened = if directional { arriving.attenuation } else { attenuation(light, distance) };
-    let strength = PI * weakened * arriving.spot;
-    if strength <= 0.0 {
-        return None;
-    }
-    let axis = arriving.direction;
     let sine =
         if directional { (0.5 * f64::from(light.angle)).sin() } else { f64::from(light.radius) / distance };
     let sine = if sine > 0.0 { sine.min(LARGEST_SINE) } else { 0.0 };
@@ -286,13 +353,16 @@ fn part(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver, u: f32, v:
     if weight <= 0.0 || direction.dot(facet) <= 0.0 {
         return Some(Part { center, disc: disc.min(0.0), visible: false });
     }
-    let blocked = if directional {
+    let blocked = if clear {
+        false
+    } else if directional {
         scene.blocked_towards(receiver.origin, direction.as_vec3())
     } else {
         // Up to where the sphere begins: what is inside it, its bulb, hides nothing.
         let across = direction.cross(axis).length() * distance;
         let depth = (f64::from(light.radius).powi(2) - across * across).max(0.0).sqrt();
         let reach = (distance * direction.dot(axis) - depth).max(0.0);
+        let position = scene.space.world(receiver.position);
         let target = if sine > 0.0 { position + direction * reach } else { placed.position };
         scene.blocked(receiver.origin, scene.space.position(target))
     };

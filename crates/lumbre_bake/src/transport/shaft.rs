@@ -1,11 +1,12 @@
-//! What may stand between a flat piece of surface and an emitter: the triangles that reach into the convex hull of both (Haines and
+//! What may stand between a flat piece of surface and what shines on it: the triangles that reach into the convex hull of both (Haines and
 //! Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991). Where none does, no shadow ray is needed. What is named may still
-//! stand beside; what is not named does not matter. Not how much of the emitter they hide: that is `visible_part`.
+//! stand beside; what is not named does not matter. Not how much they hide: that is `visible_part` and `lit_part`.
 
 use glam::DVec3;
 
 use super::box_tree::BoxTree;
 use super::emitters::Emitter;
+use crate::sampling::frame;
 use crate::scene::BakeScene;
 
 /// A parallelogram that holds a flat piece of surface.
@@ -27,22 +28,12 @@ pub(crate) fn contact(normal: DVec3, extent: f64) -> f64 {
     CONTACT * extent * normal.abs().element_sum()
 }
 
-/// The triangles that may stand between a receiver and the emitters of one part of the sources: no others do.
-pub(crate) struct Between {
-    pub part: u32,
-    /// Those that shine on it; none where nothing stands before any of them.
-    pub emitters: Vec<(u32, Vec<Corners>)>,
-}
-
 /// A half-space: what has `normal · point` above `height` is outside.
 #[derive(Clone, Copy, Debug)]
 struct Plane {
     normal: DVec3,
     height: f64,
 }
-
-/// Most facets of the hull of four points and three: every edge of one with every corner of the other, and both planes.
-const MOST_PLANES: usize = 26;
 
 /// Whether no triangle of a scene reaches into the space before an area, as high as the area is wide, or into as much beside it: what is
 /// inside something there, or outside, is so all over.
@@ -82,56 +73,109 @@ pub(crate) fn is_free_before(area: &Area, scene: &BakeScene, tree: &BoxTree) -> 
     })
 }
 
-/// The convex hull of an area and an emitter.
+/// The convex hull of an area and what shines on it.
 pub(crate) struct Shaft {
-    points: [DVec3; 7],
-    planes: [Plane; MOST_PLANES],
-    count: usize,
-    /// Largest absolute coordinate.
+    points: Vec<DVec3>,
+    planes: Vec<Plane>,
+    /// Largest absolute coordinate of what has a place.
     extent: f64,
 }
+
+/// Coordinates of a scene are below this; and longer than any way through it.
+const LARGEST: f64 = 2.25;
+const FAR: f64 = 16.0;
+/// The widest half angle of a light in the sky that shafts lead to, radians.
+pub(crate) const WIDEST: f64 = 0.5;
+/// What is around a round thing is so much larger, for what rounds.
+const ROOM: f64 = 1.001;
+
+/// Edges of the cube whose corner i has its signs in the bits of i.
+const CUBE_EDGES: [[usize; 2]; 12] =
+    [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 impl Shaft {
     /// `None` where the emitter is wholly behind the area, or the area behind it: no light passes.
     pub fn new(area: &Area, emitter: &Emitter) -> Option<Self> {
-        let [a, b, c, d] = area.corners;
         let [p, q, r] = emitter.corners_f64;
-        let points = [a, b, c, d, p, q, r];
-        let extent = points.iter().map(|point| point.abs().max_element()).fold(0.0, f64::max);
-        let mut shaft = Self {
-            points,
-            planes: [Plane { normal: DVec3::ZERO, height: 0.0 }; MOST_PLANES],
-            count: 0,
-            extent,
-        };
+        let mut shaft = Self::before(area, &[p, q, r]);
         let shines = emitter.normal.as_dvec3();
-        let receives =
-            [p, q, r].iter().any(|&point| (point - a).dot(area.normal) > shaft.slack(area.normal, extent));
-        let lit = area.corners.iter().any(|&point| (point - p).dot(shines) > shaft.slack(shines, extent));
-        if !receives || !lit {
+        let slack = shaft.slack(shines, shaft.extent);
+        let lit = area.corners.iter().any(|&point| (point - p).dot(shines) > slack);
+        if !lit || !shaft.is_reached(area) {
             return None;
         }
         // Light leaves the one and arrives at the other by their fronts alone.
-        let lowest = area.corners.iter().map(|corner| -corner.dot(area.normal)).fold(f64::MIN, f64::max);
-        shaft.push(-area.normal, lowest);
         let lowest = [p, q, r].iter().map(|corner| -corner.dot(shines)).fold(f64::MIN, f64::max);
-        shaft.push(-shines, lowest);
-        for (edges, others) in [(&points[..4], &points[4..]), (&points[4..], &points[..4])] {
-            for (place, &from) in edges.iter().enumerate() {
-                let along = edges[(place + 1) % edges.len()] - from;
-                for &other in others {
-                    let Some(normal) = along.cross(other - from).try_normalize() else { continue };
-                    shaft.push_facet(normal, normal.dot(from));
-                }
-            }
-        }
+        shaft.planes.push(Plane { normal: -shines, height: lowest });
+        shaft.close(&[[0, 1], [1, 2], [2, 0]]);
         Some(shaft)
     }
 
-    fn push(&mut self, normal: DVec3, height: f64) {
-        if let Some(plane) = self.planes.get_mut(self.count) {
-            *plane = Plane { normal, height };
-            self.count += 1;
+    /// To a point; `None` if that is behind the area.
+    pub fn to_point(area: &Area, point: DVec3) -> Option<Self> {
+        Self::before(area, &[point]).closed_if_reached(area, &[])
+    }
+
+    /// To all of a ball, and to a little beside it; `None` if it is wholly behind the area.
+    pub fn to_ball(area: &Area, center: DVec3, radius: f64) -> Option<Self> {
+        let sign = |corner: usize, axis: usize| ROOM * if corner >> axis & 1 == 1 { radius } else { -radius };
+        let corner = |corner: usize| center + DVec3::from([0, 1, 2].map(|axis| sign(corner, axis)));
+        let corners: [DVec3; 8] = std::array::from_fn(corner);
+        Self::before(area, &corners).closed_if_reached(area, &CUBE_EDGES)
+    }
+
+    /// As far as a scene goes in a direction; `None` if that leads behind the area.
+    pub fn towards(area: &Area, direction: DVec3) -> Option<Self> {
+        let ends = area.corners.map(|corner| corner + direction * FAR);
+        Self::before(area, &ends).closed_if_reached(area, &[])
+    }
+
+    /// In all directions of a cone, by half its angle, at most [`WIDEST`], and a little beside it; `None` if all of them lead behind the area.
+    pub fn in_cone(area: &Area, direction: DVec3, half_angle: f64) -> Option<Self> {
+        let [x, y] = frame(direction.as_vec3()).map(|side| side.as_dvec3() * half_angle.tan() * ROOM);
+        let ways = [x + y, y - x, -x - y, x - y].map(|side| (direction + side) * FAR);
+        let ends: Vec<DVec3> = area.corners.iter().flat_map(|&corner| ways.map(|way| corner + way)).collect();
+        let edges: Vec<[usize; 2]> =
+            (0..16).map(|end| [end, if end % 4 == 3 { end - 3 } else { end + 1 }]).collect();
+        Self::before(area, &ends).closed_if_reached(area, &edges)
+    }
+
+    /// Open but for the area's own side.
+    fn before(area: &Area, ends: &[DVec3]) -> Self {
+        let points: Vec<DVec3> = area.corners.iter().chain(ends).copied().collect();
+        let extent = |points: &[DVec3]| points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        // What ends far away has no place there that could be rounded.
+        let extent = extent(&points).min(extent(&area.corners).max(LARGEST));
+        let lowest = area.corners.iter().map(|corner| -corner.dot(area.normal)).fold(f64::MIN, f64::max);
+        let mut planes = Vec::with_capacity(1 + 4 * ends.len());
+        planes.push(Plane { normal: -area.normal, height: lowest });
+        Self { points, planes, extent }
+    }
+
+    /// Whether something of the ends is before the area.
+    fn is_reached(&self, area: &Area) -> bool {
+        let slack = self.slack(area.normal, self.extent);
+        self.points[4..].iter().any(|&point| (point - area.corners[0]).dot(area.normal) > slack)
+    }
+
+    fn closed_if_reached(mut self, area: &Area, edges: &[[usize; 2]]) -> Option<Self> {
+        if !self.is_reached(area) {
+            return None;
+        }
+        self.close(edges);
+        Some(self)
+    }
+
+    /// Planes through every edge of the area and every end, and through every edge between ends and every corner of the area.
+    fn close(&mut self, edges: &[[usize; 2]]) {
+        let own = [[0, 1], [1, 2], [2, 3], [3, 0]].map(|edge| (edge, 4..self.points.len()));
+        let far = edges.iter().map(|edge| (edge.map(|end| end + 4), 0..4));
+        for ([from, to], others) in own.into_iter().chain(far) {
+            let (from, along) = (self.points[from], self.points[to] - self.points[from]);
+            for other in others {
+                let Some(normal) = along.cross(self.points[other] - from).try_normalize() else { continue };
+                self.push_facet(normal, normal.dot(from));
+            }
         }
     }
 
@@ -144,9 +188,9 @@ impl Shaft {
             (above, below) = (above.max(own), below.min(own));
         }
         if above <= height + slack {
-            self.push(normal, above);
+            self.planes.push(Plane { normal, height: above });
         } else if below >= height - slack {
-            self.push(-normal, -below);
+            self.planes.push(Plane { normal: -normal, height: -below });
         }
     }
 
@@ -156,7 +200,7 @@ impl Shaft {
 
     /// Whether a triangle, whose largest absolute coordinate is `extent`, may reach into it.
     pub fn may_meet(&self, corners: &Corners, extent: f64) -> bool {
-        for plane in &self.planes[..self.count] {
+        for plane in &self.planes {
             let inner = plane.height - self.slack(plane.normal, extent);
             if corners.iter().all(|corner| plane.normal.dot(*corner) >= inner) {
                 return false;
@@ -175,7 +219,7 @@ impl Shaft {
     }
 
     /// The triangles of a scene that may reach into it, if they are few and stop all light.
-    pub fn triangles(&self, scene: &BakeScene, tree: &BoxTree) -> Option<Vec<u32>> {
+    pub fn triangles(&self, scene: &BakeScene, tree: &BoxTree, most: usize) -> Option<Vec<u32>> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for point in &self.points {
             (low, high) = (low.min(*point), high.max(*point));
@@ -187,7 +231,7 @@ impl Shaft {
             if self.may_meet(&triangle.corners.map(|corner| corner.as_dvec3()), f64::from(triangle.extent)) {
                 found.push(index);
             }
-            looked_at <= MOST_LOOKED_AT && found.len() <= MOST_BLOCKERS
+            looked_at <= MOST_LOOKED_AT && found.len() <= most
         });
         let solid =
             |&index: &u32| !scene.surfaces[scene.triangles[index as usize].surface as usize].is_masked();
@@ -197,7 +241,6 @@ impl Shaft {
 
 /// Most triangles that are looked at for one shaft, and that may stand in it: beyond, rays are quicker.
 const MOST_LOOKED_AT: usize = 512;
-const MOST_BLOCKERS: usize = 32;
 
 #[cfg(test)]
 #[path = "shaft_tests.rs"]

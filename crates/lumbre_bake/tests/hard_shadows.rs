@@ -1,0 +1,134 @@
+//! Shadows of lights without size, in closed form: what a lit map holds in all is what the light sends to where nothing stands before it.
+//! The texels that a shadow's edge crosses have their part, and so the sum is as exact as they are.
+
+use std::f64::consts::FRAC_1_PI;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec2, Vec3};
+use lumbre_bake::{BakeOptions, Density, bake};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
+
+fn black() -> Material {
+    Material {
+        front: Surface { diffuse: Vec3::ZERO, ..Surface::default() },
+        double_sided: true,
+        ..Material::default()
+    }
+}
+
+/// A horizontal square that looks up and fills its map to the edge.
+fn square(half: f32, at: Vec3) -> Mesh {
+    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+    Mesh(Arc::new(TriangleMesh {
+        positions: corners.map(|[x, z]| at + Vec3::new(x, 0.0, z) * half).to_vec(),
+        uv1: corners.map(|[x, z]| Vec2::new(x, z) * 0.5 + 0.5).to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..TriangleMesh::default()
+    }))
+}
+
+/// A floor of two by two metres about the origin.
+fn floor(world: &mut World) -> Entity {
+    world.spawn((square(1.0, Vec3::ZERO), black(), StaticObject)).id()
+}
+
+/// Mean irradiance of a baked floor of 32 by 32 texels, W/m².
+fn mean(world: &mut World, floor: Entity) -> f64 {
+    mean_of(world, floor, 32)
+}
+
+/// Of so many texels along a side.
+fn mean_of(world: &mut World, floor: Entity, side: u32) -> f64 {
+    let options = BakeOptions { density: Density::MapSize(side), ..BakeOptions::default() };
+    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    let map = &world.get::<Lightmap>(floor).expect("it was baked").image;
+    let texels = map.texels.iter().map(|texel| f64::from(texel.y));
+    texels.sum::<f64>() / (f64::from(map.width) * f64::from(map.height)) / FRAC_1_PI
+}
+
+/// A light of intensity 1 W/sr, or that brings 1 W/m² to what faces it.
+fn unit(light: fn(Vec3) -> Light) -> Light {
+    Light { bake: BakeMode::Static, ..light(Vec3::splat(FRAC_1_PI as f32)) }
+}
+
+/// Solid angle of a rectangle from a point at `height` over one of its corners.
+fn of_corner(x: f64, z: f64, height: f64) -> f64 {
+    (x * z / (height * (x * x + z * z + height * height).sqrt())).atan()
+}
+
+/// Of a square with this half side about (x, z), seen from that height over the origin.
+fn solid_angle(half: f64, [x, z]: [f64; 2], height: f64) -> f64 {
+    let [x0, x1, z0, z1] = [x - half, x + half, z - half, z + half];
+    let corner = |x, z| of_corner(x, z, height);
+    corner(x1, z1) - corner(x0, z1) - corner(x1, z0) + corner(x0, z0)
+}
+
+#[test]
+fn a_point_light_sends_what_its_solid_angle_leaves() {
+    for height in [1.0, 1.5] {
+        let mut world = World::new();
+        let floor = floor(&mut world);
+        world.spawn((unit(Light::point), Transform::from_xyz(0.0, height, 0.0)));
+        let open = mean(&mut world, floor);
+        // The floor is four square metres. Texels of 1/16 m, each by four points: of second order, (1/16)²/24 of E's curvature, which is
+        // -6 E at most, and of either sign.
+        let whole = solid_angle(1.0, [0.0; 2], height) / 4.0;
+        assert!((open / whole - 1.0).abs() < 2e-4, "{height}: {open} {whole}");
+        let plates = [[0.21, -0.13], [-0.34, 0.3], [-0.05, 0.42]];
+        let mut hidden = 0.0;
+        for [x, z] in plates {
+            world.spawn((square(0.11, Vec3::new(x as f32, 0.4, z as f32)), black(), StaticObject));
+            hidden += solid_angle(0.11, [x, z], height - 0.4) / 4.0;
+        }
+        let found = mean(&mut world, floor);
+        println!("{height}: {open:.6} of {whole:.6}; {found:.6} of {:.6}", whole - hidden);
+        assert!((open - found - hidden).abs() < 2e-4 * whole, "{height}: {} {hidden}", open - found);
+    }
+}
+
+#[test]
+fn a_light_in_the_sky_leaves_the_area_of_what_it_meets() {
+    let mut world = World::new();
+    let floor = floor(&mut world);
+    let sun = Transform::from_xyz(0.4, 1.0, 0.3).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((unit(Light::directional), sun));
+    let cosine = DVec3::new(0.4, 1.0, 0.3).normalize().y;
+    let open = mean(&mut world, floor);
+    assert!((open / cosine - 1.0).abs() < 1e-6, "{open} {cosine}");
+    // Shadows of plates that lie level are as large as they are.
+    let halves = [0.2f32, 0.07, 0.13];
+    for (half, [x, z]) in halves.into_iter().zip([[0.21, -0.13], [-0.34, 0.3], [-0.05, 0.62]]) {
+        world.spawn((square(half, Vec3::new(x, 0.37, z)), black(), StaticObject));
+    }
+    let hidden: f64 = halves.iter().map(|half| f64::from(half * half)).sum();
+    let found = mean(&mut world, floor);
+    println!("{found:.7} of {:.7}", cosine * (1.0 - hidden));
+    assert!((found / (cosine * (1.0 - hidden)) - 1.0).abs() < 2e-4, "{found}");
+}
+
+#[test]
+fn plates_are_cut_out_and_where_they_are_too_many_left_to_rays() {
+    let mut world = World::new();
+    let floor = floor(&mut world);
+    world.spawn((unit(Light::point), Transform::from_xyz(0.0, 1.2, 0.0)));
+    let mut expected = solid_angle(1.0, [0.0; 2], 1.2) / 4.0;
+    // Shadows are twice as large: of 24 by 24 plates, 1152 triangles, none lies beside another or off the floor.
+    for place in 0..24 * 24 {
+        let [x, z] = [place % 24, place / 24].map(|cell| (f64::from(cell) - 11.5) * 0.041);
+        world.spawn((square(0.012, Vec3::new(x as f32, 0.6, z as f32)), black(), StaticObject));
+        expected -= solid_angle(0.012, [x, z], 0.6) / 4.0;
+    }
+    // A tile is of 8 by 8 texels: of 1/16 m it has the shadows of 36 plates, of 1/8 m those of 144.
+    for side in [32, 16] {
+        let found = mean_of(&mut world, floor, side);
+        println!("{side}: {found:.6} of {expected:.6}");
+        // Every texel has plates' edges in it: 64 rays of each leave some 3 % of it, by 256 texels 2e-3, two sigma and a half; texels on the
+        // diagonal are points, and two triangles share the floor.
+        assert!((found / expected - 1.0).abs() < 5e-3, "{side}: {found} {expected}");
+    }
+}
