@@ -300,8 +300,11 @@ impl Sources<'_> {
     }
 }
 
+/// Lights by their numbers, with about what they bring.
+type Weighted = Vec<(u32, f32)>;
+
 /// Those of which each has samples of its own, by number, and the others.
-fn brightest(mut lights: Vec<(u32, f32)>) -> (Vec<(u32, f32)>, Vec<(u32, f32)>) {
+fn brightest(mut lights: Weighted) -> (Weighted, Weighted) {
     if lights.len() > OWN {
         lights.select_nth_unstable_by(OWN, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     }
