@@ -10,6 +10,7 @@ pub(crate) mod fill;
 pub(crate) mod footprint;
 pub(crate) mod gather;
 pub(crate) mod hidden;
+pub(crate) mod lanes;
 pub(crate) mod late;
 mod light_ways;
 pub(crate) mod lighting;

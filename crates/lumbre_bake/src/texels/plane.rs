@@ -1,82 +1,91 @@
-//! Weighted planes through the values of a neighbourhood, one for each half of the scrambles. Not the weights.
+//! Weighted planes through the values of a neighbourhood, one for each half of the scrambles, of eight texels at once. Not the weights.
 
-use glam::{Mat2, Vec2, Vec3, Vec4, Vec4Swizzles};
+use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::gather::SCRAMBLES;
 
 /// Scrambles of one half: the values of one plane.
 pub(crate) const HALF: usize = SCRAMBLES / 2;
-
-/// The values of both halves at a texel, with a 1 behind each: their sums count the weights by the way.
-pub(crate) type Values = [Vec4; SCRAMBLES];
+/// Numbers of a texel: the channels of all scrambles; and of a half.
+pub(crate) const VALUES: usize = 3 * SCRAMBLES;
+pub(crate) const OF_HALF: usize = 3 * HALF;
 
 /// Weighted sums over neighbours in one row.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Row {
+#[derive(Clone, Copy)]
+pub(crate) struct Row<S: Simd> {
     /// Of the values, and of those times x.
-    sums: [Values; 2],
-    /// Of x², of each half.
-    squares: Vec4,
-}
-
-impl Row {
-    /// Some eighty values of about one size: single precision keeps six digits of them. `weights` are those of the halves.
-    #[inline(always)]
-    pub fn add(&mut self, x: f32, weights: Vec4, values: &Values) {
-        let [sums, with_x] = &mut self.sums;
-        self.squares += weights * (x * x);
-        let weights = [weights.xxxx(), weights.yyyy()];
-        for (place, value) in values.iter().enumerate() {
-            let term = *value * weights[place / HALF];
-            sums[place] += term;
-            with_x[place] += term * x;
-        }
-    }
+    pub sums: [[f32x8<S>; VALUES]; 2],
+    /// Of 1, x and x², of each half.
+    pub weights: [[f32x8<S>; 2]; 3],
 }
 
 /// Weighted sums of planes a + b x + c y through the values of each half.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Planes {
+pub(crate) struct Planes<S: Simd> {
     /// Of the values, and of those times x and y.
-    sums: [Values; 3],
-    /// Of x², x y, y²: of each half.
-    squares: [Vec4; 3],
+    sums: [[f32x8<S>; VALUES]; 3],
+    /// Of 1, x, y, x², x y, y²: of each half.
+    weights: [[f32x8<S>; 2]; 6],
+    simd: S,
 }
 
 /// Square texels of spread below which a slope counts as unknown.
 const RIDGE: f32 = 0.002;
 
-impl Planes {
-    /// A row at y.
+impl<S: Simd> Planes<S> {
     #[inline(always)]
-    pub fn add(&mut self, y: f32, row: &Row) {
-        let [sums, with_x] = &row.sums;
-        for (place, (sum, with_x)) in sums.iter().zip(with_x).enumerate() {
-            self.sums[0][place] += *sum;
-            self.sums[1][place] += *with_x;
-            self.sums[2][place] += *sum * y;
-        }
-        let of_halves = |values: &Values| Vec4::new(values[0].w, values[HALF].w, 0.0, 0.0);
-        self.squares[0] += row.squares;
-        self.squares[1] += of_halves(with_x) * y;
-        self.squares[2] += of_halves(sums) * (y * y);
+    pub fn new(simd: S) -> Self {
+        let zero = simd.splat_f32x8(0.0);
+        Self { sums: [[zero; VALUES]; 3], weights: [[zero; 2]; 6], simd }
     }
 
-    /// Writes a half's values of its plane at (0, 0); leaves what is there if they are not finite.
-    pub fn at_center(&self, half: usize, values: &mut [Vec3]) {
-        let [weight, sx, sy] = self.sums.map(|sums| sums[half * HALF].w);
-        let (sx, sy) = (sx / weight, sy / weight);
-        let [sxx, sxy, syy] = self.squares.map(|squares| squares[half] / weight);
-        let spread = Mat2::from_cols(
-            Vec2::new(sxx - sx * sx + RIDGE, sxy - sx * sy),
-            Vec2::new(sxy - sx * sy, syy - sy * sy + RIDGE),
-        );
-        let towards = spread.inverse() * Vec2::new(-sx, -sy);
-        for (k, value) in values.iter_mut().enumerate() {
-            let [mean, with_x, with_y] = self.sums.map(|sums| sums[half * HALF + k].xyz() / weight);
-            let fitted = mean + (with_x - mean * sx) * towards.x + (with_y - mean * sy) * towards.y;
-            if fitted.is_finite() {
-                *value = fitted.max(Vec3::ZERO);
+    /// A row at y.
+    #[inline(always)]
+    pub fn add(&mut self, y: f32, row: &Row<S>) {
+        let [sums, with_x] = &row.sums;
+        for place in 0..VALUES {
+            self.sums[0][place] += sums[place];
+            self.sums[1][place] += with_x[place];
+            self.sums[2][place] += sums[place] * y;
+        }
+        let [one, x, xx] = &row.weights;
+        for half in 0..2 {
+            self.weights[0][half] += one[half];
+            self.weights[1][half] += x[half];
+            self.weights[2][half] += one[half] * y;
+            self.weights[3][half] += xx[half];
+            self.weights[4][half] += x[half] * y;
+            self.weights[5][half] += one[half] * (y * y);
+        }
+    }
+
+    /// Writes the values of the planes at (0, 0); leaves a colour that is there if the plane's is not finite.
+    #[inline(always)]
+    pub fn at_center(&self, values: &mut [f32x8<S>; VALUES]) {
+        let (simd, zero) = (self.simd, self.simd.splat_f32x8(0.0));
+        for half in 0..2 {
+            let weight = self.weights[0][half];
+            let (sx, sy) = (self.weights[1][half] / weight, self.weights[2][half] / weight);
+            let (sxx, sxy) = (self.weights[3][half] / weight, self.weights[4][half] / weight);
+            let syy = self.weights[5][half] / weight;
+            // Covariances of the neighbours' places.
+            let (xx, xy, yy) = (sxx - sx * sx + RIDGE, sxy - sx * sy, syy - sy * sy + RIDGE);
+            let inverse = simd.splat_f32x8(1.0) / (xx * yy - xy * xy);
+            let (xx, xy, yy) = (xx * inverse, -(xy * inverse), yy * inverse);
+            let (right, down) = (yy * -sx + xy * -sy, xy * -sx + xx * -sy);
+            for scramble in half * HALF..(half + 1) * HALF {
+                let mut fitted = [zero; 3];
+                let mut finite = simd.splat_mask32x8(true);
+                for (channel, fitted) in fitted.iter_mut().enumerate() {
+                    let place = 3 * scramble + channel;
+                    let mean = self.sums[0][place] / weight;
+                    let (with_x, with_y) = (self.sums[1][place] / weight, self.sums[2][place] / weight);
+                    *fitted = mean + (with_x - mean * sx) * right + (with_y - mean * sy) * down;
+                    finite &= fitted.abs().simd_lt(f32::INFINITY);
+                }
+                for (channel, fitted) in fitted.into_iter().enumerate() {
+                    let value = &mut values[3 * scramble + channel];
+                    *value = finite.select(fitted.max(zero), *value);
+                }
             }
         }
     }

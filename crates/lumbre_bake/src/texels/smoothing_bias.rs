@@ -1,69 +1,70 @@
 //! What smoothing may have done to the light besides taking its noise away. Not the smoothing.
 
-use glam::Vec3A;
-use rayon::prelude::*;
+use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::plane::HALF;
-use super::smooth::Estimates;
-use super::surroundings::Surroundings;
+use super::lanes::{Block, Kernel, Strips, lanes};
+use super::plane::{OF_HALF, VALUES};
+use super::smooth::{Smoothed, own_values};
 
 /// Texels around one over which differences are averaged with their sign, and then without it.
-const BLOCK_RADIUS: i64 = 1;
-const BIAS_RADIUS: i64 = 3;
+const BLOCK_RADIUS: usize = 1;
+const BIAS_RADIUS: usize = 3;
+
 /// The smoothed value of one half against the raw values of the other, which know nothing of it: the product of its differences
 /// to two scrambles, each averaged over a block, has the square of the bias as its mean, and the smoothed value's own variance.
 /// (A single texel's squared difference says the same with ten times the noise.) May be negative, by chance.
 /// Blocks are of texels `step` apart.
-pub(crate) fn squared_bias(
-    surroundings: &Surroundings<'_>,
-    step: i64,
-    raw: &[Estimates],
-    smoothed: &[Estimates],
-) -> Vec<f32> {
-    let half = |estimates: &Estimates, half: usize| [estimates[half * HALF], estimates[half * HALF + 1]];
-    let differences: Vec<[[Vec3A; HALF]; 2]> = raw
-        .par_iter()
-        .zip(smoothed)
-        .map(|(raw, smoothed)| {
-            [0, 1].map(|side| {
-                let [a, b] = half(smoothed, side);
-                half(raw, 1 - side).map(|raw| Vec3A::from(0.5 * (a + b) - raw))
-            })
-        })
-        .collect();
-    let of_blocks: Vec<f32> = surroundings
-        .texels
-        .par_iter()
-        .zip(smoothed)
-        .map(|(texel, smoothed)| {
-            let (mut sums, mut count) = ([[Vec3A::ZERO; HALF]; 2], 0u32);
-            surroundings.around(texel, BLOCK_RADIUS, step, |other| {
-                for (sums, differences) in sums.iter_mut().zip(&differences[other]) {
-                    for (sum, difference) in sums.iter_mut().zip(differences) {
-                        *sum += *difference;
+pub(crate) struct Products<'a> {
+    pub step: usize,
+    pub raw: &'a Smoothed,
+    pub smoothed: &'a Strips<VALUES>,
+}
+
+impl Kernel<1> for Products<'_> {
+    #[inline(always)]
+    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; 1] {
+        let simd = block.simd;
+        let zero = simd.splat_f32x8(0.0);
+        let (sums, count) = block.sums(
+            BLOCK_RADIUS,
+            self.step,
+            #[inline(always)]
+            |beside, at| {
+                let mut differences = [zero; VALUES];
+                for place in 0..OF_HALF {
+                    let (half, channel) = (place / 3, place % 3);
+                    let first = half * OF_HALF + channel;
+                    let one: f32x8<S> = lanes(simd, self.smoothed.beside(beside, first), at);
+                    let two: f32x8<S> = lanes(simd, self.smoothed.beside(beside, first + 3), at);
+                    let mean = (one + two) * 0.5;
+                    for scramble in 0..2 {
+                        let raw = (1 - half) * OF_HALF + 3 * scramble + channel;
+                        let raw: f32x8<S> = lanes(simd, self.raw.beside(beside, raw), at);
+                        differences[first + 3 * scramble] = mean - raw;
                     }
                 }
-                count += 1;
-            });
-            let scale = 1.0 / (count.max(1) * count.max(1)) as f32;
-            let of_half = |side: usize| {
-                let [a, b] = half(smoothed, side);
-                let own = 0.25 * ((a - b) * (a - b)).element_sum();
-                (sums[side][0] * sums[side][1]).element_sum() * scale - own
-            };
-            (of_half(0) + of_half(1)) / 6.0
-        })
-        .collect();
-    surroundings
-        .texels
-        .par_iter()
-        .map(|texel| {
-            let (mut sum, mut count) = (0.0, 0u32);
-            surroundings.around(texel, BIAS_RADIUS, step, |other| {
-                sum += of_blocks[other];
-                count += 1;
-            });
-            sum / count.max(1) as f32
-        })
-        .collect()
+                differences
+            },
+        );
+        let count = count.max(1.0);
+        let scale = simd.splat_f32x8(1.0) / (count * count);
+        let own = own_values(block, self.smoothed);
+        let mut both = zero;
+        for half in 0..2 {
+            let (mut product, mut chance) = (zero, zero);
+            for first in half * OF_HALF..half * OF_HALF + 3 {
+                product += sums[first] * sums[first + 3];
+                let apart = own[first] - own[first + 3];
+                chance += apart * apart;
+            }
+            both += product * scale - chance * 0.25;
+        }
+        [both / 6.0]
+    }
+}
+
+/// The mean of the products around.
+#[inline(always)]
+pub(crate) fn squared_bias<S: Simd>(block: &Block<'_, S>, step: usize, products: &Strips<1>) -> f32x8<S> {
+    block.mean(products, 0, BIAS_RADIUS, step)
 }

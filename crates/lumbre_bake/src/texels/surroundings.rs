@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::Vec3;
 
 use super::footprint::Texel;
+use super::lanes::{Grid, Strips};
 use crate::scene::{BakeScene, LightmapLayout};
 
 /// Who lies around whom.
@@ -17,13 +18,18 @@ pub(crate) struct Surroundings<'a> {
     surfaces: Vec<Surface>,
     /// Of each texel of all maps.
     cells: Vec<Cell>,
+    /// The same in rows, eight side by side.
+    grid: Grid,
+    /// Of each map, its first row in the grid; and of each row there, its first texel of all maps.
+    first_rows: Vec<usize>,
+    firsts: Vec<usize>,
 }
 
 /// Triangles of one chart with the very same normal.
 #[derive(Clone, Copy)]
-struct Surface {
-    chart: u32,
-    normal: Vec3,
+pub(crate) struct Surface {
+    pub chart: u32,
+    pub normal: Vec3,
 }
 
 /// A texel of a map.
@@ -36,7 +42,8 @@ struct Cell {
     run: u32,
 }
 
-const NONE: u32 = u32::MAX;
+/// No texel, no surface.
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Neighbours in a row, one after the other in every so many columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,12 +91,36 @@ impl<'a> Surroundings<'a> {
                 }
             }
         }
-        Self { scene, layout, texels, surface_of, surfaces, cells }
+        let sizes = layout.maps.iter().map(|map| (map.width, map.height));
+        let ground = cells.iter().map(|cell| cell.surface);
+        let grid = Grid::new(sizes, ground, surfaces.clone());
+        let (mut first_rows, mut firsts) = (Vec::new(), Vec::new());
+        for map in &layout.maps {
+            first_rows.push(firsts.len());
+            firsts.extend((0..map.height as usize).map(|row| map.first + row * map.width as usize));
+        }
+        Self { scene, layout, texels, surface_of, surfaces, cells, grid, first_rows, firsts }
     }
 
     /// Length of a texel's side on its surface, canonical units.
     pub fn texel_side(&self, texel: &Texel) -> f32 {
         texel.side(self.scene)
+    }
+
+    /// The texels in rows.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Numbers of each covered texel, by its place in the list of them.
+    pub fn fill<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> Strips<N> {
+        self.grid.fill(|row, column| of(self.cells[self.firsts[row] + column].place as usize))
+    }
+
+    /// The texel's row and column in the grid, if it is there.
+    pub fn place(&self, texel: &Texel) -> Option<(usize, usize)> {
+        let row = self.first_rows[texel.object as usize] + texel.y as usize;
+        (!texel.is_hidden()).then_some((row, texel.x as usize))
     }
 
     /// Calls `visit` for the texels of the same chart and about the same normal, up to so many steps each way: those in every `step`th row and
@@ -117,7 +148,7 @@ impl<'a> Surroundings<'a> {
                 let wanted = right - column + 1;
                 let run = i64::from(cell.run);
                 let count = if run > (wanted - 1) * step { wanted } else { (run - 1) / step + 1 };
-                if cell.surface == own || self.goes_on(own, cell.surface) {
+                if cell.surface == own || goes_on(&self.surfaces, own, cell.surface) {
                     let first = cell.place as usize;
                     let end = first + ((count - 1) * step) as usize + 1;
                     visit(Run { down: row * step, right: column * step, first, end });
@@ -126,11 +157,12 @@ impl<'a> Surroundings<'a> {
             }
         }
     }
+}
 
-    /// Whether light may be compared over two surfaces.
-    fn goes_on(&self, surface: u32, other: u32) -> bool {
-        let Some(other) = self.surfaces.get(other as usize) else { return false };
-        let own = &self.surfaces[surface as usize];
-        own.chart == other.chart && own.normal.dot(other.normal) > 0.9
-    }
+/// Whether light may be compared over two surfaces.
+pub(crate) fn goes_on(surfaces: &[Surface], surface: u32, other: u32) -> bool {
+    let [Some(own), Some(other)] = [surface, other].map(|index| surfaces.get(index as usize)) else {
+        return false;
+    };
+    own.chart == other.chart && own.normal.dot(other.normal) > 0.9
 }

@@ -1,0 +1,285 @@
+//! The covered texels of all maps as rows with margins, to be computed eight side by side: each lane takes the very steps that its texel
+//! alone would take, so that the bits are the same whatever instructions the machine has. Not what is computed.
+
+use std::ops::Range;
+
+use fearless_simd::{Level, Select, Simd, dispatch, f32x8, mask32x8, prelude::*, u32x8};
+use rayon::prelude::*;
+
+use super::surroundings::{NONE, Surface, goes_on};
+
+/// Texels side by side.
+pub(crate) const LANES: usize = 8;
+/// Texels to each side that a neighbourhood may reach.
+const MARGIN: usize = 12;
+/// What eight texels see of a row.
+pub(crate) const WINDOW: usize = MARGIN + LANES + MARGIN;
+
+/// Where the rows of all maps begin, and which of their texels are covered.
+pub(crate) struct Grid {
+    rows: Vec<MapRow>,
+    /// First columns of the blocks of all rows.
+    blocks: Vec<u32>,
+    /// Of each cell of the rows its surface; [`NONE`] where nothing is covered, and in the margins.
+    ground: Vec<u32>,
+    surfaces: Vec<Surface>,
+    /// Cells of all rows, without the last margin.
+    cells: usize,
+    level: Level,
+}
+
+/// A row of a map.
+pub(crate) struct MapRow {
+    /// Its first cell, and how many there are: a margin, the texels, and what a last block hangs over. The next row's margin is also
+    /// this one's.
+    start: usize,
+    stride: usize,
+    /// Rows of the same map before and after it.
+    before: u32,
+    after: u32,
+    blocks: Range<usize>,
+}
+
+/// `N` numbers of each cell, row by row: a row of the first, a row of the second, and so on. Zero where no texel is.
+pub(crate) struct Strips<const N: usize> {
+    values: Vec<f32>,
+}
+
+/// Something to be computed of eight texels.
+pub(crate) trait Kernel<const N: usize>: Sync {
+    /// Of each lane; what it says of lanes without a texel does not count.
+    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; N];
+}
+
+impl Grid {
+    /// Of maps of these widths and heights, and the surface of each of their texels, [`NONE`] if it counts nowhere.
+    pub fn new(
+        sizes: impl Iterator<Item = (u32, u32)>,
+        mut ground: impl Iterator<Item = u32>,
+        surfaces: Vec<Surface>,
+    ) -> Self {
+        let (mut rows, mut blocks, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+        for (width, height) in sizes {
+            for row in 0..height {
+                let start = cells.len();
+                cells.resize(start + MARGIN, NONE);
+                cells.extend(ground.by_ref().take(width as usize));
+                cells.resize(start + MARGIN + width as usize + LANES - 1, NONE);
+                let (first_block, mut column) = (blocks.len(), 0);
+                while let Some(gap) = cells[start + MARGIN + column..].iter().position(|&own| own != NONE) {
+                    blocks.push((column + gap) as u32);
+                    column += gap + LANES;
+                }
+                let stride = cells.len() - start;
+                let blocks = first_block..blocks.len();
+                rows.push(MapRow { start, stride, before: row, after: height - 1 - row, blocks });
+            }
+        }
+        let count = cells.len();
+        cells.resize(count + MARGIN, NONE);
+        Self { rows, blocks, ground: cells, surfaces, cells: count, level: Level::new() }
+    }
+
+    /// Numbers of each covered texel, which is told by its row (of all maps) and column.
+    pub fn fill<const N: usize>(&self, of: impl Fn(usize, usize) -> [f32; N] + Sync) -> Strips<N> {
+        self.by_rows(|index, strip| {
+            let row = &self.rows[index];
+            for column in 0..row.stride - MARGIN {
+                if self.ground[row.start + MARGIN + column] == NONE {
+                    continue;
+                }
+                for (channel, value) in of(index, column).into_iter().enumerate() {
+                    strip[channel * row.stride + MARGIN + column] = value;
+                }
+            }
+        })
+    }
+
+    /// What a kernel makes of all covered texels.
+    pub fn compute<const N: usize>(&self, kernel: &impl Kernel<N>) -> Strips<N> {
+        self.by_rows(|index, strip| {
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            if let Some(simd) = self.level.as_avx2() {
+                return simd.vectorize(
+                    #[inline(always)]
+                    || self.compute_row(simd, kernel, index, strip),
+                );
+            }
+            dispatch!(Level::baseline(), simd => self.compute_row(simd, kernel, index, strip));
+        })
+    }
+
+    #[inline(always)]
+    fn compute_row<const N: usize, S: Simd>(
+        &self,
+        simd: S,
+        kernel: &impl Kernel<N>,
+        index: usize,
+        strip: &mut [f32],
+    ) {
+        let row = &self.rows[index];
+        for &column in &self.blocks[row.blocks.clone()] {
+            let column = column as usize;
+            let own: u32x8<S> = lanes(simd, window(&self.ground, row.start + column), MARGIN);
+            let covered = simd.not_mask32x8(own.simd_eq(simd.splat_u32x8(NONE)));
+            let block = Block { grid: self, simd, row: index, column, own };
+            let values = kernel.at(&block);
+            for (channel, value) in values.into_iter().enumerate() {
+                let at = channel * row.stride + MARGIN + column;
+                covered.select(value, simd.splat_f32x8(0.0)).store_slice(&mut strip[at..at + LANES]);
+            }
+        }
+    }
+
+    /// Strips whose rows are written each for itself.
+    fn by_rows<const N: usize>(&self, write: impl Fn(usize, &mut [f32]) + Sync) -> Strips<N> {
+        let mut values = vec![0.0; N * self.cells + MARGIN];
+        let mut rest = &mut values[..];
+        let mut strips = Vec::with_capacity(self.rows.len());
+        for row in &self.rows {
+            let (own, after) = rest.split_at_mut(N * row.stride);
+            strips.push(own);
+            rest = after;
+        }
+        strips.into_par_iter().enumerate().for_each(|(index, strip)| write(index, strip));
+        Strips { values }
+    }
+
+    /// What the strips hold of a texel.
+    pub fn get<const N: usize>(&self, strips: &Strips<N>, row: usize, column: usize) -> [f32; N] {
+        let row = &self.rows[row];
+        let first = N * row.start + MARGIN + column;
+        std::array::from_fn(|channel| strips.values[first + channel * row.stride])
+    }
+}
+
+/// Eight texels side by side, at least the first of them covered.
+pub(crate) struct Block<'g, S: Simd> {
+    grid: &'g Grid,
+    pub simd: S,
+    row: usize,
+    column: usize,
+    /// Their surfaces.
+    own: u32x8<S>,
+}
+
+/// A row in which eight texels have neighbours.
+#[derive(Clone, Copy)]
+pub(crate) struct Beside<'g> {
+    /// Rows from the texels' own to it.
+    pub down: i64,
+    row: &'g MapRow,
+    column: usize,
+    ground: &'g [u32; WINDOW],
+}
+
+/// The texels' own place in a window.
+pub(crate) const OWN: usize = MARGIN;
+
+impl<'g, S: Simd> Block<'g, S> {
+    /// What strips hold of the texels themselves.
+    #[inline(always)]
+    pub fn own<const N: usize>(&self, strips: &Strips<N>, channel: usize) -> f32x8<S> {
+        let row = &self.grid.rows[self.row];
+        let at = N * row.start + channel * row.stride + self.column;
+        lanes(self.simd, window(&strips.values, at), OWN)
+    }
+
+    /// The rows of the map so many steps up and down.
+    #[inline(always)]
+    pub fn rows(&self, steps: usize, step: usize) -> impl Iterator<Item = Beside<'g>> + use<'g, S> {
+        let (grid, index, column) = (self.grid, self.row, self.column);
+        let own = &grid.rows[index];
+        let up = steps.min(own.before as usize / step) as i64;
+        let down = steps.min(own.after as usize / step) as i64;
+        (-up..=down).map(move |steps| {
+            let down = steps * step as i64;
+            let row = &grid.rows[(index as i64 + down) as usize];
+            Beside { down, row, column, ground: window(&grid.ground, row.start + column) }
+        })
+    }
+
+    /// The texels whose neighbour `at` that place of the window counts: those on the same surface, or one that goes on from it.
+    #[inline(always)]
+    pub fn counts(&self, beside: &Beside<'g>, at: usize) -> mask32x8<S> {
+        let others: u32x8<S> = lanes(self.simd, beside.ground, at);
+        let same = self.own.simd_eq(others);
+        if same.all_true() {
+            return same;
+        }
+        let none = self.simd.splat_u32x8(NONE);
+        let nothing = (self.own.simd_eq(none) | others.simd_eq(none)).to_bitmask();
+        let mut bits = same.to_bitmask() & !nothing;
+        let mut unsure = !(bits | nothing) & ((1 << LANES) - 1);
+        while unsure != 0 {
+            let lane = unsure.trailing_zeros() as usize & (LANES - 1);
+            unsure &= unsure - 1;
+            bits |= u64::from(goes_on(&self.grid.surfaces, self.own[lane], others[lane])) << lane;
+        }
+        mask32x8::from_bitmask(self.simd, bits)
+    }
+
+    /// Sums of terms over neighbours, row by row and column by column, and how many there are.
+    #[inline(always)]
+    pub fn sums<const M: usize>(
+        &self,
+        steps: usize,
+        step: usize,
+        terms: impl Fn(&Beside<'g>, usize) -> [f32x8<S>; M],
+    ) -> ([f32x8<S>; M], f32x8<S>) {
+        let zero = self.simd.splat_f32x8(0.0);
+        let one = self.simd.splat_f32x8(1.0);
+        let (mut sums, mut count) = ([zero; M], zero);
+        for beside in self.rows(steps, step) {
+            for place in 0..2 * steps + 1 {
+                let at = OWN - steps * step + place * step;
+                let counts = self.counts(&beside, at);
+                let terms = terms(&beside, at);
+                for k in 0..M {
+                    sums[k] += counts.select(terms[k], zero);
+                }
+                count += counts.select(one, zero);
+            }
+        }
+        (sums, count)
+    }
+
+    /// Mean of a channel over neighbours.
+    #[inline(always)]
+    pub fn mean<const N: usize>(
+        &self,
+        strips: &Strips<N>,
+        channel: usize,
+        steps: usize,
+        step: usize,
+    ) -> f32x8<S> {
+        let (sums, count) = self.sums(
+            steps,
+            step,
+            #[inline(always)]
+            |beside, at| [lanes(self.simd, strips.beside(beside, channel), at)],
+        );
+        sums[0] / count.max(1.0)
+    }
+}
+
+impl<const N: usize> Strips<N> {
+    /// What eight texels see of a channel in a row.
+    #[inline(always)]
+    pub fn beside(&self, beside: &Beside<'_>, channel: usize) -> &[f32; WINDOW] {
+        let row = beside.row;
+        window(&self.values, N * row.start + channel * row.stride + beside.column)
+    }
+}
+
+/// What is seen from the cell `at` on.
+#[inline(always)]
+fn window<T>(values: &[T], at: usize) -> &[T; WINDOW] {
+    values[at..].first_chunk().expect("rows end with margins")
+}
+
+/// Eight of a window.
+#[inline(always)]
+pub(crate) fn lanes<S: Simd, V: SimdBase<S>>(simd: S, window: &[V::Element; WINDOW], at: usize) -> V {
+    V::from_slice(simd, &window[at..at + LANES])
+}
