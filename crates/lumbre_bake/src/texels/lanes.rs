@@ -47,8 +47,8 @@ pub(crate) struct Strips<const N: usize> {
 
 /// Something to be computed of eight texels.
 pub(crate) trait Kernel<const N: usize>: Sync {
-    /// Of each lane; what it says of lanes without a texel does not count.
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; N];
+    /// Of each lane, given what was there before, or zero; what it says of lanes without a texel does not count.
+    fn at<S: Simd>(&self, block: &Block<'_, S>, before: &[f32x8<S>; N]) -> [f32x8<S>; N];
 }
 
 impl Grid {
@@ -82,35 +82,42 @@ impl Grid {
 
     /// Numbers of each covered texel, which is told by its row (of all maps) and column.
     pub fn fill<const N: usize>(&self, of: impl Fn(usize, usize) -> [f32; N] + Sync) -> Strips<N> {
-        self.by_rows(|index, strip| {
+        let mut strips = self.strips();
+        self.by_rows(&mut strips, |index, strip| {
             let row = &self.rows[index];
-            for column in 0..row.stride - MARGIN {
-                if self.ground[row.start + MARGIN + column] == NONE {
-                    continue;
-                }
+            let ground = &self.ground[row.start + MARGIN..row.start + row.stride];
+            for (column, _) in ground.iter().enumerate().filter(|(_, surface)| **surface != NONE) {
                 for (channel, value) in of(index, column).into_iter().enumerate() {
                     strip[channel * row.stride + MARGIN + column] = value;
                 }
             }
-        })
+        });
+        strips
     }
 
     /// What a kernel makes of all covered texels.
     pub fn compute<const N: usize>(&self, kernel: &impl Kernel<N>) -> Strips<N> {
-        self.by_rows(|index, strip| {
+        let mut strips = self.strips();
+        self.change(&mut strips, kernel);
+        strips
+    }
+
+    /// What a kernel makes of all covered texels, in place of what was there.
+    pub fn change<const N: usize>(&self, strips: &mut Strips<N>, kernel: &impl Kernel<N>) {
+        self.by_rows(strips, |index, strip| {
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             if let Some(simd) = self.level.as_avx2() {
                 return simd.vectorize(
                     #[inline(always)]
-                    || self.compute_row(simd, kernel, index, strip),
+                    || self.change_row(simd, kernel, index, strip),
                 );
             }
-            dispatch!(Level::baseline(), simd => self.compute_row(simd, kernel, index, strip));
-        })
+            dispatch!(Level::baseline(), simd => self.change_row(simd, kernel, index, strip));
+        });
     }
 
     #[inline(always)]
-    fn compute_row<const N: usize, S: Simd>(
+    fn change_row<const N: usize, S: Simd>(
         &self,
         simd: S,
         kernel: &impl Kernel<N>,
@@ -118,31 +125,41 @@ impl Grid {
         strip: &mut [f32],
     ) {
         let row = &self.rows[index];
+        let zero = simd.splat_f32x8(0.0);
         for &column in &self.blocks[row.blocks.clone()] {
             let column = column as usize;
             let own: u32x8<S> = lanes(simd, window(&self.ground, row.start + column), MARGIN);
             let covered = simd.not_mask32x8(own.simd_eq(simd.splat_u32x8(NONE)));
-            let block = Block { grid: self, simd, row: index, column, own };
-            let values = kernel.at(&block);
+            let alike = own.simd_eq(own[0]).all_true();
+            let block = Block { grid: self, simd, row: index, column, own, alike };
+            let mut values = [zero; N];
+            for (channel, value) in values.iter_mut().enumerate() {
+                let at = channel * row.stride + MARGIN + column;
+                *value = f32x8::from_slice(simd, &strip[at..at + LANES]);
+            }
+            let values = kernel.at(&block, &values);
             for (channel, value) in values.into_iter().enumerate() {
                 let at = channel * row.stride + MARGIN + column;
-                covered.select(value, simd.splat_f32x8(0.0)).store_slice(&mut strip[at..at + LANES]);
+                covered.select(value, zero).store_slice(&mut strip[at..at + LANES]);
             }
         }
     }
 
-    /// Strips whose rows are written each for itself.
-    fn by_rows<const N: usize>(&self, write: impl Fn(usize, &mut [f32]) + Sync) -> Strips<N> {
-        let mut values = vec![0.0; N * self.cells + MARGIN];
-        let mut rest = &mut values[..];
-        let mut strips = Vec::with_capacity(self.rows.len());
+    /// Zero everywhere.
+    fn strips<const N: usize>(&self) -> Strips<N> {
+        Strips { values: vec![0.0; N * self.cells + MARGIN] }
+    }
+
+    /// Writes every row's strips, each for itself.
+    fn by_rows<const N: usize>(&self, strips: &mut Strips<N>, write: impl Fn(usize, &mut [f32]) + Sync) {
+        let mut rest = &mut strips.values[..];
+        let mut rows = Vec::with_capacity(self.rows.len());
         for row in &self.rows {
             let (own, after) = rest.split_at_mut(N * row.stride);
-            strips.push(own);
+            rows.push(own);
             rest = after;
         }
-        strips.into_par_iter().enumerate().for_each(|(index, strip)| write(index, strip));
-        Strips { values }
+        rows.into_par_iter().enumerate().for_each(|(index, row)| write(index, row));
     }
 
     /// What the strips hold of a texel.
@@ -159,8 +176,9 @@ pub(crate) struct Block<'g, S: Simd> {
     pub simd: S,
     row: usize,
     column: usize,
-    /// Their surfaces.
+    /// Their surfaces, and whether those are one.
     own: u32x8<S>,
+    alike: bool,
 }
 
 /// A row in which eight texels have neighbours.
@@ -199,24 +217,41 @@ impl<'g, S: Simd> Block<'g, S> {
         })
     }
 
+    /// Whether all that is within reach in a row is on the texels' one surface.
+    #[inline(always)]
+    pub fn all_count(&self, beside: &Beside<'g>, reach: usize) -> bool {
+        let mut all = self.alike;
+        let mut at = OWN - reach;
+        while all && at < OWN + reach {
+            all = self.same(beside, at).all_true();
+            at += LANES;
+        }
+        all && self.same(beside, OWN + reach).all_true()
+    }
+
+    #[inline(always)]
+    fn same(&self, beside: &Beside<'g>, at: usize) -> mask32x8<S> {
+        let others: u32x8<S> = lanes(self.simd, beside.ground, at);
+        self.own.simd_eq(others)
+    }
+
     /// The texels whose neighbour `at` that place of the window counts: those on the same surface, or one that goes on from it.
     #[inline(always)]
     pub fn counts(&self, beside: &Beside<'g>, at: usize) -> mask32x8<S> {
-        let others: u32x8<S> = lanes(self.simd, beside.ground, at);
-        let same = self.own.simd_eq(others);
-        if same.all_true() {
-            return same;
+        let same = self.same(beside, at);
+        let mut more = 0;
+        if !same.all_true() {
+            let others: u32x8<S> = lanes(self.simd, beside.ground, at);
+            let none = self.simd.splat_u32x8(NONE);
+            let sure = same | self.own.simd_eq(none) | none.simd_eq(others);
+            let mut unsure = !sure.to_bitmask() & ((1 << LANES) - 1);
+            while unsure != 0 {
+                let lane = unsure.trailing_zeros() as usize & (LANES - 1);
+                unsure &= unsure - 1;
+                more |= u64::from(goes_on(&self.grid.surfaces, self.own[lane], others[lane])) << lane;
+            }
         }
-        let none = self.simd.splat_u32x8(NONE);
-        let nothing = (self.own.simd_eq(none) | others.simd_eq(none)).to_bitmask();
-        let mut bits = same.to_bitmask() & !nothing;
-        let mut unsure = !(bits | nothing) & ((1 << LANES) - 1);
-        while unsure != 0 {
-            let lane = unsure.trailing_zeros() as usize & (LANES - 1);
-            unsure &= unsure - 1;
-            bits |= u64::from(goes_on(&self.grid.surfaces, self.own[lane], others[lane])) << lane;
-        }
-        mask32x8::from_bitmask(self.simd, bits)
+        same | mask32x8::from_bitmask(self.simd, more)
     }
 
     /// Sums of terms over neighbours, row by row and column by column, and how many there are.
@@ -231,10 +266,18 @@ impl<'g, S: Simd> Block<'g, S> {
         let one = self.simd.splat_f32x8(1.0);
         let (mut sums, mut count) = ([zero; M], zero);
         for beside in self.rows(steps, step) {
+            let all = self.all_count(&beside, steps * step);
             for place in 0..2 * steps + 1 {
                 let at = OWN - steps * step + place * step;
-                let counts = self.counts(&beside, at);
                 let terms = terms(&beside, at);
+                if all {
+                    for k in 0..M {
+                        sums[k] += terms[k];
+                    }
+                    count += one;
+                    continue;
+                }
+                let counts = self.counts(&beside, at);
                 for k in 0..M {
                     sums[k] += counts.select(terms[k], zero);
                 }

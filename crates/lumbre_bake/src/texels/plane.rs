@@ -3,21 +3,13 @@
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::gather::SCRAMBLES;
+use super::lanes::{OWN, WINDOW, lanes};
 
 /// Scrambles of one half: the values of one plane.
 pub(crate) const HALF: usize = SCRAMBLES / 2;
 /// Numbers of a texel: the channels of all scrambles; and of a half.
 pub(crate) const VALUES: usize = 3 * SCRAMBLES;
 pub(crate) const OF_HALF: usize = 3 * HALF;
-
-/// Weighted sums over neighbours in one row.
-#[derive(Clone, Copy)]
-pub(crate) struct Row<S: Simd> {
-    /// Of the values, and of those times x.
-    pub sums: [[f32x8<S>; VALUES]; 2],
-    /// Of 1, x and x², of each half.
-    pub weights: [[f32x8<S>; 2]; 3],
-}
 
 /// Weighted sums of planes a + b x + c y through the values of each half.
 pub(crate) struct Planes<S: Simd> {
@@ -38,23 +30,57 @@ impl<S: Simd> Planes<S> {
         Self { sums: [[zero; VALUES]; 3], weights: [[zero; 2]; 6], simd }
     }
 
-    /// A row at y.
+    /// The weights of a half's neighbours in the row at y, `step` apart and the middle one at 0.
     #[inline(always)]
-    pub fn add(&mut self, y: f32, row: &Row<S>) {
-        let [sums, with_x] = &row.sums;
-        for place in 0..VALUES {
-            self.sums[0][place] += sums[place];
-            self.sums[1][place] += with_x[place];
-            self.sums[2][place] += sums[place] * y;
+    pub fn add_weights<const COLUMNS: usize>(
+        &mut self,
+        half: usize,
+        step: usize,
+        y: f32,
+        weights: &[f32x8<S>; COLUMNS],
+    ) {
+        let zero = self.simd.splat_f32x8(0.0);
+        let (mut sum, mut with_x, mut with_xx) = (zero, zero, zero);
+        for (place, weight) in weights.iter().enumerate() {
+            let x = place as f32 * step as f32 - (COLUMNS / 2 * step) as f32;
+            sum += *weight;
+            with_x += *weight * x;
+            with_xx += *weight * (x * x);
         }
-        let [one, x, xx] = &row.weights;
-        for half in 0..2 {
-            self.weights[0][half] += one[half];
-            self.weights[1][half] += x[half];
-            self.weights[2][half] += one[half] * y;
-            self.weights[3][half] += xx[half];
-            self.weights[4][half] += x[half] * y;
-            self.weights[5][half] += one[half] * (y * y);
+        self.weights[0][half] += sum;
+        self.weights[1][half] += with_x;
+        self.weights[2][half] += sum * y;
+        self.weights[3][half] += with_xx;
+        self.weights[4][half] += with_x * y;
+        self.weights[5][half] += sum * (y * y);
+    }
+
+    /// Their values of one colour. Some eighty values of about one size: single precision keeps six digits of their sums.
+    #[inline(always)]
+    pub fn add_values<const COLUMNS: usize>(
+        &mut self,
+        scramble: usize,
+        step: usize,
+        y: f32,
+        weights: &[f32x8<S>; COLUMNS],
+        values: [&[f32; WINDOW]; 3],
+    ) {
+        let zero = self.simd.splat_f32x8(0.0);
+        let (mut sums, mut with_x) = ([zero; 3], [zero; 3]);
+        for (place, weight) in weights.iter().enumerate() {
+            let x = place as f32 * step as f32 - (COLUMNS / 2 * step) as f32;
+            let at = OWN - COLUMNS / 2 * step + place * step;
+            for channel in 0..3 {
+                let term = *weight * lanes::<S, f32x8<S>>(self.simd, values[channel], at);
+                sums[channel] += term;
+                with_x[channel] += term * x;
+            }
+        }
+        for channel in 0..3 {
+            let place = 3 * scramble + channel;
+            self.sums[0][place] += sums[channel];
+            self.sums[1][place] += with_x[channel];
+            self.sums[2][place] += sums[channel] * y;
         }
     }
 

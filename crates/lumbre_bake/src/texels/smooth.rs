@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::gather::SCRAMBLES;
 use super::lanes::{Beside, Block, Grid, Kernel, OWN, Strips, lanes};
-use super::plane::{HALF, OF_HALF, Planes, Row, VALUES};
+use super::plane::{HALF, Planes, VALUES};
 use super::smoothing_bias::{Products, squared_bias};
 use super::surroundings::Surroundings;
 
@@ -21,9 +21,6 @@ const BIAS: usize = VALUES;
 
 /// One pass over all texels.
 struct Level {
-    /// Texels from one neighbour to the next, and how many neighbours each way.
-    step: usize,
-    steps: usize,
     /// Texels at which a neighbour weighs e⁻¹; and where things are near, the share of their harmonic mean distance, inverted.
     width: f32,
     near: f32,
@@ -32,17 +29,13 @@ struct Level {
     /// Of the variance of what goes in, the part that chance leaves in the squared bias.
     chance: f32,
 }
-/// The most neighbours in a row.
-const COLUMNS: usize = 9;
 
 /// The first reaches little further than a texel's own size, whatever is near; the second only where everything is far. `chance`, for
 /// the first: four times the variance of a texel for one scramble, a ninth of it in a block, of which the radius holds 49/9, twice for
 /// two halves: 4 / 9 / sqrt(2 * 49 / 9). What the second takes in goes together over some 20 texels: its blocks hold four
 /// that do not, and the radius as many blocks.
-const LEVELS: [Level; 2] = [
-    Level { step: 1, steps: 3, width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 },
-    Level { step: 3, steps: 4, width: 9.0, near: 12.0, guide_steps: 0, chance: 0.33 },
-];
+const FIRST: Level = Level { width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 };
+const SECOND: Level = Level { width: 9.0, near: 12.0, guide_steps: 0, chance: 0.33 };
 
 /// The estimates of every covered texel, smoothed, and the squared bias that the smoothing may have brought, mean of the channels.
 /// `inverse_distances` tells how near to each texel the things are that it gathered from.
@@ -60,9 +53,8 @@ pub(crate) fn smooth(
         let estimates = &estimates[index];
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })
     });
-    for level in &LEVELS {
-        smoothed = level.smooth(grid, &smoothed, &nearness);
-    }
+    FIRST.smooth::<1, 7>(grid, &mut smoothed, &nearness);
+    SECOND.smooth::<3, 9>(grid, &mut smoothed, &nearness);
     let texels = surroundings.texels.par_iter().zip(estimates);
     let smoothed = texels.map(|(texel, estimates)| {
         let Some((row, column)) = surroundings.place(texel) else { return (*estimates, 0.0) };
@@ -73,20 +65,22 @@ pub(crate) fn smooth(
 }
 
 impl Level {
-    /// The estimates smoothed, and the squared bias with what this brought; a texel to which it brings more than it takes away stays as it is.
-    fn smooth(&self, grid: &Grid, estimates: &Smoothed, nearness: &Strips<1>) -> Smoothed {
+    /// Smooths the estimates, and adds the squared bias that this brought; a texel to which it brings more than it takes away stays as it is.
+    fn smooth<const STEP: usize, const COLUMNS: usize>(
+        &self,
+        grid: &Grid,
+        estimates: &mut Smoothed,
+        nearness: &Strips<1>,
+    ) {
         let variances = grid.compute(&Variances(estimates));
-        let guides = grid.compute(&Guides { level: self, estimates, variances: &variances });
+        let guides = grid.compute(&Guides::<STEP> { level: self, estimates, variances: &variances });
         drop(variances);
-        let smoothed = grid.compute(&Fit { level: self, estimates, nearness, guides: &guides });
-        let products = grid.compute(&Products { step: self.step, raw: estimates, smoothed: &smoothed });
-        grid.compute(&Choice {
-            level: self,
-            estimates,
-            smoothed: &smoothed,
-            guides: &guides,
-            products: &products,
-        })
+        let fit = Fit::<STEP, COLUMNS> { level: self, estimates, nearness, guides: &guides };
+        let smoothed = grid.compute(&fit);
+        let products = grid.compute(&Products::<STEP> { raw: estimates, smoothed: &smoothed });
+        let choice =
+            Choice::<STEP> { level: self, smoothed: &smoothed, guides: &guides, products: &products };
+        grid.change(estimates, &choice);
     }
 }
 
@@ -95,7 +89,7 @@ struct Nearness<'a>(&'a Strips<2>);
 
 impl Kernel<1> for Nearness<'_> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; 1] {
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 1]) -> [f32x8<S>; 1] {
         let near = block.mean(self.0, 0, NOISE_STEPS, 1);
         let steps = near * block.own(self.0, 1);
         let finite = steps.abs().simd_lt(f32::INFINITY);
@@ -108,7 +102,7 @@ struct Variances<'a>(&'a Smoothed);
 
 impl Kernel<1> for Variances<'_> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; 1] {
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 1]) -> [f32x8<S>; 1] {
         [sum_of_variances(block.simd, &own_values(block, self.0))]
     }
 }
@@ -142,7 +136,7 @@ fn sum_of_variances<S: Simd>(simd: S, values: &[f32x8<S>; VALUES]) -> f32x8<S> {
 /// A texel's noise: its own spread of four is itself noise, the neighbourhood's mean is not. And what tells edges: the means of both halves
 /// over the texels next to it. Each half's weights come from the other half: noise that shaped the weights would pull the mean towards
 /// what is most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
-struct Guides<'a> {
+struct Guides<'a, const STEP: usize> {
     level: &'a Level,
     estimates: &'a Smoothed,
     variances: &'a Strips<1>,
@@ -151,14 +145,13 @@ struct Guides<'a> {
 const GUIDES: usize = 2 * 3 + 1;
 const NOISE: usize = 2 * 3;
 
-impl Kernel<GUIDES> for Guides<'_> {
+impl<const STEP: usize> Kernel<GUIDES> for Guides<'_, STEP> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; GUIDES] {
-        let Level { step, guide_steps, .. } = *self.level;
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; GUIDES]) -> [f32x8<S>; GUIDES] {
         let simd = block.simd;
         let (sums, count) = block.sums(
-            guide_steps,
-            step,
+            self.level.guide_steps,
+            STEP,
             #[inline(always)]
             |beside, at| {
                 let mut sums = [simd.splat_f32x8(0.0); 2 * 3];
@@ -173,7 +166,7 @@ impl Kernel<GUIDES> for Guides<'_> {
             },
         );
         let scale = simd.splat_f32x8(1.0) / (count * HALF as f32).max(1.0);
-        let mut guides = [block.mean(self.variances, 0, NOISE_STEPS, step); GUIDES];
+        let mut guides = [block.mean(self.variances, 0, NOISE_STEPS, STEP); GUIDES];
         for (guide, sum) in guides.iter_mut().zip(sums) {
             *guide = sum * scale;
         }
@@ -181,55 +174,44 @@ impl Kernel<GUIDES> for Guides<'_> {
     }
 }
 
-/// The weighted planes.
-struct Fit<'a> {
+/// The weighted planes, over so many texels a row, `STEP` apart, and as many rows.
+struct Fit<'a, const STEP: usize, const COLUMNS: usize> {
     level: &'a Level,
     estimates: &'a Smoothed,
     nearness: &'a Strips<1>,
     guides: &'a Strips<GUIDES>,
 }
 
-impl Kernel<VALUES> for Fit<'_> {
+impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, COLUMNS> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; VALUES] {
-        let Level { step, steps, .. } = *self.level;
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; VALUES]) -> [f32x8<S>; VALUES] {
         let simd = block.simd;
-        let zero = simd.splat_f32x8(0.0);
-        let mut own = [zero; GUIDES];
+        let mut own = [simd.splat_f32x8(0.0); GUIDES];
         for (place, own) in own.iter_mut().enumerate() {
             *own = block.own(self.guides, place);
         }
         let near = self.level.near * self.level.near;
         let narrow = block.own(self.nearness, 0) * near + self.level.width.powi(-2);
-        // Of a guide over a texel's mean: twice for a half, and the less the more texels.
-        let guide_noise = GUIDE_SIGMAS * 2.0 / ((2 * self.level.guide_steps + 1) as f32).powi(2);
         let mut planes = Planes::new(simd);
-        for beside in block.rows(steps, step) {
+        for beside in block.rows(COLUMNS / 2, STEP) {
             let y = beside.down as f32;
-            let mut guides = [self.guides.beside(&beside, NOISE); GUIDES];
-            for (place, guide) in guides.iter_mut().enumerate() {
-                *guide = self.guides.beside(&beside, place);
-            }
-            let mut weights = [[zero; 2]; COLUMNS];
-            for (place, weights) in weights.iter_mut().enumerate().take(2 * steps + 1) {
-                let at = OWN - steps * step + place * step;
-                let x = at as f32 - OWN as f32;
-                let noise: f32x8<S> = lanes(simd, guides[NOISE], at);
-                let expected = (own[NOISE] + noise) * guide_noise;
-                let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
-                let far = narrow * (x * x + y * y);
-                let counts = block.counts(&beside, at);
-                for (half, weight) in weights.iter_mut().enumerate() {
-                    let mut apart = zero;
-                    for channel in 0..3 {
-                        let guide: f32x8<S> = lanes(simd, guides[3 * half + channel], at);
-                        let difference = guide - own[3 * half + channel];
-                        apart += difference * difference;
-                    }
-                    *weight = counts.select(falloff(simd, far + apart * inverse), zero);
+            let weights = if block.all_count(&beside, COLUMNS / 2 * STEP) {
+                self.weights::<true, S>(block, &beside, &own, narrow)
+            } else {
+                self.weights::<false, S>(block, &beside, &own, narrow)
+            };
+            for (half, weights) in weights.iter().enumerate() {
+                planes.add_weights(half, STEP, y, weights);
+                for scramble in half * HALF..(half + 1) * HALF {
+                    let first = 3 * scramble;
+                    let [r, g, b] = [first, first + 1, first + 2];
+                    let values = [r, g, b].map(
+                        #[inline(always)]
+                        |channel| self.estimates.beside(&beside, channel),
+                    );
+                    planes.add_values(scramble, STEP, y, weights, values);
                 }
             }
-            planes.add(y, &self.row(block, &beside, &weights));
         }
         let mut values = own_values(block, self.estimates);
         planes.at_center(&mut values);
@@ -237,72 +219,78 @@ impl Kernel<VALUES> for Fit<'_> {
     }
 }
 
-impl Fit<'_> {
-    /// The weighted sums of a row. Some eighty values of about one size: single precision keeps six digits of them.
+impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
+    /// Of both halves' neighbours in a row.
     #[inline(always)]
-    fn row<S: Simd>(
+    fn weights<const ALL_COUNT: bool, S: Simd>(
         &self,
         block: &Block<'_, S>,
         beside: &Beside<'_>,
-        weights: &[[f32x8<S>; 2]; COLUMNS],
-    ) -> Row<S> {
-        let Level { step, steps, .. } = *self.level;
-        let (simd, first) = (block.simd, OWN - steps * step);
+        own: &[f32x8<S>; GUIDES],
+        narrow: f32x8<S>,
+    ) -> [[f32x8<S>; COLUMNS]; 2] {
+        let simd = block.simd;
         let zero = simd.splat_f32x8(0.0);
-        let mut row = Row { sums: [[zero; VALUES]; 2], weights: [[zero; 2]; 3] };
-        for half in 0..2 {
-            let mut windows = [self.estimates.beside(beside, 0); OF_HALF];
-            for (place, window) in windows.iter_mut().enumerate() {
-                *window = self.estimates.beside(beside, half * OF_HALF + place);
-            }
-            let (mut sums, mut with_x, mut of_weights) = ([zero; OF_HALF], [zero; OF_HALF], [zero; 3]);
-            for (place, weight) in weights.iter().enumerate().take(2 * steps + 1) {
-                let at = first + place * step;
-                let (x, weight) = (at as f32 - OWN as f32, weight[half]);
-                of_weights[0] += weight;
-                of_weights[1] += weight * x;
-                of_weights[2] += weight * (x * x);
-                for k in 0..OF_HALF {
-                    let term = weight * lanes::<S, f32x8<S>>(simd, windows[k], at);
-                    sums[k] += term;
-                    with_x[k] += term * x;
+        // Of a guide over a texel's mean: twice for a half, and the less the more texels.
+        let guide_noise = GUIDE_SIGMAS * 2.0 / ((2 * self.level.guide_steps + 1) as f32).powi(2);
+        let y = beside.down as f32;
+        let mut guides = [self.guides.beside(beside, NOISE); GUIDES];
+        for (place, guide) in guides.iter_mut().enumerate() {
+            *guide = self.guides.beside(beside, place);
+        }
+        let mut weights = [[zero; COLUMNS]; 2];
+        for place in 0..COLUMNS {
+            let at = OWN - COLUMNS / 2 * STEP + place * STEP;
+            let x = place as f32 * STEP as f32 - (COLUMNS / 2 * STEP) as f32;
+            let noise: f32x8<S> = lanes(simd, guides[NOISE], at);
+            let expected = (own[NOISE] + noise) * guide_noise;
+            let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
+            let far = narrow * (x * x + y * y);
+            let counts = if ALL_COUNT { simd.splat_mask32x8(true) } else { block.counts(beside, at) };
+            for (half, weights) in weights.iter_mut().enumerate() {
+                let mut squares = [zero; 3];
+                for (channel, square) in squares.iter_mut().enumerate() {
+                    let guide: f32x8<S> = lanes(simd, guides[3 * half + channel], at);
+                    let difference = guide - own[3 * half + channel];
+                    *square = difference * difference;
                 }
-            }
-            row.sums[0][half * OF_HALF..][..OF_HALF].copy_from_slice(&sums);
-            row.sums[1][half * OF_HALF..][..OF_HALF].copy_from_slice(&with_x);
-            for k in 0..3 {
-                row.weights[k][half] = of_weights[k];
+                let apart = squares[0] + squares[1] + squares[2];
+                let weight = falloff(simd, far + apart * inverse);
+                weights[place] = if ALL_COUNT { weight } else { counts.select(weight, zero) };
             }
         }
-        row
+        weights
     }
 }
 
 /// What was smoothed where that helps; and the squared bias of both levels together.
-struct Choice<'a> {
+struct Choice<'a, const STEP: usize> {
     level: &'a Level,
-    estimates: &'a Smoothed,
     smoothed: &'a Strips<VALUES>,
     guides: &'a Strips<GUIDES>,
     products: &'a Strips<1>,
 }
 
-impl Kernel<{ VALUES + 1 }> for Choice<'_> {
+impl<const STEP: usize> Kernel<{ VALUES + 1 }> for Choice<'_, STEP> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; VALUES + 1] {
+    fn at<S: Simd>(
+        &self,
+        block: &Block<'_, S>,
+        estimates: &[f32x8<S>; VALUES + 1],
+    ) -> [f32x8<S>; VALUES + 1] {
         let zero = block.simd.splat_f32x8(0.0);
         let before = block.own(self.guides, NOISE) / 3.0;
-        let bias = squared_bias(block, self.level.step, self.products);
+        let bias = squared_bias(block, STEP, self.products);
         let bias = (bias - before * self.level.chance).max(zero);
         let smoothed = own_values(block, self.smoothed);
         let worse = (bias + sum_of_variances(block.simd, &smoothed) / 3.0).simd_gt(before);
         let brought = worse.select(zero, bias);
-        let mut chosen = [zero; VALUES + 1];
-        for place in 0..VALUES {
-            chosen[place] = worse.select(block.own(self.estimates, place), smoothed[place]);
+        let mut chosen = *estimates;
+        for (chosen, smoothed) in chosen.iter_mut().zip(smoothed) {
+            *chosen = worse.select(*chosen, smoothed);
         }
         // Both levels flatten what is curved, and so in the same direction.
-        let both = block.own(self.estimates, BIAS).sqrt() + brought.sqrt();
+        let both = estimates[BIAS].sqrt() + brought.sqrt();
         chosen[BIAS] = both * both;
         chosen
     }

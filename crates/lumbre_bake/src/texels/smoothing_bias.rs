@@ -13,21 +13,20 @@ const BIAS_RADIUS: usize = 3;
 /// The smoothed value of one half against the raw values of the other, which know nothing of it: the product of its differences
 /// to two scrambles, each averaged over a block, has the square of the bias as its mean, and the smoothed value's own variance.
 /// (A single texel's squared difference says the same with ten times the noise.) May be negative, by chance.
-/// Blocks are of texels `step` apart.
-pub(crate) struct Products<'a> {
-    pub step: usize,
+/// Blocks are of texels `STEP` apart.
+pub(crate) struct Products<'a, const STEP: usize> {
     pub raw: &'a Smoothed,
     pub smoothed: &'a Strips<VALUES>,
 }
 
-impl Kernel<1> for Products<'_> {
+impl<const STEP: usize> Kernel<1> for Products<'_, STEP> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>) -> [f32x8<S>; 1] {
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 1]) -> [f32x8<S>; 1] {
         let simd = block.simd;
         let zero = simd.splat_f32x8(0.0);
         let (sums, count) = block.sums(
             BLOCK_RADIUS,
-            self.step,
+            STEP,
             #[inline(always)]
             |beside, at| {
                 let mut differences = [zero; VALUES];
