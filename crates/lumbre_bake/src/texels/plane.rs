@@ -3,7 +3,8 @@
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::gather::SCRAMBLES;
-use super::lanes::{OWN, WINDOW, lanes};
+use super::lanes::{WINDOW, lanes};
+use super::neighbours::OWN;
 
 /// Scrambles of one half: the values of one plane.
 pub(crate) const HALF: usize = SCRAMBLES / 2;

@@ -2,9 +2,11 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::lanes::{Block, Kernel, Strips, lanes};
+use super::guides::own_values;
+use super::lanes::{Kernel, Strips, lanes};
+use super::neighbours::Block;
 use super::plane::{OF_HALF, VALUES};
-use super::smooth::{Smoothed, own_values};
+use super::smooth::Smoothed;
 
 /// Texels around one over which differences are averaged with their sign, and then without it.
 const BLOCK_RADIUS: usize = 1;
