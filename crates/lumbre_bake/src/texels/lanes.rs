@@ -26,7 +26,8 @@ pub(crate) struct Grid {
     pub surfaces: Vec<Surface>,
     /// Cells of all rows, without the last margin.
     cells: usize,
-    level: Level,
+    /// The instructions that this machine has; every level computes the same bits.
+    pub level: Level,
 }
 
 /// A row of a map.

@@ -156,3 +156,129 @@ impl<const N: usize> Strips<N> {
         window(&self.values, N * row.start + channel * row.stride + beside.column)
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use fearless_simd::Level;
+    use glam::Vec3;
+
+    use super::super::lanes::Kernel;
+    use super::super::surroundings::Surface;
+    use super::*;
+
+    const SIZES: [(u32, u32); 4] = [(37, 23), (5, 3), (1, 40), (90, 30)];
+
+    /// SplitMix64, in [0, 1).
+    pub(crate) fn random(state: &mut u64) -> f32 {
+        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = *state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
+    }
+
+    /// Maps in tiles of random surfaces, of which some go on and some do not, with holes; as these instructions compute them.
+    pub(crate) fn random_grid(level: Level) -> Grid {
+        let surface = |chart, x: f32, y: f32| Surface { chart, normal: Vec3::new(x, y, 0.0).normalize() };
+        let surfaces =
+            vec![surface(0, 1.0, 0.0), surface(0, 1.0, 0.2), surface(1, 1.0, 0.0), surface(1, 0.0, 1.0)];
+        let mut state = 11;
+        let mut ground = Vec::new();
+        for (width, height) in SIZES {
+            let tiles: Vec<u32> = (0..1000).map(|_| (random(&mut state) * 4.0) as u32).collect();
+            for place in 0..width * height {
+                // Wide ones: whole windows lie on one surface, too.
+                let tile = place / width / 13 * 10 + place % width / 45;
+                let hole = random(&mut state) < 0.02;
+                ground.push(if hole { NONE } else { tiles[tile as usize] });
+            }
+        }
+        let mut grid = Grid::new(SIZES.into_iter(), ground.into_iter(), surfaces);
+        grid.level = level;
+        grid
+    }
+
+    /// Random numbers of all covered texels.
+    pub(crate) fn random_strips<const N: usize>(grid: &Grid, seed: u64) -> Strips<N> {
+        grid.fill(|row, column| {
+            let mut state = seed ^ ((row * 1000 + column) as u64) << 20;
+            std::array::from_fn(|_| random(&mut state))
+        })
+    }
+
+    struct Means<'a> {
+        of: &'a Strips<2>,
+        steps: usize,
+        step: usize,
+    }
+
+    impl Kernel<2> for Means<'_> {
+        #[inline(always)]
+        fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; 2]) -> [f32x8<S>; 2] {
+            [0, 1].map(
+                #[inline(always)]
+                |channel| block.mean(self.of, channel, self.steps, self.step),
+            )
+        }
+    }
+
+    /// By asking every texel within reach.
+    fn direct_mean(
+        grid: &Grid,
+        of: &Strips<2>,
+        [row, column]: [usize; 2],
+        steps: i64,
+        step: i64,
+    ) -> [f32; 2] {
+        let surface = |row: usize, column: i64| {
+            let width = grid.rows[row].stride - MARGIN - (LANES - 1);
+            let column = usize::try_from(column).ok().filter(|column| *column < width)?;
+            Some(grid.ground[grid.rows[row].start + MARGIN + column])
+        };
+        let own = surface(row, column as i64).unwrap();
+        let (mut sums, mut count) = ([0.0; 2], 0.0);
+        for down in -steps..=steps {
+            let down = down * step;
+            if down < -i64::from(grid.rows[row].before) || down > i64::from(grid.rows[row].after) {
+                continue;
+            }
+            let row = (row as i64 + down) as usize;
+            for right in -steps..=steps {
+                let column = column as i64 + right * step;
+                let Some(other) = surface(row, column).filter(|&other| other != NONE) else { continue };
+                if other == own || goes_on(&grid.surfaces, own, other) {
+                    let values = grid.get(of, row, column as usize);
+                    sums = [sums[0] + values[0], sums[1] + values[1]];
+                    count += 1.0;
+                }
+            }
+        }
+        sums.map(|sum| sum / count)
+    }
+
+    #[test]
+    fn means_are_those_of_direct_sums_with_every_set_of_instructions() {
+        for level in [Level::new(), Level::baseline()] {
+            let grid = random_grid(level);
+            let of: Strips<2> = random_strips(&grid, 5);
+            let mut texels = 0;
+            for (steps, step) in [(0, 3), (1, 1), (1, 3), (2, 1), (2, 3), (3, 3), (4, 3), (12, 1)] {
+                let means = grid.compute(&Means { of: &of, steps, step });
+                for row in 0..grid.rows.len() {
+                    let first = grid.rows[row].start + MARGIN;
+                    for column in 0..grid.rows[row].stride - MARGIN - (LANES - 1) {
+                        if grid.ground[first + column] == NONE {
+                            assert_eq!(grid.get(&means, row, column), [0.0; 2]);
+                            continue;
+                        }
+                        // In the same order: the same bits.
+                        let direct = direct_mean(&grid, &of, [row, column], steps as i64, step as i64);
+                        assert_eq!(grid.get(&means, row, column), direct, "{row} {column} {steps} {step}");
+                        texels += 1;
+                    }
+                }
+            }
+            assert!(texels > 20_000, "{texels}");
+        }
+    }
+}

@@ -30,7 +30,7 @@ pub(crate) struct Level {
     /// Reach of the means that tell edges, in steps.
     pub guide_steps: usize,
     /// Of the variance of what goes in, the part that chance leaves in the squared bias.
-    chance: f32,
+    pub chance: f32,
 }
 
 /// The first reaches little further than a texel's own size, whatever is near; the second only where everything is far. `chance`, for
@@ -149,4 +149,31 @@ pub(crate) fn variance(estimates: &Estimates) -> Vec3 {
     let mean = mean(estimates);
     let squares: Vec3 = estimates.iter().map(|&e| (e - mean) * (e - mean)).sum();
     squares / (SCRAMBLES * (SCRAMBLES - 1)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level as Instructions;
+
+    use super::super::neighbours::tests::{random_grid, random_strips};
+    use super::*;
+
+    #[test]
+    fn every_set_of_instructions_smooths_to_the_same_bits() {
+        let smoothed = |level| {
+            let grid = random_grid(level);
+            let mut estimates = random_strips(&grid, 3);
+            smooth_strips(&grid, random_strips(&grid, 4), &mut estimates);
+            estimates.values
+        };
+        let (best, baseline) = (smoothed(Instructions::new()), smoothed(Instructions::baseline()));
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&best), bits(&baseline));
+        assert!(best.iter().all(|value| value.is_finite()));
+        // Smoothing does something.
+        let grid = random_grid(Instructions::new());
+        let before: Smoothed = random_strips(&grid, 3);
+        let changed = before.values.iter().zip(&best).filter(|(before, after)| before != after).count();
+        assert!(2 * changed > best.iter().filter(|value| **value != 0.0).count(), "{changed}");
+    }
 }

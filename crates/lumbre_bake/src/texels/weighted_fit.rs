@@ -108,3 +108,93 @@ fn falloff<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     }
     power
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level as Instructions;
+
+    use super::super::lanes::{LANES, MARGIN};
+    use super::super::neighbours::tests::{random_grid, random_strips};
+    use super::super::surroundings::{NONE, goes_on};
+    use super::*;
+
+    /// The value at the middle of the plane a + b x + c y that makes the sum of w ((value - plane)² + .002 (b² + c²)) least, in double
+    /// precision: by elimination in the normal equations. Points are weight, x, y, value.
+    fn least_squares(points: &[[f64; 4]]) -> f64 {
+        let mut rows = [[0.0; 4]; 3];
+        for &[weight, x, y, value] in points {
+            let terms = [1.0, x, y, value];
+            for (row, own) in rows.iter_mut().zip(terms) {
+                for (sum, other) in row.iter_mut().zip(terms) {
+                    *sum += weight * own * other;
+                }
+            }
+            rows[1][1] += weight * 0.002;
+            rows[2][2] += weight * 0.002;
+        }
+        // Slopes first, so that the middle's value is left.
+        for pivot in [2, 1] {
+            for row in 0..pivot {
+                let factor = rows[row][pivot] / rows[pivot][pivot];
+                for column in 0..4 {
+                    rows[row][column] -= factor * rows[pivot][column];
+                }
+            }
+        }
+        rows[0][3] / rows[0][0]
+    }
+
+    #[test]
+    fn the_fit_is_the_plane_of_weighted_least_squares() {
+        let grid = random_grid(Instructions::new());
+        let level = Level { width: 9.0, near: 0.5, guide_steps: 0, chance: 0.0 };
+        let (estimates, nearness) = (random_strips(&grid, 1), random_strips(&grid, 2));
+        let guides: Strips<GUIDES> = random_strips(&grid, 3);
+        let fit: Fit<'_, 3, 9> =
+            Fit { level: &level, estimates: &estimates, nearness: &nearness, guides: &guides };
+        let found = grid.compute(&fit);
+        let (mut texels, mut largest) = (0, 0.0f64);
+        for row in 0..grid.rows.len() {
+            let width = grid.rows[row].stride - MARGIN - (LANES - 1);
+            let surface = |row: usize, column: usize| grid.ground[grid.rows[row].start + MARGIN + column];
+            for column in (0..width).filter(|&column| surface(row, column) != NONE) {
+                let own = grid.get(&guides, row, column).map(f64::from);
+                let near = f64::from(grid.get(&nearness, row, column)[0]);
+                let mut points: [Vec<[f64; 4]>; VALUES] = Default::default();
+                for (down, right) in
+                    (-4..=4).flat_map(|down| (-4..=4).map(move |right| (3 * down, 3 * right)))
+                {
+                    let range = -i64::from(grid.rows[row].before)..=i64::from(grid.rows[row].after);
+                    let place = usize::try_from(column as i64 + right).ok().filter(|&place| place < width);
+                    let (Some(place), true) = (place, range.contains(&down)) else { continue };
+                    let beside = (row as i64 + down) as usize;
+                    let [here, there] = [surface(row, column), surface(beside, place)];
+                    if there == NONE || !(here == there || goes_on(&grid.surfaces, here, there)) {
+                        continue;
+                    }
+                    let (x, y) = (right as f64, down as f64);
+                    let other = grid.get(&guides, beside, place).map(f64::from);
+                    let values = grid.get(&estimates, beside, place).map(f64::from);
+                    for k in 0..VALUES {
+                        let half = k / (3 * HALF);
+                        let apart =
+                            (0..3).map(|c| (own[3 * half + c] - other[3 * half + c]).powi(2)).sum::<f64>();
+                        let far = (x * x + y * y) * (1.0 / 81.0 + 0.25 * near);
+                        // Variances: twice for a guide, eight of them weigh e⁻¹.
+                        let exponent = far + apart / (8.0 * 2.0 * (own[NOISE] + other[NOISE]));
+                        let weight = (1.0 - exponent / 16.0).max(0.0).powi(16);
+                        points[k].push([weight, x, y, values[k]]);
+                    }
+                }
+                for (found, points) in grid.get(&found, row, column).into_iter().zip(&points) {
+                    let expected = least_squares(points).max(0.0);
+                    largest = largest.max((f64::from(found) - expected).abs());
+                }
+                texels += 1;
+            }
+        }
+        assert!(texels > 3000, "{texels}");
+        // Beside mean squares of up to 144, single precision rounds by 144 · 2⁻²⁴, that is .004 of what counts as no spread.
+        assert!(largest < 1e-4, "{largest}");
+    }
+}
