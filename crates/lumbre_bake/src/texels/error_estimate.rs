@@ -37,15 +37,15 @@ pub(crate) struct GatherErrors<'a> {
 }
 
 /// Steps each way, and texels of a step, over which the spread of the scrambles is put together.
-const SPREAD_STEPS: i64 = 2;
-const SPREAD_STEP: i64 = 3;
+const SPREAD_STEPS: usize = 2;
+const SPREAD_STEP: usize = 3;
 /// Squared, by how much of itself the variance of four scrambles is off: 2 / (4 - 1).
 const ALONE: f32 = 2.0 / 3.0;
 
 /// Variance of every texel's mean, mean of the channels. Four scrambles alone tell it badly: in one case of seven the mean is further than
 /// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts,
 /// with one standard error of the neighbours' mean, since rays end where it is small by chance.
-pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimates: &[Estimates]) -> Vec<f32> {
+pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> Vec<f32> {
     let own: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum() / 3.0).collect();
     // The scrambles of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
@@ -55,22 +55,17 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, texels: &[Texel], estimate
             (apart * apart).element_sum() / 3.0
         })
         .collect();
-    let around = |texel: &Texel| {
-        let (mut sum, mut squares, mut of_halves, mut count) = (0.0, 0.0, 0.0, 0u32);
-        surroundings.around(texel, SPREAD_STEPS, SPREAD_STEP, |other| {
-            sum += own[other];
-            squares += own[other] * own[other];
-            of_halves += halves[other];
-            count += 1;
-        });
-        let count = count.max(1) as f32;
+    let numbers = |index: usize| [1.0, own[index], own[index] * own[index], halves[index]];
+    let sums = surroundings.sums(numbers, SPREAD_STEPS, SPREAD_STEP);
+    let around = |[count, sum, squares, of_halves]: [f32; 4]| {
+        let count = count.max(1.0);
         let (mean, of_halves) = (sum / count, of_halves / count);
         // At least that of as many values with three degrees of freedom each: of few, what they differ by says little.
         let scatter = (squares / count - mean * mean).max(ALONE * mean * mean);
         let by_chance = (scatter / count).sqrt();
         mean.max(of_halves) + by_chance
     };
-    texels.par_iter().zip(&own).map(|(texel, own)| own.max(around(texel))).collect()
+    sums.into_par_iter().zip(&own).map(|(sums, own)| own.max(around(sums))).collect()
 }
 
 impl GatherErrors<'_> {
@@ -106,7 +101,7 @@ pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, li
 }
 
 /// Texels around one over which checks are put together.
-const CHECK_RADIUS: i64 = 3;
+const CHECK_RADIUS: usize = 3;
 /// A difference between patches and real bounces counts as known, and is taken away, where it is this many times its own error.
 const KNOWN: f64 = 3.0;
 
@@ -130,8 +125,8 @@ struct Unsmoothed {
 }
 
 /// Steps each way, and texels of a step, over which squares of what is unknown are put together.
-const WIDER_STEPS: i64 = 2;
-const WIDER_STEP: i64 = 4;
+const WIDER_STEPS: usize = 2;
+const WIDER_STEP: usize = 4;
 
 /// Checks put together.
 #[derive(Clone, Copy, Default)]
@@ -154,7 +149,22 @@ impl Checks {
         }
     }
 
-    #[inline(always)]
+    /// In single precision.
+    fn numbers(&self) -> [f32; 8] {
+        let ([r, g, b], light) = (self.difference.as_vec3().to_array(), self.light.as_vec3());
+        [self.count as f32, r, g, b, self.square as f32, light.x, light.y, light.z]
+    }
+
+    /// The sums of some.
+    fn from_numbers([count, r, g, b, square, light @ ..]: [f32; 8]) -> Self {
+        Self {
+            count: f64::from(count),
+            difference: DVec3::new(r.into(), g.into(), b.into()),
+            square: f64::from(square),
+            light: Vec3::from(light).as_dvec3(),
+        }
+    }
+
     fn add(&mut self, other: &Self) {
         self.count += other.count;
         self.difference += other.difference;
@@ -202,9 +212,8 @@ pub(crate) fn patch_bias(
             known * mean * checks.count / checks.light.max(DVec3::splat(f64::MIN_POSITIVE))
         })
         .collect();
-    let around = |texel: &Texel| {
-        let mut checks = Checks::default();
-        surroundings.around(texel, CHECK_RADIUS, 1, |other| checks.add(&checked[other]));
+    let around = |(texel, sums): (&Texel, [f32; 8])| {
+        let checks = Checks::from_numbers(sums);
         if checks.count < 2.0 {
             return Unsmoothed::default();
         }
@@ -219,20 +228,17 @@ pub(crate) fn patch_bias(
         let later = later * square(correction);
         Unsmoothed { correction: correction.as_vec3(), unknown: unknown as f32, later: later as f32 }
     };
-    let alone: Vec<Unsmoothed> = texels.par_iter().map(around).collect();
+    let sums = surroundings.sums(|index| checked[index].numbers(), CHECK_RADIUS, 1);
+    let alone: Vec<Unsmoothed> = texels.par_iter().zip(sums).map(around).collect();
     // One neighbourhood's checks tell the square of what is unknown by a single sample, which may be as good as nothing: others' tell it too.
-    let wider = |(texel, own): (&Texel, &Unsmoothed)| {
-        let (mut sum, mut count) = (0.0, 0u32);
-        surroundings.around(texel, WIDER_STEPS, WIDER_STEP, |other| {
-            sum += alone[other].unknown;
-            count += 1;
-        });
-        let unknown = own.unknown.max(sum / count.max(1) as f32);
+    let sums = surroundings.sums(|index| [1.0, alone[index].unknown], WIDER_STEPS, WIDER_STEP);
+    let wider = |([count, sum], own): ([f32; 2], &Unsmoothed)| {
+        let unknown = own.unknown.max(sum / count.max(1.0));
         PatchBias {
             correction: own.correction,
             rest: unknown.max(0.0) + own.later,
             expected: own.unknown + own.later,
         }
     };
-    texels.par_iter().zip(&alone).map(wider).collect()
+    sums.into_par_iter().zip(&alone).map(wider).collect()
 }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Select, Simd, dispatch, f32x8, mask32x8, prelude::*, u32x8};
+use fearless_simd::{Level, Select, Simd, dispatch, f32x8, prelude::*, u32x8};
 use rayon::prelude::*;
 
 use super::neighbours::Block;

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Select, Simd, f32x8, mask32x8, prelude::*, u32x8};
 
-use super::lanes::{Grid, LANES, MARGIN, MapRow, Strips, WINDOW, lanes, window};
+use super::lanes::{Grid, Kernel, LANES, MARGIN, MapRow, Strips, WINDOW, lanes, window};
 use super::surroundings::{NONE, goes_on};
 
 /// Eight texels side by side, at least the first of them covered.
@@ -148,6 +148,32 @@ impl<'g, S: Simd> Block<'g, S> {
     }
 }
 
+/// Sums over neighbours.
+pub(crate) struct BoxSums<'a, const N: usize> {
+    pub of: &'a Strips<N>,
+    pub steps: usize,
+    pub step: usize,
+}
+
+impl<const N: usize> Kernel<N> for BoxSums<'_, N> {
+    #[inline(always)]
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; N]) -> [f32x8<S>; N] {
+        let (sums, _) = block.sums(
+            self.steps,
+            self.step,
+            #[inline(always)]
+            |beside, at| {
+                let mut terms = [block.simd.splat_f32x8(0.0); N];
+                for (channel, term) in terms.iter_mut().enumerate() {
+                    *term = lanes(block.simd, self.of.beside(beside, channel), at);
+                }
+                terms
+            },
+        );
+        sums
+    }
+}
+
 impl<const N: usize> Strips<N> {
     /// What eight texels see of a channel in a row.
     #[inline(always)]
@@ -162,7 +188,6 @@ pub(crate) mod tests {
     use fearless_simd::Level;
     use glam::Vec3;
 
-    use super::super::lanes::Kernel;
     use super::super::surroundings::Surface;
     use super::*;
 

@@ -101,7 +101,7 @@ pub(crate) fn gather(
         watch.advance(1.0)?;
         let patch_bias =
             patch_bias(&surroundings, texels, &gathered, &raw, outgoing.patches.mean_reflectance());
-        let spread = spread(&surroundings, texels, &estimates);
+        let spread = spread(&surroundings, &estimates);
         let errors = GatherErrors {
             gathered: &gathered,
             estimates: &estimates,

@@ -55,13 +55,12 @@ pub(crate) fn smooth(
         std::array::from_fn(|place| if place < BIAS { estimates[place / 3][place % 3] } else { 0.0 })
     });
     smooth_strips(grid, things, &mut smoothed);
-    let texels = surroundings.texels.par_iter().zip(estimates);
-    let smoothed = texels.map(|(texel, estimates)| {
-        let Some((row, column)) = surroundings.place(texel) else { return (*estimates, 0.0) };
-        let found = grid.get(&smoothed, row, column);
-        (std::array::from_fn(|scramble| Vec3::from_slice(&found[3 * scramble..])), found[BIAS])
+    let found = surroundings.read(&smoothed).into_par_iter();
+    let of_texels = found.zip(surroundings.texels).zip(estimates).map(|((found, texel), estimates)| {
+        let smoothed = std::array::from_fn(|scramble| Vec3::from_slice(&found[3 * scramble..]));
+        if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, found[BIAS]) }
     });
-    smoothed.unzip()
+    of_texels.unzip()
 }
 
 /// The same of strips: `things` holds how near things are and the texels' sides.
