@@ -22,20 +22,25 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
     #[inline(always)]
     fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; VALUES]) -> [f32x8<S>; VALUES] {
         let simd = block.simd;
-        let mut own = [simd.splat_f32x8(0.0); GUIDES];
+        let zero = simd.splat_f32x8(0.0);
+        let mut own = [zero; GUIDES];
         for (place, own) in own.iter_mut().enumerate() {
             *own = block.own(self.guides, place);
         }
         let near = self.level.near * self.level.near;
         let narrow = block.own(self.nearness, 0) * near + self.level.width.powi(-2);
+        // Of a guide over a texel's mean: twice for a half, and the less the more texels.
+        let guide_noise = GUIDE_SIGMAS * 2.0 / ((2 * self.level.guide_steps + 1) as f32).powi(2);
+        let texels = Texels { own, narrow, guide_noise };
+        let mut weights = [[zero; COLUMNS]; 2];
         let mut planes = Planes::new(simd);
         for beside in block.rows(COLUMNS / 2, STEP) {
             let y = beside.down as f32;
-            let weights = if block.all_count(&beside, COLUMNS / 2 * STEP) {
-                self.weights::<true, S>(block, &beside, &own, narrow)
+            if block.all_count(&beside, COLUMNS / 2 * STEP) {
+                self.weigh::<true, S>(block, &beside, &texels, &mut weights);
             } else {
-                self.weights::<false, S>(block, &beside, &own, narrow)
-            };
+                self.weigh::<false, S>(block, &beside, &texels, &mut weights);
+            }
             for (half, weights) in weights.iter().enumerate() {
                 planes.add_weights(half, STEP, y, weights);
                 for scramble in half * HALF..(half + 1) * HALF {
@@ -55,33 +60,40 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
     }
 }
 
+/// What the weights depend on of the texels themselves.
+struct Texels<S: Simd> {
+    own: [f32x8<S>; GUIDES],
+    /// Of a squared distance in texels.
+    narrow: f32x8<S>,
+    /// Of the noise of two texels, by which squared differences of their guides are divided.
+    guide_noise: f32,
+}
+
 impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
-    /// Of both halves' neighbours in a row.
+    /// Weighs both halves' neighbours in a row.
     #[inline(always)]
-    fn weights<const ALL_COUNT: bool, S: Simd>(
+    fn weigh<const ALL_COUNT: bool, S: Simd>(
         &self,
         block: &Block<'_, S>,
         beside: &Beside<'_>,
-        own: &[f32x8<S>; GUIDES],
-        narrow: f32x8<S>,
-    ) -> [[f32x8<S>; COLUMNS]; 2] {
+        texels: &Texels<S>,
+        weights: &mut [[f32x8<S>; COLUMNS]; 2],
+    ) {
         let simd = block.simd;
         let zero = simd.splat_f32x8(0.0);
-        // Of a guide over a texel's mean: twice for a half, and the less the more texels.
-        let guide_noise = GUIDE_SIGMAS * 2.0 / ((2 * self.level.guide_steps + 1) as f32).powi(2);
+        let Texels { own, narrow, guide_noise } = texels;
         let y = beside.down as f32;
         let mut guides = [self.guides.beside(beside, NOISE); GUIDES];
         for (place, guide) in guides.iter_mut().enumerate() {
             *guide = self.guides.beside(beside, place);
         }
-        let mut weights = [[zero; COLUMNS]; 2];
         for place in 0..COLUMNS {
             let at = OWN - COLUMNS / 2 * STEP + place * STEP;
             let x = place as f32 * STEP as f32 - (COLUMNS / 2 * STEP) as f32;
             let noise: f32x8<S> = lanes(simd, guides[NOISE], at);
-            let expected = (own[NOISE] + noise) * guide_noise;
+            let expected = (own[NOISE] + noise) * *guide_noise;
             let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
-            let far = narrow * (x * x + y * y);
+            let far = *narrow * (x * x + y * y);
             let counts = if ALL_COUNT { simd.splat_mask32x8(true) } else { block.counts(beside, at) };
             for (half, weights) in weights.iter_mut().enumerate() {
                 let mut squares = [zero; 3];
@@ -95,7 +107,6 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
                 weights[place] = if ALL_COUNT { weight } else { counts.select(weight, zero) };
             }
         }
-        weights
     }
 }
 
