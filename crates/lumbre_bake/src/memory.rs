@@ -35,8 +35,10 @@ const COVERED: u64 = (size_of::<Texel>()
     + 24
     + 8 * 4) as u64;
 
-/// Of a texel of a map: its light, direct and filled, the fill's two lists with their errors, its error, its place in the neighbourhoods.
-const MAPPED: u64 = 5 * 12 + 3 * 4 + 4 + 8;
+/// Of a texel of a map: its light, direct and filled, the fill's two lists with their errors, and its error; or, before that and more, the numbers
+/// that smoothing keeps in rows: estimates with their bias, those of the weighted fit, guides with the noise, products and nearness. Its place
+/// among the covered ones and its surface.
+const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8;
 
 /// Of a patch: itself, its direct light in two halves and together, its rows' heads, and sixteen lists of the solver for each channel.
 const PATCH: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8) as u64;
