@@ -145,10 +145,11 @@ mod tests {
         }
         // Slopes first, so that the middle's value is left.
         for pivot in [2, 1] {
-            for row in 0..pivot {
-                let factor = rows[row][pivot] / rows[pivot][pivot];
-                for column in 0..4 {
-                    rows[row][column] -= factor * rows[pivot][column];
+            let eliminated = rows[pivot];
+            for row in &mut rows[..pivot] {
+                let factor = row[pivot] / eliminated[pivot];
+                for (value, other) in row.iter_mut().zip(eliminated) {
+                    *value -= factor * other;
                 }
             }
         }
