@@ -29,24 +29,62 @@ impl Sequence {
 
     /// The four dimensions of point `index`, of dimension set `set` (0, 1, …).
     pub fn point(&self, index: u32, set: u32) -> [f32; 4] {
-        let seed = match index / LENGTH {
-            0 => self.seed,
-            beyond => self.of(beyond).seed,
-        };
-        sample(index % LENGTH, set, seed)
+        self.set(set).point(index)
+    }
+
+    /// One dimension set, for several points.
+    pub fn set(&self, set: u32) -> SequenceSet {
+        SequenceSet { sequence: *self, set, scramble: Scramble::new(set, self.seed) }
     }
 }
 
-/// As `sobol_burley::sample_4d`, with the first sets' points looked up four bits of the index at a time.
-fn sample(index: u32, set: u32, seed: u32) -> [f32; 4] {
-    let Some(nibbles) = NIBBLES.get(set as usize) else { return sobol_burley::sample_4d(index, set, seed) };
-    let shuffled = owen_scramble_rev(index.reverse_bits(), parts::hash(seed ^ 0x79c6_8e4a));
-    let of_nibble =
-        |nibble: usize| -> Int4 { nibbles[nibble][(shuffled >> (28 - 4 * nibble) & 15) as usize].into() };
-    let point = of_nibble(0) ^ of_nibble(1) ^ of_nibble(2) ^ of_nibble(3);
-    let scramble = seed.wrapping_mul(0x9c8f_2d3b) ^ set;
-    let scramble = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].map(|own| own ^ scramble);
-    owen_scramble_int4_rev(point, hash_int4(scramble.into())).reverse_bits().to_f32_norm()
+/// One dimension set of a sequence.
+#[derive(Clone, Copy)]
+pub(crate) struct SequenceSet {
+    sequence: Sequence,
+    set: u32,
+    scramble: Scramble,
+}
+
+impl SequenceSet {
+    /// The four dimensions of point `index`.
+    pub fn point(&self, index: u32) -> [f32; 4] {
+        let scramble = match index / LENGTH {
+            0 => self.scramble,
+            beyond => Scramble::new(self.set, self.sequence.of(beyond).seed),
+        };
+        scramble.point(self.set, index % LENGTH)
+    }
+}
+
+/// What `sobol_burley::sample_4d` hashes for every point, once.
+#[derive(Clone, Copy)]
+struct Scramble {
+    shuffle: u32,
+    dimensions: Int4,
+}
+
+impl Scramble {
+    fn new(set: u32, seed: u32) -> Self {
+        let own = seed.wrapping_mul(0x9c8f_2d3b) ^ set;
+        let dimensions = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].map(|other| own ^ other);
+        Self { shuffle: parts::hash(seed ^ 0x79c6_8e4a), dimensions: hash_int4(dimensions.into()) }
+    }
+
+    /// As `sobol_burley::sample_4d`, with the first sets' points looked up four bits of the index at a time.
+    fn point(&self, set: u32, index: u32) -> [f32; 4] {
+        let shuffled = owen_scramble_rev(index.reverse_bits(), self.shuffle);
+        let point = match NIBBLES.get(set as usize) {
+            Some(nibbles) => {
+                let of = |nibble: usize| -> Int4 {
+                    nibbles[nibble][(shuffled >> (28 - 4 * nibble) & 15) as usize].into()
+                };
+                of(0) ^ of(1) ^ of(2) ^ of(3)
+            }
+            None => sobol_int4_rev(shuffled, set),
+        };
+        owen_scramble_int4_rev(point, self.dimensions).reverse_bits().to_f32_norm()
+    }
 }
 
 /// Dimension sets with a table.
@@ -132,7 +170,7 @@ mod tests {
         for (seed, set) in [(0, 0), (7, 1), (u32::MAX, 7), (0x1234_5678, 8), (9, 60)] {
             for index in (0..LENGTH).step_by(7) {
                 let expected = sobol_burley::sample_4d(index, set, seed);
-                assert_eq!(sample(index, set, seed), expected, "{index} {set} {seed}");
+                assert_eq!(Scramble::new(set, seed).point(set, index), expected, "{index} {set} {seed}");
             }
         }
     }

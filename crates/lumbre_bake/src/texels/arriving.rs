@@ -52,6 +52,20 @@ pub(super) struct Met {
     pub distance: f32,
 }
 
+impl Met {
+    /// Nothing is read yet.
+    const UNREAD: Self = Self {
+        triangle: 0,
+        side: Side::Front,
+        at: (0.0, 0.0),
+        patch: 0,
+        reflectance: Vec3::ZERO,
+        direct: Vec3::ZERO,
+        direction: Vec3::ZERO,
+        distance: 0.0,
+    };
+}
+
 /// A surface that reflects, with the sample's weight, or else what arrives all the same (times π as all light is here): the sky's, or none, with its
 /// weight.
 pub(super) type Arriving = Result<(Met, f32), (Vec3, f32)>;
@@ -62,28 +76,20 @@ pub(super) const NOTHING: (Vec3, f32) = (Vec3::ZERO, 0.0);
 /// Where a sample looks.
 #[derive(Clone, Copy)]
 enum Aim {
-    /// About the receiver's normal.
-    Around {
-        u: f32,
-        v: f32,
-    },
-    /// At a region of the guide, named with this probability.
-    At {
-        region: u32,
-        u: f32,
-        v: f32,
-        probability: f32,
-    },
+    /// In a direction about the receiver's normal.
+    Around(Vec3),
+    /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
+    At(u32, f32, Met, Vec3),
     Nowhere,
 }
 
-/// What is known of a sample under way.
+/// A sample under way.
 #[derive(Clone, Copy)]
 struct Way {
     aim: Aim,
     /// Of the samples, what the guide places; none if it knows nothing of the receiver.
     share: Option<f32>,
-    /// Region met, if there is one and it is asked for.
+    /// Region met, where it counts.
     region: Option<u32>,
 }
 
@@ -93,6 +99,18 @@ fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
     (direction.dot(receiver.normal).max(0.0) + below.dot(receiver.normal).max(0.0)) * FRAC_1_PI
 }
 
+/// A direction with density [`kernel`].
+#[inline]
+fn about(receiver: &Receiver, u: f32, v: f32) -> Vec3 {
+    let direction = cosine_about(receiver.normal, u, v);
+    let below = direction.dot(receiver.geometric_normal);
+    if below <= 0.0 {
+        // Under the facet though above the smooth surface: mirrored up.
+        return direction - receiver.geometric_normal * (2.0 * below);
+    }
+    direction
+}
+
 impl Outgoing<'_> {
     /// For each receiver a point that its light by bounces comes from: some of the samples, if the guide knows the receiver's region, are
     /// points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic (Veach and Guibas, "Optimally
@@ -100,16 +118,40 @@ impl Outgoing<'_> {
     pub(super) fn arriving<const MOST: usize>(&self, asked: &[Asked], found: &mut [Arriving; MOST]) {
         let mut ways = [Way { aim: Aim::Nowhere, share: None, region: None }; MOST];
         for (way, asked) in ways.iter_mut().zip(asked) {
-            *way = self.way(asked);
+            way.share = asked.region.and_then(|region| self.guide.share(region));
+            way.aim = self.aim(asked, way.share);
         }
-        for ((way, asked), found) in ways.iter_mut().zip(asked).zip(found.iter_mut()) {
-            *found = self.follow(asked, way);
+        for ((way, asked), found) in ways.iter().zip(asked).zip(found.iter_mut()) {
+            *found = match &way.aim {
+                Aim::Nowhere => Err(NOTHING),
+                Aim::At(_, _, met, end) => {
+                    let hidden = self.scene.blocked(asked.receiver.origin, *end);
+                    if hidden { Err(NOTHING) } else { Ok((*met, 1.0)) }
+                }
+                Aim::Around(direction) => match self.meet(asked.receiver.origin, *direction) {
+                    Ok(met) => Ok((met, 1.0)),
+                    Err(light) => {
+                        // The sky is found by these alone.
+                        let rest = 1.0 - way.share.unwrap_or(0.0);
+                        Err((light / rest, 1.0 / rest))
+                    }
+                },
+            };
         }
-        for (found, _) in found.iter_mut().zip(asked) {
-            if let Ok((met, _)) = found {
-                met.reflectance = self.reflectance(met.triangle, met.side, met.at);
-                met.direct = self.direct_at(met.triangle, met.side, met.at, met.patch);
-            }
+        for ((way, found), _) in ways.iter_mut().zip(found.iter_mut()).zip(asked) {
+            let Ok((met, _)) = found else { continue };
+            let Some(patch) = self.patches.at(met.triangle, met.side, met.at) else {
+                *found = Err(NOTHING);
+                continue;
+            };
+            way.region = match way.aim {
+                Aim::At(region, ..) => Some(region),
+                _ if way.share.is_some() => self.guide.regions.at(met.triangle, met.side, met.at),
+                _ => None,
+            };
+            met.patch = patch;
+            met.reflectance = self.reflectance(met.triangle, met.side, met.at);
+            met.direct = self.direct_at(met.triangle, met.side, met.at, patch);
         }
         for ((way, asked), found) in ways.iter().zip(asked).zip(found) {
             if let (Ok((met, weight)), Some(share)) = (&mut *found, way.share) {
@@ -121,54 +163,28 @@ impl Outgoing<'_> {
         }
     }
 
-    /// Where to look.
-    fn way(&self, &Asked { region, u, v, .. }: &Asked) -> Way {
-        let Some((region, share)) = region.and_then(|region| Some((region, self.guide.share(region)?)))
-        else {
-            return Way { aim: Aim::Around { u, v }, share: None, region: None };
+    /// Where to look: the guide's rows are far, so nothing here waits for what a ray meets.
+    #[inline]
+    fn aim(&self, asked: &Asked, share: Option<f32>) -> Aim {
+        let &Asked { ref receiver, region, u, v } = asked;
+        let (Some(region), Some(share)) = (region, share) else {
+            return Aim::Around(about(receiver, u, v));
         };
-        let aim = if u < share {
-            match self.guide.pick(region, u / share) {
-                Some((region, u, probability)) => Aim::At { region, u, v, probability },
-                None => Aim::Nowhere,
-            }
-        } else {
-            Aim::Around { u: (u - share) / (1.0 - share), v }
-        };
-        Way { aim, share: Some(share), region: None }
-    }
-
-    /// What is there: its light is not read yet, its weight 1.
-    fn follow(&self, asked: &Asked, way: &mut Way) -> Arriving {
-        let met = match way.aim {
-            Aim::Nowhere => return Err(NOTHING),
-            Aim::At { region, u, v, .. } => {
-                way.region = Some(region);
-                self.point_of(&asked.receiver, region, u, v).ok_or(NOTHING)?
-            }
-            Aim::Around { u, v } => {
-                let met = self.meet_about(&asked.receiver, u, v);
-                // The sky is found by these alone.
-                let rest = 1.0 - way.share.unwrap_or(0.0);
-                let met = met.map_err(|light| (light / rest, 1.0 / rest))?;
-                if way.share.is_some() {
-                    way.region = self.guide.regions.at(met.triangle, met.side, met.at);
-                }
-                met
-            }
-        };
-        Ok((met, 1.0))
+        if u >= share {
+            return Aim::Around(about(receiver, (u - share) / (1.0 - share), v));
+        }
+        let picked = self.guide.pick(region, u / share);
+        picked
+            .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v))
+            .unwrap_or(Aim::Nowhere)
     }
 
     /// The weight of a sample of which the guide places a share.
     fn weight(&self, asked: &Asked, way: &Way, share: f32, met: &Met) -> Option<f32> {
         let region = way.region?;
         let probability = match way.aim {
-            Aim::At { probability, .. } => probability,
-            Aim::Around { .. } => {
-                asked.region.map_or(0.0, |receiver| self.guide.probability(receiver, region))
-            }
-            Aim::Nowhere => return None,
+            Aim::At(_, probability, ..) => probability,
+            _ => asked.region.map_or(0.0, |receiver| self.guide.probability(receiver, region)),
         };
         // Densities over the surfaces' area.
         let by_guide = probability / self.guide.regions.list[region as usize].area;
@@ -179,25 +195,22 @@ impl Outgoing<'_> {
         (cosine > 0.0 && weight.is_finite()).then_some(weight)
     }
 
-    /// What a ray about a receiver's normal meets, or what arrives all the same.
-    fn meet_about(&self, receiver: &Receiver, u: f32, v: f32) -> Result<Met, Vec3> {
-        let mut direction = cosine_about(receiver.normal, u, v);
-        let below = direction.dot(receiver.geometric_normal);
-        if below <= 0.0 {
-            // Under the facet though above the smooth surface: mirrored up.
-            direction -= receiver.geometric_normal * (2.0 * below);
+    /// What a ray meets, its light not read yet, or what arrives all the same.
+    #[inline]
+    fn meet(&self, origin: Vec3, direction: Vec3) -> Result<Met, Vec3> {
+        match self.scene.first_hit(origin, direction) {
+            SurfaceHit::Lit { triangle, side, at, distance } => {
+                Ok(Met { triangle, side, at, direction, distance, ..Met::UNREAD })
+            }
+            SurfaceHit::None => Err(self.sky),
+            SurfaceHit::Back | SurfaceHit::Inside => Err(Vec3::ZERO),
         }
-        let (triangle, side, at, distance) = match self.scene.first_hit(receiver.origin, direction) {
-            SurfaceHit::Lit { triangle, side, at, distance } => (triangle, side, at, distance),
-            SurfaceHit::None => return Err(self.sky),
-            SurfaceHit::Back | SurfaceHit::Inside => return Err(Vec3::ZERO),
-        };
-        self.unread(triangle, side, at, direction, distance).ok_or(Vec3::ZERO)
     }
 
-    /// A point of a region, if the receiver sees it.
-    fn point_of(&self, receiver: &Receiver, region: u32, u: f32, v: f32) -> Option<Met> {
-        let region = &self.guide.regions.list[region as usize];
+    /// A point of a region, if it and the receiver face each other.
+    #[inline]
+    fn point_of(&self, receiver: &Receiver, index: u32, probability: f32, u: f32, v: f32) -> Option<Aim> {
+        let region = &self.guide.regions.list[index as usize];
         let (triangle, side) = (region.triangle, region.side);
         let at = self.guide.regions.point(region, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
@@ -211,24 +224,8 @@ impl Outgoing<'_> {
             return None;
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
-        if self.scene.blocked(receiver.origin, end) {
-            return None;
-        }
-        self.unread(triangle, side, at, direction, distance)
-    }
-
-    /// A surface whose light is still to be read.
-    fn unread(
-        &self,
-        triangle: u32,
-        side: Side,
-        at: (f32, f32),
-        direction: Vec3,
-        distance: f32,
-    ) -> Option<Met> {
-        let patch = self.patches.at(triangle, side, at)?;
-        let (reflectance, direct) = (Vec3::ZERO, Vec3::ZERO);
-        Some(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
+        let met = Met { triangle, side, at, direction, distance, ..Met::UNREAD };
+        Some(Aim::At(index, probability, met, end))
     }
 
     /// The receiver at a surface that was met.

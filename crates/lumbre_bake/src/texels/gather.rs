@@ -159,7 +159,7 @@ impl Outgoing<'_> {
             (0..SCRAMBLES).flat_map(|scramble| (from..samples).map(move |sample| (scramble, sample)));
         let mut batch = Batch::default();
         while let Some((scramble, sample)) = all.next() {
-            let [x, y, u, v] = sequences[scramble].point(sample, 0);
+            let [x, y, u, v] = sequences[scramble].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
                 let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
                 batch.push(Asked { receiver: receiver(self.scene, &point), region, u, v }, scramble, sample);
