@@ -10,6 +10,7 @@ use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::SurfaceHit;
 use crate::scene::material::Side;
 use crate::transport::direct::Receiver;
+use crate::transport::guide::Part;
 
 /// A receiver that asks for a sample of its light by bounces.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +46,9 @@ pub(super) struct Met {
     pub at: (f32, f32),
     pub patch: u32,
     pub reflectance: Vec3,
-    /// Direct irradiance there.
+    /// Irradiance there: direct, and the patch's by bounces.
     pub direct: Vec3,
+    pub indirect: Vec3,
     /// Of the ray, of unit length, and how far it went.
     pub direction: Vec3,
     pub distance: f32,
@@ -61,17 +63,26 @@ impl Met {
         patch: 0,
         reflectance: Vec3::ZERO,
         direct: Vec3::ZERO,
+        indirect: Vec3::ZERO,
         direction: Vec3::ZERO,
         distance: 0.0,
     };
 }
 
-/// A surface that reflects, with the sample's weight, or else what arrives all the same (times π as all light is here): the sky's, or none, with its
-/// weight.
-pub(super) type Arriving = Result<(Met, f32), (Vec3, f32)>;
+/// What a sample has found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arriving {
+    /// A surface that reflects.
+    pub met: Option<Met>,
+    /// Or else what arrives all the same, times π as all light is here: the sky's, or none. Weighted.
+    pub light: Vec3,
+    pub weight: f32,
+}
 
-/// No light and no weight: what the guide named is not to be seen.
-pub(super) const NOTHING: (Vec3, f32) = (Vec3::ZERO, 0.0);
+impl Arriving {
+    /// No light and no weight: what the guide named is not to be seen.
+    pub const NOTHING: Self = Self { met: None, light: Vec3::ZERO, weight: 0.0 };
+}
 
 /// Where a sample looks.
 #[derive(Clone, Copy)]
@@ -89,8 +100,16 @@ struct Way {
     aim: Aim,
     /// Of the samples, what the guide places; none if it knows nothing of the receiver.
     share: Option<f32>,
-    /// Region met, where it counts.
+    /// Part of the guide's row that is asked next.
+    part: Part,
+    /// Region and texel met, where they count.
     region: Option<u32>,
+    texel: usize,
+}
+
+impl Way {
+    const NONE: Self =
+        Self { aim: Aim::Nowhere, share: None, part: Part::NONE, region: None, texel: usize::MAX };
 }
 
 /// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
@@ -116,32 +135,27 @@ impl Outgoing<'_> {
     /// points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic (Veach and Guibas, "Optimally
     /// Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
     pub(super) fn arriving<const MOST: usize>(&self, asked: &[Asked], found: &mut [Arriving; MOST]) {
-        let mut ways = [Way { aim: Aim::Nowhere, share: None, region: None }; MOST];
+        // One thing for all samples before the next: the loops that read from afar do little else.
+        let mut ways = [Way::NONE; MOST];
+        let ways = &mut ways[..asked.len()];
         for (way, asked) in ways.iter_mut().zip(asked) {
             way.share = asked.region.and_then(|region| self.guide.share(region));
-            way.aim = self.aim(asked, way.share);
+            if let (Some(region), Some(share)) = (asked.region, way.share)
+                && asked.u < share
+            {
+                way.part = self.guide.near(region, asked.u / share);
+            }
+        }
+        for (way, asked) in ways.iter_mut().zip(asked) {
+            way.aim = self.aim(asked, way);
         }
         for ((way, asked), found) in ways.iter().zip(asked).zip(found.iter_mut()) {
-            *found = match &way.aim {
-                Aim::Nowhere => Err(NOTHING),
-                Aim::At(_, _, met, end) => {
-                    let hidden = self.scene.blocked(asked.receiver.origin, *end);
-                    if hidden { Err(NOTHING) } else { Ok((*met, 1.0)) }
-                }
-                Aim::Around(direction) => match self.meet(asked.receiver.origin, *direction) {
-                    Ok(met) => Ok((met, 1.0)),
-                    Err(light) => {
-                        // The sky is found by these alone.
-                        let rest = 1.0 - way.share.unwrap_or(0.0);
-                        Err((light / rest, 1.0 / rest))
-                    }
-                },
-            };
+            self.follow(asked, way, found);
         }
-        for ((way, found), _) in ways.iter_mut().zip(found.iter_mut()).zip(asked) {
-            let Ok((met, _)) = found else { continue };
+        for (way, found) in ways.iter_mut().zip(found.iter_mut()) {
+            let Some(met) = &mut found.met else { continue };
             let Some(patch) = self.patches.at(met.triangle, met.side, met.at) else {
-                *found = Err(NOTHING);
+                *found = Arriving::NOTHING;
                 continue;
             };
             way.region = match way.aim {
@@ -151,40 +165,81 @@ impl Outgoing<'_> {
             };
             met.patch = patch;
             met.reflectance = self.reflectance(met.triangle, met.side, met.at);
-            met.direct = self.direct_at(met.triangle, met.side, met.at, patch);
+            way.texel = self.texel_at(met.triangle, met.side, met.at);
+        }
+        for ((way, asked), found) in ways.iter_mut().zip(asked).zip(found.iter_mut()) {
+            let Some(met) = &mut found.met else { continue };
+            met.direct = self.direct.get(way.texel).copied().unwrap_or(Vec3::NAN);
+            met.indirect = self.patch_indirect[met.patch as usize];
+            if let (Aim::Around(_), Some(own), Some(region)) = (&way.aim, asked.region, way.region) {
+                way.part = self.guide.near_region(own, region);
+            }
         }
         for ((way, asked), found) in ways.iter().zip(asked).zip(found) {
-            if let (Ok((met, weight)), Some(share)) = (&mut *found, way.share) {
+            let Some(met) = &mut found.met else { continue };
+            if met.direct.x.is_nan() {
+                met.direct = self.direct_of_part(met.triangle, met.side, met.at, met.patch);
+            }
+            if let Some(share) = way.share {
                 match self.weight(asked, way, share, met) {
-                    Some(own) => *weight = own,
-                    None => *found = Err(NOTHING),
+                    Some(weight) => found.weight = weight,
+                    None => *found = Arriving::NOTHING,
                 }
             }
         }
     }
 
-    /// Where to look: the guide's rows are far, so nothing here waits for what a ray meets.
+    /// Where to look.
     #[inline]
-    fn aim(&self, asked: &Asked, share: Option<f32>) -> Aim {
-        let &Asked { ref receiver, region, u, v } = asked;
-        let (Some(region), Some(share)) = (region, share) else {
-            return Aim::Around(about(receiver, u, v));
-        };
-        if u >= share {
-            return Aim::Around(about(receiver, (u - share) / (1.0 - share), v));
+    fn aim(&self, asked: &Asked, way: &Way) -> Aim {
+        let &Asked { ref receiver, u, v, .. } = asked;
+        match way.share {
+            None => Aim::Around(about(receiver, u, v)),
+            Some(share) if u >= share => Aim::Around(about(receiver, (u - share) / (1.0 - share), v)),
+            Some(share) => {
+                let picked = self.guide.pick(&way.part, u / share);
+                picked.map_or(Aim::Nowhere, |(region, u, probability)| {
+                    self.point_of(receiver, region, probability, u, v).unwrap_or(Aim::Nowhere)
+                })
+            }
         }
-        let picked = self.guide.pick(region, u / share);
-        picked
-            .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v))
-            .unwrap_or(Aim::Nowhere)
+    }
+
+    /// What is there, its light not read yet.
+    #[inline]
+    fn follow(&self, asked: &Asked, way: &Way, found: &mut Arriving) {
+        *found = Arriving::NOTHING;
+        let origin = asked.receiver.origin;
+        match &way.aim {
+            Aim::Nowhere => {}
+            Aim::At(_, _, met, end) => {
+                if !self.scene.blocked(origin, *end) {
+                    found.met = Some(*met);
+                    found.weight = 1.0;
+                }
+            }
+            &Aim::Around(direction) => {
+                // The sky is found by these alone.
+                let rest = 1.0 - way.share.unwrap_or(0.0);
+                match self.scene.first_hit(origin, direction) {
+                    SurfaceHit::Lit { triangle, side, at, distance } => {
+                        found.met = Some(Met { triangle, side, at, direction, distance, ..Met::UNREAD });
+                        found.weight = 1.0;
+                    }
+                    SurfaceHit::None => (found.light, found.weight) = (self.sky / rest, 1.0 / rest),
+                    SurfaceHit::Back | SurfaceHit::Inside => found.weight = 1.0 / rest,
+                }
+            }
+        }
     }
 
     /// The weight of a sample of which the guide places a share.
+    #[inline]
     fn weight(&self, asked: &Asked, way: &Way, share: f32, met: &Met) -> Option<f32> {
         let region = way.region?;
         let probability = match way.aim {
             Aim::At(_, probability, ..) => probability,
-            _ => asked.region.map_or(0.0, |receiver| self.guide.probability(receiver, region)),
+            _ => self.guide.probability(&way.part, region),
         };
         // Densities over the surfaces' area.
         let by_guide = probability / self.guide.regions.list[region as usize].area;
@@ -193,18 +248,6 @@ impl Outgoing<'_> {
         let by_cosine = kernel(&asked.receiver, met.direction) * cosine / (met.distance * met.distance);
         let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
         (cosine > 0.0 && weight.is_finite()).then_some(weight)
-    }
-
-    /// What a ray meets, its light not read yet, or what arrives all the same.
-    #[inline]
-    fn meet(&self, origin: Vec3, direction: Vec3) -> Result<Met, Vec3> {
-        match self.scene.first_hit(origin, direction) {
-            SurfaceHit::Lit { triangle, side, at, distance } => {
-                Ok(Met { triangle, side, at, direction, distance, ..Met::UNREAD })
-            }
-            SurfaceHit::None => Err(self.sky),
-            SurfaceHit::Back | SurfaceHit::Inside => Err(Vec3::ZERO),
-        }
     }
 
     /// A point of a region, if it and the receiver face each other.

@@ -4,7 +4,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::arriving::{Asked, Met, NOTHING};
+use super::arriving::{Arriving, Asked, Met};
 use super::footprint::{Texel, receiver};
 pub(crate) use super::outgoing::Outgoing;
 use super::tile_sequence::TileSequence;
@@ -181,22 +181,23 @@ impl Outgoing<'_> {
         gathered: &mut Gathered,
     ) {
         let asked = &batch.asked[..batch.count];
-        let mut arriving = [Err(NOTHING); BATCH];
+        let mut arriving = [Arriving::NOTHING; BATCH];
         self.arriving(asked, &mut arriving);
         let mut readings = [Reading::default(); BATCH];
         let mut checks = Batch::default();
         for (place, found) in arriving[..batch.count].iter().enumerate() {
             let (scramble, sample) = batch.numbers[place];
             let reading = &mut readings[place];
-            match found {
-                Err((light, weight)) => (reading.light, reading.weight) = (*light, *weight),
-                Ok((met, weight)) => {
-                    gathered.inverse_distances += weight / met.distance.max(f32::MIN_POSITIVE);
+            (reading.light, reading.weight) = (found.light, found.weight);
+            match &found.met {
+                None => {}
+                Some(met) => {
+                    gathered.inverse_distances += found.weight / met.distance.max(f32::MIN_POSITIVE);
                     // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
                     let turn = (sample * SCRAMBLES as u32 + scramble as u32)
                         .wrapping_add(texel.index.wrapping_mul(7));
                     reading.checked = turn.is_multiple_of(CHECKED);
-                    let last = self.read((met, *weight), &sequences[scramble], sample, reading);
+                    let last = self.read((met, found.weight), &sequences[scramble], sample, reading);
                     if let Some(last) = last.filter(|_| reading.checked) {
                         let [u, v, ..] = sequences[scramble].point(sample, 1);
                         let region = self.guide.regions.at(last.triangle, last.side, last.at);
@@ -211,12 +212,8 @@ impl Outgoing<'_> {
         }
         self.arriving(&checks.asked[..checks.count], &mut arriving);
         for (found, &(place, patch)) in arriving.iter().zip(&checks.numbers[..checks.count]) {
-            let real = match found {
-                Err((light, _)) => *light,
-                Ok((met, chance)) => {
-                    *chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
-                }
-            };
+            let leaving = |met: &Met| found.weight * met.reflectance * (met.direct + met.indirect);
+            let real = found.met.as_ref().map_or(found.light, leaving);
             readings[place].rays += 1;
             readings[place].difference *= self.patch_indirect[patch as usize] - real;
         }
@@ -241,7 +238,6 @@ impl Outgoing<'_> {
         sample: u32,
         reading: &mut Reading,
     ) -> Option<Met> {
-        reading.weight = weight;
         let mut weight = weight * met.reflectance;
         let (mut light, mut last) = (weight * met.direct, *met);
         // In a gap narrower than patches there may be many.
@@ -252,21 +248,18 @@ impl Outgoing<'_> {
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
             let asked = Asked { receiver: self.receiver_at(&last), region: None, u, v };
-            let mut found = [Err(NOTHING)];
+            let mut found = [Arriving::NOTHING];
             self.arriving(&[asked], &mut found);
             let [found] = found;
-            let (met, chance) = match found {
-                Ok(met) => met,
-                Err((arriving, _)) => {
-                    reading.light = light + weight * arriving;
-                    return None;
-                }
+            let Some(met) = found.met else {
+                reading.light = light + weight * found.light;
+                return None;
             };
-            weight *= chance * met.reflectance;
+            weight *= found.weight * met.reflectance;
             light += weight * met.direct;
             last = met;
         }
-        reading.light = light + weight * self.patch_indirect[last.patch as usize];
+        reading.light = light + weight * last.indirect;
         reading.error = self.patch_error[last.patch as usize] * (weight.element_sum() / 3.0);
         if reading.checked {
             reading.difference = weight;

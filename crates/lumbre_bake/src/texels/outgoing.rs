@@ -50,24 +50,39 @@ impl Outgoing<'_> {
     }
 
     /// Of the texel hit, or its part, or of the patch where no texel shows that side.
-    pub(super) fn direct_at(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {
-        if side == Side::Front {
-            let scene_triangle = &self.scene.triangles[triangle as usize];
-            let map = &self.layout.maps[scene_triangle.object as usize];
-            let [a, b, c] = scene_triangle.uv;
-            let uv = a + (b - a) * u + (c - a) * v;
-            let (x, y) = (uv.x as u32, uv.y as u32);
-            if x < map.width && y < map.height {
-                let index = map.first + (y * map.width + x) as usize;
-                let direct = self.direct[index];
-                if !direct.x.is_nan() {
-                    return direct;
-                }
-                if let Some(direct) = self.divided.at(index as u32, uv.fract()) {
-                    return direct;
-                }
-            }
-        }
-        self.patch_direct[patch as usize]
+    fn direct_at(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
+        let direct = self.direct_of(self.texel_at(triangle, side, at));
+        direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch))
+    }
+
+    /// The texel that shows a point, in the row of all maps; the greatest number where none does.
+    pub(super) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> usize {
+        let (index, _) = self.place_at(triangle, at);
+        index.filter(|_| side == Side::Front).unwrap_or(usize::MAX)
+    }
+
+    /// Of a texel, if it has one for all of it.
+    pub(super) fn direct_of(&self, texel: usize) -> Option<Vec3> {
+        self.direct.get(texel).copied().filter(|direct| !direct.x.is_nan())
+    }
+
+    /// Where the texel has none: of its part or of the patch.
+    #[cold]
+    pub(super) fn direct_of_part(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
+        let (index, uv) = self.place_at(triangle, at);
+        let index = index.filter(|_| side == Side::Front);
+        let divided = index.and_then(|index| self.divided.at(index as u32, uv.fract()));
+        divided.unwrap_or_else(|| self.patch_direct[patch as usize])
+    }
+
+    /// The texel at a point, if it is on the map, and the point on the map.
+    fn place_at(&self, triangle: u32, (u, v): (f32, f32)) -> (Option<usize>, Vec2) {
+        let scene_triangle = &self.scene.triangles[triangle as usize];
+        let map = &self.layout.maps[scene_triangle.object as usize];
+        let [a, b, c] = scene_triangle.uv;
+        let uv = a + (b - a) * u + (c - a) * v;
+        let (x, y) = (uv.x as u32, uv.y as u32);
+        let index = (x < map.width && y < map.height).then(|| map.first + (y * map.width + x) as usize);
+        (index, uv)
     }
 }

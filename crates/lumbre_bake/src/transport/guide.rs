@@ -86,14 +86,25 @@ impl Guide {
         self.rows.share(region)
     }
 
-    /// Of those that light `region`, the one at `u` in [0, 1); the place within its interval, stretched to [0, 1); its probability.
-    pub fn pick(&self, region: u32, u: f32) -> Option<(u32, f32, f32)> {
-        self.rows.pick(region, u)
+    /// Where in the list of those that light `region` to look for the one at `u` in [0, 1).
+    pub fn near(&self, region: u32, u: f32) -> Part {
+        self.rows.near(region, u)
     }
 
-    /// The probability that [`pick`](Self::pick) takes `other`.
-    pub fn probability(&self, region: u32, other: u32) -> f32 {
-        self.rows.probability(region, other)
+    /// Of those that light a region, the one at `u`, of which `part` is [near](Self::near); the place within its interval, stretched to
+    /// [0, 1); its probability.
+    pub fn pick(&self, part: &Part, u: f32) -> Option<(u32, f32, f32)> {
+        self.rows.pick(part, u)
+    }
+
+    /// Where in the list of those that light `region` to look for `other`.
+    pub fn near_region(&self, region: u32, other: u32) -> Part {
+        self.rows.near_column(region, other)
+    }
+
+    /// The probability that [`pick`](Self::pick) takes `other`, of which `part` is [near](Self::near_region).
+    pub fn probability(&self, part: &Part, other: u32) -> f32 {
+        self.rows.probability(part, other)
     }
 }
 
@@ -129,6 +140,24 @@ struct Entry {
     end: f32,
 }
 
+/// A part of a row, and what stands in its middle: read before it is needed, together with those of other samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
+    /// Where the row begins in the list of all entries, and how many it has; the rest counts from there.
+    begin: usize,
+    count: u32,
+    first: u32,
+    last: u32,
+    middle: u32,
+    entry: Entry,
+}
+
+impl Part {
+    /// Of no row.
+    pub const NONE: Self =
+        Self { begin: 0, count: 0, first: 0, last: 0, middle: 0, entry: Entry { column: 0, end: 1.0 } };
+}
+
 /// Parts of a row's index.
 const PARTS: usize = 64;
 
@@ -161,15 +190,14 @@ impl Rows {
         }
     }
 
-    fn row(&self, row: u32) -> &[Entry] {
-        let head = self.heads[row as usize];
-        &self.entries[head.start..head.start + head.count as usize]
-    }
-
-    /// Where a part of a row begins and ends, by one of the indices.
-    fn part(index: &[u32], row: u32, part: usize) -> (usize, usize) {
+    fn part(&self, index: &[u32], row: u32, part: usize) -> Part {
         let at = row as usize * (PARTS + 1) + part.min(PARTS - 1);
-        (index[at] as usize, index[at + 1] as usize)
+        let Head { start: begin, count, .. } = self.heads[row as usize];
+        let (first, last) = (index[at], index[at + 1]);
+        let middle = first.midpoint(last);
+        let entry =
+            self.entries.get(begin + middle as usize).copied().unwrap_or(Entry { column: 0, end: 1.0 });
+        Part { begin, count, first, last, middle, entry }
     }
 
     fn share(&self, row: u32) -> Option<f32> {
@@ -177,25 +205,41 @@ impl Rows {
         (head.count > 0).then_some(head.share)
     }
 
-    fn pick(&self, row: u32, u: f32) -> Option<(u32, f32, f32)> {
-        let (first, last) = Self::part(&self.cumulative_index, row, (u * PARTS as f32) as usize);
-        let row = self.row(row);
-        let at = first + row[first..last].partition_point(|entry| entry.end <= u);
-        let Entry { column, end } = *row.get(at)?;
-        let start = if at == 0 { 0.0 } else { row[at - 1].end };
+    fn near(&self, row: u32, u: f32) -> Part {
+        self.part(&self.cumulative_index, row, (u * PARTS as f32) as usize)
+    }
+
+    fn near_column(&self, row: u32, column: u32) -> Part {
+        self.part(&self.column_index, row, (column >> self.part_bits) as usize)
+    }
+
+    /// The first entry of a part that is not `before`, or the end of the part; and the end of the one before it.
+    fn find(&self, part: &Part, before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
+        let range = if part.first < part.last && before(&part.entry) {
+            part.middle + 1..part.last
+        } else {
+            part.first..part.middle
+        };
+        let within = &self.entries[part.begin + range.start as usize..part.begin + range.end as usize];
+        let at = range.start as usize + within.partition_point(before);
+        let start = if at == 0 { 0.0 } else { self.entries[part.begin + at - 1].end };
+        (self.entries.get(part.begin + at).filter(|_| at < part.count as usize), start)
+    }
+
+    fn pick(&self, part: &Part, u: f32) -> Option<(u32, f32, f32)> {
+        let (entry, start) = self.find(part, |entry| entry.end <= u);
+        let &Entry { column, end } = entry?;
         let probability = end - start;
         (probability > 0.0)
             .then(|| (column, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
     }
 
-    fn probability(&self, row: u32, column: u32) -> f32 {
-        let (first, last) = Self::part(&self.column_index, row, (column >> self.part_bits) as usize);
-        let row = self.row(row);
-        match row[first..last].binary_search_by_key(&column, |entry| entry.column).map(|at| first + at) {
-            Ok(0) => row[0].end,
-            Ok(at) => row[at].end - row[at - 1].end,
-            Err(_) => 0.0,
+    fn probability(&self, part: &Part, column: u32) -> f32 {
+        if part.first == part.last {
+            return 0.0;
         }
+        let (entry, start) = self.find(part, |entry| entry.column < column);
+        entry.filter(|entry| entry.column == column).map_or(0.0, |entry| entry.end - start)
     }
 }
 
@@ -211,16 +255,24 @@ mod tests {
         rows
     }
 
+    fn pick(rows: &Rows, row: u32, u: f32) -> Option<(u32, f32, f32)> {
+        rows.pick(&rows.near(row, u), u)
+    }
+
+    fn probability(rows: &Rows, row: u32, column: u32) -> f32 {
+        rows.probability(&rows.near_column(row, column), column)
+    }
+
     #[test]
     fn probabilities_are_in_proportion_to_the_weights() {
         let rows = rows();
         for (row, column, expected) in [(0, 1, 0.25), (0, 4, 0.75), (0, 7, 0.0), (0, 5, 0.0), (2, 5, 1.0)] {
-            assert_eq!(rows.probability(row, column), expected);
+            assert_eq!(probability(&rows, row, column), expected);
         }
         for (u, column, within, probability) in
             [(0.125, 1, 0.5, 0.25), (0.25, 4, 0.0, 0.75), (0.625, 4, 0.5, 0.75)]
         {
-            assert_eq!(rows.pick(0, u), Some((column, within, probability)));
+            assert_eq!(pick(&rows, 0, u), Some((column, within, probability)));
         }
     }
 
@@ -228,7 +280,7 @@ mod tests {
     fn what_gets_no_light_is_not_guided() {
         let rows = rows();
         assert_eq!([0, 1, 2].map(|row| rows.share(row)), [Some(0.4), None, Some(0.25)]);
-        assert_eq!(rows.pick(1, 0.5), None);
+        assert_eq!(pick(&rows, 1, 0.5), None);
     }
 
     #[test]
@@ -238,17 +290,18 @@ mod tests {
         rows.push(0.4, (0..1000).map(|column| (column, weight(column))));
         rows.push(0.4, (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0)));
         for row in 0..2 {
-            let entries = rows.row(row);
+            let head = rows.heads[row as usize];
+            let entries = &rows.entries[head.start..head.start + head.count as usize];
             for step in 0..5000 {
                 let u = step as f32 / 5000.0;
                 let at = entries.partition_point(|entry| entry.end <= u);
-                assert_eq!(rows.pick(row, u).map(|found| found.0), Some(entries[at].column), "{u}");
+                assert_eq!(pick(&rows, row, u).map(|found| found.0), Some(entries[at].column), "{u}");
             }
             for column in 0..1000 {
                 let expected = entries
                     .binary_search_by_key(&column, |entry| entry.column)
                     .map_or(0.0, |at| entries[at].end - if at == 0 { 0.0 } else { entries[at - 1].end });
-                assert_eq!(rows.probability(row, column), expected, "{column}");
+                assert_eq!(probability(&rows, row, column), expected, "{column}");
             }
         }
     }
