@@ -86,7 +86,7 @@ impl Arriving {
 
 /// Where a sample looks.
 #[derive(Clone, Copy)]
-enum Aim {
+pub(super) enum Aim {
     /// In a direction about the receiver's normal.
     Around(Vec3),
     /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
@@ -96,7 +96,7 @@ enum Aim {
 
 /// A sample under way.
 #[derive(Clone, Copy)]
-struct Way {
+pub(super) struct Way {
     aim: Aim,
     /// Of the samples, what the guide places; none if it knows nothing of the receiver.
     share: Option<f32>,
@@ -108,7 +108,8 @@ struct Way {
 }
 
 impl Way {
-    const NONE: Self =
+    /// Nothing is known.
+    pub const NONE: Self =
         Self { aim: Aim::Nowhere, share: None, part: Part::NONE, region: None, texel: usize::MAX };
 }
 
@@ -134,10 +135,9 @@ impl Outgoing<'_> {
     /// For each receiver a point that its light by bounces comes from: some of the samples, if the guide knows the receiver's region, are
     /// points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic (Veach and Guibas, "Optimally
     /// Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
-    pub(super) fn arriving<const MOST: usize>(&self, asked: &[Asked], found: &mut [Arriving; MOST]) {
+    pub(super) fn arriving(&self, asked: &[Asked], ways: &mut [Way], found: &mut [Arriving]) {
         // One thing for all samples before the next: the loops that read from afar do little else.
-        let mut ways = [Way::NONE; MOST];
-        let ways = &mut ways[..asked.len()];
+        let (ways, found) = (&mut ways[..asked.len()], &mut found[..asked.len()]);
         for (way, asked) in ways.iter_mut().zip(asked) {
             way.share = asked.region.and_then(|region| self.guide.share(region));
             if let (Some(region), Some(share)) = (asked.region, way.share)
@@ -147,7 +147,7 @@ impl Outgoing<'_> {
             }
         }
         for (way, asked) in ways.iter_mut().zip(asked) {
-            way.aim = self.aim(asked, way);
+            self.aim(asked, way);
         }
         for ((way, asked), found) in ways.iter().zip(asked).zip(found.iter_mut()) {
             self.follow(asked, way, found);
@@ -191,18 +191,20 @@ impl Outgoing<'_> {
 
     /// Where to look.
     #[inline]
-    fn aim(&self, asked: &Asked, way: &Way) -> Aim {
+    fn aim(&self, asked: &Asked, way: &mut Way) {
         let &Asked { ref receiver, u, v, .. } = asked;
-        match way.share {
+        way.aim = match way.share {
             None => Aim::Around(about(receiver, u, v)),
             Some(share) if u >= share => Aim::Around(about(receiver, (u - share) / (1.0 - share), v)),
             Some(share) => {
                 let picked = self.guide.pick(&way.part, u / share);
-                picked.map_or(Aim::Nowhere, |(region, u, probability)| {
-                    self.point_of(receiver, region, probability, u, v).unwrap_or(Aim::Nowhere)
-                })
+                let Some((region, u, probability)) = picked else {
+                    way.aim = Aim::Nowhere;
+                    return;
+                };
+                self.point_of(receiver, region, probability, u, v).unwrap_or(Aim::Nowhere)
             }
-        }
+        };
     }
 
     /// What is there, its light not read yet.

@@ -2,9 +2,11 @@
 //! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it,
 //! those of real bounces more. Emission is not read: `direct` has counted it.
 
+use std::cell::RefCell;
+
 use glam::{Vec2, Vec3};
 
-use super::arriving::{Arriving, Asked, Met};
+use super::arriving::{Arriving, Asked, Met, Way};
 use super::footprint::{Texel, receiver};
 pub(crate) use super::outgoing::Outgoing;
 use super::tile_sequence::TileSequence;
@@ -22,30 +24,52 @@ const NEAR_BOUNCES: u32 = 6;
 /// Samples that are followed together: what they read is then on its way from memory at the same time.
 const BATCH: usize = 16;
 
-/// Samples to follow.
+/// Samples to follow, and how far they are.
 struct Batch {
     asked: [Asked; BATCH],
     /// Which they are.
     numbers: [(usize, u32); BATCH],
     count: usize,
+    ways: [Way; BATCH],
+    found: [Arriving; BATCH],
 }
 
-impl Default for Batch {
-    fn default() -> Self {
-        Self { asked: [Asked::NOWHERE; BATCH], numbers: [(0, 0); BATCH], count: 0 }
-    }
+/// A batch of samples and one of those that check them.
+struct Batches {
+    samples: Batch,
+    readings: [Reading; BATCH],
+    checks: Batch,
+}
+
+thread_local! {
+    /// To clear them for every texel would take longer than its rays do.
+    static BATCHES: RefCell<Batches> = const {
+        RefCell::new(Batches { samples: Batch::NONE, readings: [Reading::NONE; BATCH], checks: Batch::NONE })
+    };
 }
 
 impl Batch {
+    const NONE: Self = Self {
+        asked: [Asked::NOWHERE; BATCH],
+        numbers: [(0, 0); BATCH],
+        count: 0,
+        ways: [Way::NONE; BATCH],
+        found: [Arriving::NOTHING; BATCH],
+    };
+
     fn push(&mut self, asked: Asked, first: usize, second: u32) {
         self.asked[self.count] = asked;
         self.numbers[self.count] = (first, second);
         self.count += 1;
     }
+
+    fn follow(&mut self, outgoing: &Outgoing<'_>) {
+        outgoing.arriving(&self.asked[..self.count], &mut self.ways, &mut self.found);
+    }
 }
 
 /// What one sample of the gather found.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Reading {
     light: Vec3,
     weight: f32,
@@ -56,6 +80,17 @@ struct Reading {
     difference: Vec3,
     /// Rays beyond the first.
     rays: u32,
+}
+
+impl Reading {
+    const NONE: Self = Self {
+        light: Vec3::ZERO,
+        weight: 0.0,
+        error: Vec2::ZERO,
+        checked: false,
+        difference: Vec3::ZERO,
+        rays: 0,
+    };
 }
 
 /// The weights of a scramble's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
@@ -152,23 +187,35 @@ impl Gathered {
 impl Outgoing<'_> {
     /// Adds samples `self.samples..samples` of every scramble.
     pub fn gather(&self, texel: &Texel, gathered: &mut Gathered, samples: u32, seed: u32) {
+        BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
+    }
+
+    fn gather_with(
+        &self,
+        batches: &mut Batches,
+        texel: &Texel,
+        gathered: &mut Gathered,
+        samples: u32,
+        seed: u32,
+    ) {
         let from = gathered.samples;
         let sequences: [TileSequence; SCRAMBLES] =
             std::array::from_fn(|scramble| TileSequence::new(seed, 16 + scramble as u32, texel, self.run));
-        let mut all =
+        let numbers =
             (0..SCRAMBLES).flat_map(|scramble| (from..samples).map(move |sample| (scramble, sample)));
-        let mut batch = Batch::default();
-        while let Some((scramble, sample)) = all.next() {
+        batches.samples.count = 0;
+        for (scramble, sample) in numbers {
             let [x, y, u, v] = sequences[scramble].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
                 let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
-                batch.push(Asked { receiver: receiver(self.scene, &point), region, u, v }, scramble, sample);
+                let asked = Asked { receiver: receiver(self.scene, &point), region, u, v };
+                batches.samples.push(asked, scramble, sample);
             }
-            if batch.count == BATCH {
-                self.gather_batch(texel, &sequences, &mut batch, gathered);
+            if batches.samples.count == BATCH {
+                self.gather_batch(texel, &sequences, batches, gathered);
             }
         }
-        self.gather_batch(texel, &sequences, &mut batch, gathered);
+        self.gather_batch(texel, &sequences, batches, gathered);
         gathered.samples = from.max(samples);
     }
 
@@ -177,68 +224,52 @@ impl Outgoing<'_> {
         &self,
         texel: &Texel,
         sequences: &[TileSequence; SCRAMBLES],
-        batch: &mut Batch,
+        Batches { samples, readings, checks }: &mut Batches,
         gathered: &mut Gathered,
     ) {
-        let asked = &batch.asked[..batch.count];
-        let mut arriving = [Arriving::NOTHING; BATCH];
-        self.arriving(asked, &mut arriving);
-        let mut readings = [Reading::default(); BATCH];
-        let mut checks = Batch::default();
-        for (place, found) in arriving[..batch.count].iter().enumerate() {
-            let (scramble, sample) = batch.numbers[place];
+        samples.follow(self);
+        checks.count = 0;
+        let numbers = &samples.numbers[..samples.count];
+        for (place, (found, &(scramble, sample))) in samples.found.iter().zip(numbers).enumerate() {
             let reading = &mut readings[place];
-            (reading.light, reading.weight) = (found.light, found.weight);
-            match &found.met {
-                None => {}
-                Some(met) => {
-                    gathered.inverse_distances += found.weight / met.distance.max(f32::MIN_POSITIVE);
-                    // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
-                    let turn = (sample * SCRAMBLES as u32 + scramble as u32)
-                        .wrapping_add(texel.index.wrapping_mul(7));
-                    reading.checked = turn.is_multiple_of(CHECKED);
-                    let last = self.read((met, found.weight), &sequences[scramble], sample, reading);
-                    if let Some(last) = last.filter(|_| reading.checked) {
-                        let [u, v, ..] = sequences[scramble].point(sample, 1);
-                        let region = self.guide.regions.at(last.triangle, last.side, last.at);
-                        checks.push(
-                            Asked { receiver: self.receiver_at(&last), region, u, v },
-                            place,
-                            last.patch,
-                        );
-                    }
-                }
+            *reading = Reading { light: found.light, weight: found.weight, ..Reading::NONE };
+            let Some(met) = &found.met else { continue };
+            gathered.inverse_distances += found.weight / met.distance.max(f32::MIN_POSITIVE);
+            // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
+            let turn =
+                (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
+            reading.checked = turn.is_multiple_of(CHECKED);
+            let last = self.read(met, &sequences[scramble], sample, reading);
+            if let Some(last) = last.filter(|_| reading.checked) {
+                let [u, v, ..] = sequences[scramble].point(sample, 1);
+                let region = self.guide.regions.at(last.triangle, last.side, last.at);
+                let asked = Asked { receiver: self.receiver_at(&last), region, u, v };
+                checks.push(asked, place, last.patch);
             }
         }
-        self.arriving(&checks.asked[..checks.count], &mut arriving);
-        for (found, &(place, patch)) in arriving.iter().zip(&checks.numbers[..checks.count]) {
+        checks.follow(self);
+        for (found, &(place, patch)) in checks.found.iter().zip(&checks.numbers[..checks.count]) {
             let leaving = |met: &Met| found.weight * met.reflectance * (met.direct + met.indirect);
             let real = found.met.as_ref().map_or(found.light, leaving);
             readings[place].rays += 1;
             readings[place].difference *= self.patch_indirect[patch as usize] - real;
         }
-        for (reading, (scramble, _)) in readings.iter().zip(&batch.numbers[..batch.count]) {
-            gathered.sums[*scramble] += reading.light;
-            gathered.weights[*scramble].add(reading.weight, reading.light);
+        for (reading, &(scramble, _)) in readings.iter().zip(numbers) {
+            gathered.sums[scramble] += reading.light;
+            gathered.weights[scramble].add(reading.weight, reading.light);
             gathered.rays += 1 + u64::from(reading.rays);
             gathered.patch_errors += reading.error;
             gathered.checks += u32::from(reading.checked);
             gathered.differences += reading.difference;
             gathered.squared_differences += (reading.difference.element_sum() / 3.0).powi(2);
         }
-        batch.count = 0;
+        samples.count = 0;
     }
 
     /// The light that leaves a point that was met, emission apart, times a weight. Returns the surface whose patch was read, if one was; the
     /// difference of that to a real bounce is then still to be multiplied by it.
-    fn read(
-        &self,
-        (met, weight): (&Met, f32),
-        sequence: &TileSequence,
-        sample: u32,
-        reading: &mut Reading,
-    ) -> Option<Met> {
-        let mut weight = weight * met.reflectance;
+    fn read(&self, met: &Met, sequence: &TileSequence, sample: u32, reading: &mut Reading) -> Option<Met> {
+        let mut weight = reading.weight * met.reflectance;
         let (mut light, mut last) = (weight * met.direct, *met);
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
@@ -249,7 +280,7 @@ impl Outgoing<'_> {
             reading.rays += 1;
             let asked = Asked { receiver: self.receiver_at(&last), region: None, u, v };
             let mut found = [Arriving::NOTHING];
-            self.arriving(&[asked], &mut found);
+            self.arriving(&[asked], &mut [Way::NONE], &mut found);
             let [found] = found;
             let Some(met) = found.met else {
                 reading.light = light + weight * found.light;
