@@ -116,10 +116,20 @@ pub(crate) fn cosine_direction(u: f32, v: f32) -> Vec3 {
     if a == 0.0 && b == 0.0 {
         return Vec3::Z;
     }
-    let (radius, angle) =
-        if a.abs() > b.abs() { (a, TAU / 8.0 * (b / a)) } else { (b, TAU / 4.0 - TAU / 8.0 * (a / b)) };
-    let (sine, cosine) = angle.sin_cos();
-    Vec3::new(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
+    let wide = a.abs() > b.abs();
+    let (radius, other) = if wide { (a, b) } else { (b, a) };
+    let (sine, cosine) = eighth_turn(TAU / 8.0 * (other / radius));
+    let (x, y) = if wide { (cosine, sine) } else { (sine, cosine) };
+    Vec3::new(radius * x, radius * y, (1.0 - radius * radius).max(0.0).sqrt())
+}
+
+/// Sine and cosine of an angle of at most an eighth of a turn, to 1e-7; the same on every machine, unlike the standard library's (Moshier, Cephes
+/// Mathematical Library, sinf.c, 1992).
+fn eighth_turn(x: f32) -> (f32, f32) {
+    let y = x * x;
+    let sine = ((-1.951_529_6e-4 * y + 8.332_161e-3) * y - 1.666_665_5e-1) * y * x + x;
+    let cosine = ((2.443_315_7e-5 * y - 1.388_731_6e-3) * y + 4.166_664_6e-2) * y * y - 0.5 * y + 1.0;
+    (sine, cosine)
 }
 
 /// Two unit vectors that make a right-handed frame with a unit `normal`
@@ -190,6 +200,16 @@ mod tests {
         }
         assert!((z / f64::from(n) - 2.0 / 3.0).abs() < 1e-3);
         assert!((xx / f64::from(n) - 0.25).abs() < 1e-3);
+    }
+
+    #[test]
+    fn an_eighth_of_a_turn_is_that_of_the_library() {
+        for step in -1000..=1000i16 {
+            let x = f64::from(step) / 1000.0 * std::f64::consts::FRAC_PI_4;
+            let (sine, cosine) = eighth_turn(x as f32);
+            let (s, c) = f64::from(x as f32).sin_cos();
+            assert!((f64::from(sine) - s).abs() < 1e-7 && (f64::from(cosine) - c).abs() < 1e-7, "{x}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::outgoing::Outgoing;
 use crate::sampling::{cosine_about, triangle_point};
@@ -49,6 +49,8 @@ pub(super) struct Met {
     /// Irradiance there: direct, and the patch's by bounces.
     pub direct: Vec3,
     pub indirect: Vec3,
+    /// The patch's errors in that.
+    pub error: Vec2,
     /// Of the ray, of unit length, and how far it went.
     pub direction: Vec3,
     pub distance: f32,
@@ -64,6 +66,7 @@ impl Met {
         reflectance: Vec3::ZERO,
         direct: Vec3::ZERO,
         indirect: Vec3::ZERO,
+        error: Vec2::ZERO,
         direction: Vec3::ZERO,
         distance: 0.0,
     };
@@ -102,15 +105,22 @@ pub(super) struct Way {
     share: Option<f32>,
     /// Part of the guide's row that is asked next.
     part: Part,
-    /// Region and texel met, where they count.
+    /// Region and texel met, where they count, and the texel's direct light.
     region: Option<u32>,
     texel: usize,
+    direct: Vec3,
 }
 
 impl Way {
     /// Nothing is known.
-    pub const NONE: Self =
-        Self { aim: Aim::Nowhere, share: None, part: Part::NONE, region: None, texel: usize::MAX };
+    pub const NONE: Self = Self {
+        aim: Aim::Nowhere,
+        share: None,
+        part: Part::NONE,
+        region: None,
+        texel: usize::MAX,
+        direct: Vec3::ZERO,
+    };
 }
 
 /// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
@@ -153,6 +163,7 @@ impl Outgoing<'_> {
             self.follow(asked, way, found);
         }
         for (way, found) in ways.iter_mut().zip(found.iter_mut()) {
+            way.texel = usize::MAX;
             let Some(met) = &mut found.met else { continue };
             let Some(patch) = self.patches.at(met.triangle, met.side, met.at) else {
                 *found = Arriving::NOTHING;
@@ -167,19 +178,24 @@ impl Outgoing<'_> {
             met.reflectance = self.reflectance(met.triangle, met.side, met.at);
             way.texel = self.texel_at(met.triangle, met.side, met.at);
         }
+        for way in ways.iter_mut() {
+            way.direct = self.direct.get(way.texel).copied().unwrap_or(Vec3::NAN);
+        }
         for ((way, asked), found) in ways.iter_mut().zip(asked).zip(found.iter_mut()) {
             let Some(met) = &mut found.met else { continue };
-            met.direct = self.direct.get(way.texel).copied().unwrap_or(Vec3::NAN);
             met.indirect = self.patch_indirect[met.patch as usize];
+            met.error = self.patch_error[met.patch as usize];
             if let (Aim::Around(_), Some(own), Some(region)) = (&way.aim, asked.region, way.region) {
                 way.part = self.guide.near_region(own, region);
             }
         }
         for ((way, asked), found) in ways.iter().zip(asked).zip(found) {
             let Some(met) = &mut found.met else { continue };
-            if met.direct.x.is_nan() {
-                met.direct = self.direct_of_part(met.triangle, met.side, met.at, met.patch);
-            }
+            met.direct = if way.direct.x.is_nan() {
+                self.direct_of_part(met.triangle, met.side, met.at, met.patch)
+            } else {
+                way.direct
+            };
             if let Some(share) = way.share {
                 match self.weight(asked, way, share, met) {
                     Some(weight) => found.weight = weight,
@@ -198,11 +214,9 @@ impl Outgoing<'_> {
             Some(share) if u >= share => Aim::Around(about(receiver, (u - share) / (1.0 - share), v)),
             Some(share) => {
                 let picked = self.guide.pick(&way.part, u / share);
-                let Some((region, u, probability)) = picked else {
-                    way.aim = Aim::Nowhere;
-                    return;
-                };
-                self.point_of(receiver, region, probability, u, v).unwrap_or(Aim::Nowhere)
+                let point = picked
+                    .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v));
+                point.unwrap_or(Aim::Nowhere)
             }
         };
     }

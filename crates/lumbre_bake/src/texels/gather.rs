@@ -291,7 +291,7 @@ impl Outgoing<'_> {
             last = met;
         }
         reading.light = light + weight * last.indirect;
-        reading.error = self.patch_error[last.patch as usize] * (weight.element_sum() / 3.0);
+        reading.error = last.error * (weight.element_sum() / 3.0);
         if reading.checked {
             reading.difference = weight;
         }
