@@ -1,6 +1,6 @@
 //! The final gather: rays from every texel read the light that leaves what they meet. Direct light there is that of
 //! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it,
-//! those of real bounces more. Emission is not read: `direct` has counted it.
+//! those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `arriving`.
 
 use std::cell::RefCell;
 
@@ -42,7 +42,7 @@ struct Batches {
 }
 
 thread_local! {
-    /// To clear them for every texel would take longer than its rays do.
+    /// Kept, as to clear them for every texel takes as long as some of its rays. What a batch leaves in them nothing reads.
     static BATCHES: RefCell<Batches> = const {
         RefCell::new(Batches { samples: Batch::NONE, readings: [Reading::NONE; BATCH], checks: Batch::NONE })
     };
