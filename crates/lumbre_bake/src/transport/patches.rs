@@ -170,7 +170,7 @@ impl Patches {
     pub fn point(&self, patch: &Patch, (u, v): (f32, f32)) -> (f32, f32) {
         if patch.cell & PIECE == 0 {
             let divisions = self.cuts[patch.triangle as usize].divisions.max(1);
-            return point_in_row(divisions, patch.cell >> ROW, patch.cell & (1 << ROW) - 1, u, v);
+            return point_in_row(divisions, patch.cell >> ROW, patch.cell & ((1 << ROW) - 1), u, v);
         }
         point_between(&self.lines.pieces[(patch.cell & !PIECE) as usize], u, v)
     }
