@@ -49,7 +49,7 @@ const RAY: u64 = 2 * 8 + 8 + 2 * 8 + 2 * 8 + 8;
 
 /// Of a patch, for the guide: its region, its place in the list of that, what leaves it, and at worst a region of its own, with the
 /// cut, the head of its list and row, its brightness and exchange.
-const GUIDED_PATCH: u64 = (4 + 8 + 4 + size_of::<Patch>() + 16 + 24 + 8 + 8 + 8 + 4) as u64;
+const GUIDED_PATCH: u64 = (4 + 8 + 4 + size_of::<Patch>() + 16 + 24 + 16 + 8 + 8) as u64;
 
 /// Of a pair of regions: the one and the probability, in lists that may have grown to twice their length. A ray makes two.
 const GUIDE_PAIR: u64 = 2 * 2 * (4 + 4);

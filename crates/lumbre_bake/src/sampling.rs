@@ -2,8 +2,10 @@
 //! 9(4), 2020) and their maps to hemispheres and triangles. Not what is sampled with them.
 
 use std::f32::consts::TAU;
+use std::sync::LazyLock;
 
 use glam::Vec3;
+use sobol_burley::parts::{self, Int4, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
 /// A sequence of 4D points in [0, 1)⁴, of its own scramble.
 #[derive(Clone, Copy, Debug)]
@@ -27,13 +29,77 @@ impl Sequence {
 
     /// The four dimensions of point `index`, of dimension set `set` (0, 1, …).
     pub fn point(&self, index: u32, set: u32) -> [f32; 4] {
-        let seed = match index / LENGTH {
-            0 => self.seed,
-            beyond => self.of(beyond).seed,
-        };
-        sobol_burley::sample_4d(index % LENGTH, set, seed)
+        self.set(set).point(index)
+    }
+
+    /// One dimension set, for several points.
+    pub fn set(&self, set: u32) -> SequenceSet {
+        SequenceSet { sequence: *self, set, scramble: Scramble::new(set, self.seed) }
     }
 }
+
+/// One dimension set of a sequence.
+#[derive(Clone, Copy)]
+pub(crate) struct SequenceSet {
+    sequence: Sequence,
+    set: u32,
+    scramble: Scramble,
+}
+
+impl SequenceSet {
+    /// The four dimensions of point `index`.
+    pub fn point(&self, index: u32) -> [f32; 4] {
+        let scramble = match index / LENGTH {
+            0 => self.scramble,
+            beyond => Scramble::new(self.set, self.sequence.of(beyond).seed),
+        };
+        scramble.point(self.set, index % LENGTH)
+    }
+}
+
+/// What `sobol_burley::sample_4d` hashes for every point, once.
+#[derive(Clone, Copy)]
+struct Scramble {
+    shuffle: u32,
+    dimensions: Int4,
+}
+
+impl Scramble {
+    fn new(set: u32, seed: u32) -> Self {
+        let own = seed.wrapping_mul(0x9c8f_2d3b) ^ set;
+        let dimensions = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].map(|other| own ^ other);
+        Self { shuffle: parts::hash(seed ^ 0x79c6_8e4a), dimensions: hash_int4(dimensions.into()) }
+    }
+
+    /// As `sobol_burley::sample_4d`, with the first sets' points looked up four bits of the index at a time.
+    fn point(&self, set: u32, index: u32) -> [f32; 4] {
+        let shuffled = owen_scramble_rev(index.reverse_bits(), self.shuffle);
+        let point = match NIBBLES.get(set as usize) {
+            Some(nibbles) => {
+                let of = |nibble: usize| -> Int4 {
+                    nibbles[nibble][(shuffled >> (28 - 4 * nibble) & 15) as usize].into()
+                };
+                of(0) ^ of(1) ^ of(2) ^ of(3)
+            }
+            None => sobol_int4_rev(shuffled, set),
+        };
+        owen_scramble_int4_rev(point, self.dimensions).reverse_bits().to_f32_norm()
+    }
+}
+
+/// Dimension sets with a table.
+const SETS: usize = 8;
+
+/// Of each dimension set, what each value of each four bits of a reversed index, the highest first, adds to a point.
+static NIBBLES: LazyLock<[[[[u32; 4]; 16]; 4]; SETS]> = LazyLock::new(|| {
+    std::array::from_fn(|set| {
+        std::array::from_fn(|nibble| {
+            std::array::from_fn(|value| {
+                sobol_int4_rev((value as u32) << (28 - 4 * nibble), set as u32).into()
+            })
+        })
+    })
+});
 
 /// A 32-bit finalizer (Wellons' lowbias32).
 pub(crate) fn hash(mut x: u32) -> u32 {
@@ -50,10 +116,20 @@ pub(crate) fn cosine_direction(u: f32, v: f32) -> Vec3 {
     if a == 0.0 && b == 0.0 {
         return Vec3::Z;
     }
-    let (radius, angle) =
-        if a.abs() > b.abs() { (a, TAU / 8.0 * (b / a)) } else { (b, TAU / 4.0 - TAU / 8.0 * (a / b)) };
-    let (sine, cosine) = angle.sin_cos();
-    Vec3::new(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
+    let wide = a.abs() > b.abs();
+    let (radius, other) = if wide { (a, b) } else { (b, a) };
+    let (sine, cosine) = eighth_turn(TAU / 8.0 * (other / radius));
+    let (x, y) = if wide { (cosine, sine) } else { (sine, cosine) };
+    Vec3::new(radius * x, radius * y, (1.0 - radius * radius).max(0.0).sqrt())
+}
+
+/// Sine and cosine of an angle of at most an eighth of a turn, to 1e-7; the same on every machine, unlike the standard library's (Moshier, Cephes
+/// Mathematical Library, sinf.c, 1992).
+fn eighth_turn(x: f32) -> (f32, f32) {
+    let y = x * x;
+    let sine = ((-1.951_529_6e-4 * y + 8.332_161e-3) * y - 1.666_665_5e-1) * y * x + x;
+    let cosine = ((2.443_315_7e-5 * y - 1.388_731_6e-3) * y + 4.166_664_6e-2) * y * y - 0.5 * y + 1.0;
+    (sine, cosine)
 }
 
 /// Two unit vectors that make a right-handed frame with a unit `normal`
@@ -100,6 +176,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn points_are_those_of_the_crate() {
+        for (seed, set) in [(0, 0), (7, 1), (u32::MAX, 7), (0x1234_5678, 8), (9, 60)] {
+            for index in (0..LENGTH).step_by(7) {
+                let expected = sobol_burley::sample_4d(index, set, seed);
+                assert_eq!(Scramble::new(set, seed).point(set, index), expected, "{index} {set} {seed}");
+            }
+        }
+    }
+
+    #[test]
     fn cosine_directions_have_the_moments_of_the_cosine() {
         // ∫ cos θ · cos θ / π = 2/3 and ∫ x² cos θ / π = 1/4, over 2^14 Sobol points: error ~ 1/N.
         let sequence = Sequence::new(1, 2, 3);
@@ -114,6 +200,16 @@ mod tests {
         }
         assert!((z / f64::from(n) - 2.0 / 3.0).abs() < 1e-3);
         assert!((xx / f64::from(n) - 0.25).abs() < 1e-3);
+    }
+
+    #[test]
+    fn an_eighth_of_a_turn_is_that_of_the_library() {
+        for step in -1000..=1000i16 {
+            let x = f64::from(step) / 1000.0 * std::f64::consts::FRAC_PI_4;
+            let (sine, cosine) = eighth_turn(x as f32);
+            let (s, c) = f64::from(x as f32).sin_cos();
+            assert!((f64::from(sine) - s).abs() < 1e-7 && (f64::from(cosine) - c).abs() < 1e-7, "{x}");
+        }
     }
 
     #[test]

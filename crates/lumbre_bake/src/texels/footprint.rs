@@ -193,6 +193,7 @@ fn middle_of_piece(triangle: &SceneTriangle, corner: Vec2) -> Option<Vec2> {
 
 impl Texel {
     /// The point of the footprint at a place of the unit square.
+    #[inline]
     pub fn point(&self, scene: &BakeScene, x: f32, y: f32) -> Option<FootprintPoint> {
         match &self.footprint {
             Footprint::Whole(triangle) => {
@@ -234,6 +235,7 @@ impl Texel {
 }
 
 /// The receiver at a point of a triangle's front.
+#[inline]
 pub(crate) fn receiver(scene: &BakeScene, point: &FootprintPoint) -> Receiver {
     let triangle = &scene.triangles[point.triangle as usize];
     let (u, v) = point.at;

@@ -1,48 +1,19 @@
-//! The final gather: cosine rays from every texel read the light that leaves what they meet. Direct light there is that of
+//! The final gather: rays from every texel read the light that leaves what they meet. Direct light there is that of
 //! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it,
-//! those of real bounces more. Emission is not read: `direct` has counted it.
+//! those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `arriving`.
 
-use std::f32::consts::FRAC_1_PI;
+use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
 
-use super::divided_light::DividedLight;
+use super::arriving::{Arriving, Asked, Met, Way};
 use super::footprint::{Texel, receiver};
+pub(crate) use super::outgoing::Outgoing;
 use super::tile_sequence::TileSequence;
-use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::material::Side;
-use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
-use crate::transport::direct::Receiver;
-use crate::transport::guide::Guide;
-use crate::transport::patches::Patches;
 
 /// Independent scrambles per texel: their spread is the texel's error.
 pub(crate) const SCRAMBLES: usize = 4;
-
-/// The light that leaves surfaces, as the gather reads it.
-pub(crate) struct Outgoing<'a> {
-    pub scene: &'a BakeScene,
-    pub layout: &'a LightmapLayout,
-    pub patches: &'a Patches,
-    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, or more than one.
-    pub direct: &'a [Vec3],
-    /// Of the texels that have more than one.
-    pub divided: &'a DividedLight,
-    /// Irradiance that a surface gets of an unhidden sky.
-    pub sky: Vec3,
-    /// Per patch, direct irradiance.
-    pub patch_direct: &'a [Vec3],
-    /// Per patch, irradiance by bounces and by the sky.
-    pub patch_indirect: &'a [Vec3],
-    /// Per patch, the errors of that, with their signs: by the form factors' noise, and by the patches' size.
-    pub patch_error: &'a [Vec2],
-    /// Hits nearer than this get a real bounce more, canonical units.
-    pub near: f32,
-    /// Where each patch's light comes from.
-    pub guide: &'a Guide,
-    /// Samples of each scramble in the first round.
-    pub run: u32,
-}
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
 pub(crate) const CHECKED: u32 = 4;
@@ -50,10 +21,58 @@ pub(crate) const CHECKED: u32 = 4;
 /// Most real bounces that one ray makes between surfaces too near for patches.
 const NEAR_BOUNCES: u32 = 6;
 
-/// What one ray of the gather found.
-#[derive(Default)]
+/// Samples that are followed together: what they read is then on its way from memory at the same time.
+const BATCH: usize = 16;
+
+/// Samples to follow, and how far they are.
+struct Batch {
+    asked: [Asked; BATCH],
+    /// Which they are.
+    numbers: [(usize, u32); BATCH],
+    count: usize,
+    ways: [Way; BATCH],
+    found: [Arriving; BATCH],
+}
+
+/// A batch of samples and one of those that check them.
+struct Batches {
+    samples: Batch,
+    readings: [Reading; BATCH],
+    checks: Batch,
+}
+
+thread_local! {
+    /// Kept, as to clear them for every texel takes as long as some of its rays. What a batch leaves in them nothing reads.
+    static BATCHES: RefCell<Batches> = const {
+        RefCell::new(Batches { samples: Batch::NONE, readings: [Reading::NONE; BATCH], checks: Batch::NONE })
+    };
+}
+
+impl Batch {
+    const NONE: Self = Self {
+        asked: [Asked::NOWHERE; BATCH],
+        numbers: [(0, 0); BATCH],
+        count: 0,
+        ways: [Way::NONE; BATCH],
+        found: [Arriving::NOTHING; BATCH],
+    };
+
+    fn push(&mut self, asked: Asked, first: usize, second: u32) {
+        self.asked[self.count] = asked;
+        self.numbers[self.count] = (first, second);
+        self.count += 1;
+    }
+
+    fn follow(&mut self, outgoing: &Outgoing<'_>) {
+        outgoing.arriving(&self.asked[..self.count], &mut self.ways, &mut self.found);
+    }
+}
+
+/// What one sample of the gather found.
+#[derive(Clone, Copy)]
 struct Reading {
     light: Vec3,
+    weight: f32,
     /// What the patches' errors leave in it.
     error: Vec2,
     /// Whether the patch that was read was checked, and by how much it is more than the real bounce.
@@ -63,30 +82,15 @@ struct Reading {
     rays: u32,
 }
 
-/// A surface that a ray has met.
-struct Met {
-    triangle: u32,
-    side: Side,
-    at: (f32, f32),
-    patch: u32,
-    reflectance: Vec3,
-    /// Direct irradiance there.
-    direct: Vec3,
-    /// Of the ray, of unit length, and how far it went.
-    direction: Vec3,
-    distance: f32,
-}
-
-/// No light and no weight: what the guide named is not to be seen.
-const NOTHING: (Vec3, f32) = (Vec3::ZERO, 0.0);
-
-/// What a ray meets: a surface that reflects, or else what arrives all the same, times π as all light is here: the sky's, or none.
-type Meeting<T> = Result<T, Vec3>;
-
-/// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
-fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
-    let below = direction - receiver.geometric_normal * (2.0 * direction.dot(receiver.geometric_normal));
-    (direction.dot(receiver.normal).max(0.0) + below.dot(receiver.normal).max(0.0)) * FRAC_1_PI
+impl Reading {
+    const NONE: Self = Self {
+        light: Vec3::ZERO,
+        weight: 0.0,
+        error: Vec2::ZERO,
+        checked: false,
+        difference: Vec3::ZERO,
+        rays: 0,
+    };
 }
 
 /// The weights of a scramble's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
@@ -183,115 +187,90 @@ impl Gathered {
 impl Outgoing<'_> {
     /// Adds samples `self.samples..samples` of every scramble.
     pub fn gather(&self, texel: &Texel, gathered: &mut Gathered, samples: u32, seed: u32) {
-        for (scramble, sum) in gathered.sums.iter_mut().enumerate() {
-            let sequence = TileSequence::new(seed, 16 + scramble as u32, texel, self.run);
-            for sample in gathered.samples..samples {
-                let [x, y, u, v] = sequence.point(sample, 0);
-                let Some(point) = texel.point(self.scene, x, y) else { continue };
-                let receiver = receiver(self.scene, &point);
-                gathered.rays += 1;
+        BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
+    }
+
+    fn gather_with(
+        &self,
+        batches: &mut Batches,
+        texel: &Texel,
+        gathered: &mut Gathered,
+        samples: u32,
+        seed: u32,
+    ) {
+        let from = gathered.samples;
+        let sequences: [TileSequence; SCRAMBLES] =
+            std::array::from_fn(|scramble| TileSequence::new(seed, 16 + scramble as u32, texel, self.run));
+        let numbers =
+            (0..SCRAMBLES).flat_map(|scramble| (from..samples).map(move |sample| (scramble, sample)));
+        batches.samples.count = 0;
+        for (scramble, sample) in numbers {
+            let [x, y, u, v] = sequences[scramble].first(sample);
+            if let Some(point) = texel.point(self.scene, x, y) {
                 let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
-                let met = match self.sample(&receiver, region, u, v) {
-                    Ok(met) => met,
-                    Err((light, weight)) => {
-                        *sum += light;
-                        gathered.weights[scramble].add(weight, light);
-                        continue;
-                    }
-                };
-                // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
-                let turn =
-                    (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
-                let checked = turn.is_multiple_of(CHECKED);
-                gathered.inverse_distances += met.1 / met.0.distance.max(f32::MIN_POSITIVE);
-                let weight = met.1;
-                let found = self.read(met, sequence, sample, checked);
-                *sum += found.light;
-                gathered.weights[scramble].add(weight, found.light);
-                gathered.rays += u64::from(found.rays);
-                gathered.patch_errors += found.error;
-                gathered.checks += u32::from(found.checked);
-                gathered.differences += found.difference;
-                gathered.squared_differences += (found.difference.element_sum() / 3.0).powi(2);
+                let asked = Asked { receiver: receiver(self.scene, &point), region, u, v };
+                batches.samples.push(asked, scramble, sample);
+            }
+            if batches.samples.count == BATCH {
+                self.gather_batch(texel, &sequences, batches, gathered);
             }
         }
-        gathered.samples = gathered.samples.max(samples);
+        self.gather_batch(texel, &sequences, batches, gathered);
+        gathered.samples = from.max(samples);
     }
 
-    /// A point that a receiver's light by bounces comes from, with its weight, or else light that needs no point, with its weight: some of the samples, if the guide
-    /// knows the receiver's region, are points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic
-    /// (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
-    fn sample(
+    /// Adds some samples, and empties their list.
+    fn gather_batch(
         &self,
-        receiver: &Receiver,
-        region: Option<u32>,
-        u: f32,
-        v: f32,
-    ) -> Result<(Met, f32), (Vec3, f32)> {
-        let Some(region) = region.filter(|&region| self.guide.knows(region)) else {
-            return match self.meet_about(receiver, u, v) {
-                Ok(met) => Ok((met, 1.0)),
-                Err(light) => Err((light, 1.0)),
-            };
-        };
-        let share = self.guide.share(region);
-        let (met, other, probability) = if u < share {
-            let (other, u, probability) = self.guide.pick(region, u / share).ok_or(NOTHING)?;
-            (self.point_of(receiver, other, u, v).ok_or(NOTHING)?, other, probability)
-        } else {
-            // The sky is found by these alone.
-            let met = self.meet_about(receiver, (u - share) / (1.0 - share), v);
-            let met = met.map_err(|light| (light / (1.0 - share), 1.0 / (1.0 - share)))?;
-            let other = self.guide.regions.at(met.triangle, met.side, met.at).ok_or(NOTHING)?;
-            (met, other, self.guide.probability(region, other))
-        };
-        // Densities over the surfaces' area.
-        let by_guide = probability / self.guide.regions.list[other as usize].area;
-        let normal = self.scene.triangles[met.triangle as usize].side_normal(met.side);
-        let cosine = -met.direction.dot(normal);
-        let by_cosine = kernel(receiver, met.direction) * cosine / (met.distance * met.distance);
-        let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
-        if cosine > 0.0 && weight.is_finite() { Ok((met, weight)) } else { Err(NOTHING) }
-    }
-
-    /// What a ray about a receiver's normal meets.
-    fn meet_about(&self, receiver: &Receiver, u: f32, v: f32) -> Meeting<Met> {
-        let mut direction = cosine_about(receiver.normal, u, v);
-        let below = direction.dot(receiver.geometric_normal);
-        if below <= 0.0 {
-            // Under the facet though above the smooth surface: mirrored up.
-            direction -= receiver.geometric_normal * (2.0 * below);
+        texel: &Texel,
+        sequences: &[TileSequence; SCRAMBLES],
+        Batches { samples, readings, checks }: &mut Batches,
+        gathered: &mut Gathered,
+    ) {
+        samples.follow(self);
+        checks.count = 0;
+        let numbers = &samples.numbers[..samples.count];
+        for (place, (found, &(scramble, sample))) in samples.found.iter().zip(numbers).enumerate() {
+            let reading = &mut readings[place];
+            *reading = Reading { light: found.light, weight: found.weight, ..Reading::NONE };
+            let Some(met) = &found.met else { continue };
+            gathered.inverse_distances += found.weight / met.distance.max(f32::MIN_POSITIVE);
+            // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
+            let turn =
+                (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
+            reading.checked = turn.is_multiple_of(CHECKED);
+            let last = self.read(met, &sequences[scramble], sample, reading);
+            if let Some(last) = last.filter(|_| reading.checked) {
+                let [u, v, ..] = sequences[scramble].point(sample, 1);
+                let region = self.guide.regions.at(last.triangle, last.side, last.at);
+                let asked = Asked { receiver: self.receiver_at(&last), region, u, v };
+                checks.push(asked, place, last.patch);
+            }
         }
-        self.meet(receiver.origin, direction)
-    }
-
-    /// A point of a region, if the receiver sees it.
-    fn point_of(&self, receiver: &Receiver, region: u32, u: f32, v: f32) -> Option<Met> {
-        let region = &self.guide.regions.list[region as usize];
-        let (triangle, side) = (region.triangle, region.side);
-        let at = self.guide.regions.point(region, triangle_point(u, v));
-        let surface = &self.scene.triangles[triangle as usize];
-        let position = surface.position(at.0, at.1);
-        let apart = position - receiver.position;
-        let distance = apart.length();
-        let direction = apart / distance;
-        let faces =
-            direction.dot(surface.side_normal(side)) < 0.0 && direction.dot(receiver.geometric_normal) > 0.0;
-        let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
-        if !faces || self.scene.blocked(receiver.origin, end) {
-            return None;
+        checks.follow(self);
+        for (found, &(place, patch)) in checks.found.iter().zip(&checks.numbers[..checks.count]) {
+            let leaving = |met: &Met| found.weight * met.reflectance * (met.direct + met.indirect);
+            let real = found.met.as_ref().map_or(found.light, leaving);
+            readings[place].rays += 1;
+            readings[place].difference *= self.patch_indirect[patch as usize] - real;
         }
-        let patch = self.patches.at(triangle, side, at)?;
-        let reflectance = self.reflectance(triangle, side, at);
-        let direct = self.direct_at(triangle, side, at, patch);
-        Some(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
+        for (reading, &(scramble, _)) in readings.iter().zip(numbers) {
+            gathered.sums[scramble] += reading.light;
+            gathered.weights[scramble].add(reading.weight, reading.light);
+            gathered.rays += 1 + u64::from(reading.rays);
+            gathered.patch_errors += reading.error;
+            gathered.checks += u32::from(reading.checked);
+            gathered.differences += reading.difference;
+            gathered.squared_differences += (reading.difference.element_sum() / 3.0).powi(2);
+        }
+        samples.count = 0;
     }
 
-    /// The light that leaves a point that was met, emission apart, times a weight.
-    fn read(&self, (met, weight): (Met, f32), sequence: TileSequence, sample: u32, checked: bool) -> Reading {
-        let mut reading = Reading { checked, ..Reading::default() };
-        let mut weight = weight * met.reflectance;
-        let (mut light, mut last) = (weight * met.direct, met);
+    /// The light that leaves a point that was met, emission apart, times a weight. Returns the surface whose patch was read, if one was; the
+    /// difference of that to a real bounce is then still to be multiplied by it.
+    fn read(&self, met: &Met, sequence: &TileSequence, sample: u32, reading: &mut Reading) -> Option<Met> {
+        let mut weight = reading.weight * met.reflectance;
+        let (mut light, mut last) = (weight * met.direct, *met);
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
             if last.distance >= self.near || weight == Vec3::ZERO {
@@ -299,95 +278,23 @@ impl Outgoing<'_> {
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
-            let (met, chance) = match self.bounce(&last, None, u, v) {
-                Ok(met) => met,
-                Err((arriving, _)) => {
-                    reading.light = light + weight * arriving;
-                    return reading;
-                }
+            let asked = Asked { receiver: self.receiver_at(&last), region: None, u, v };
+            let mut found = [Arriving::NOTHING];
+            self.arriving(&[asked], &mut [Way::NONE], &mut found);
+            let [found] = found;
+            let Some(met) = found.met else {
+                reading.light = light + weight * found.light;
+                return None;
             };
-            weight *= chance * met.reflectance;
+            weight *= found.weight * met.reflectance;
             light += weight * met.direct;
             last = met;
         }
-        let indirect = self.patch_indirect[last.patch as usize];
-        let grey = |color: Vec3| color.element_sum() / 3.0;
-        if checked {
-            let [u, v, ..] = sequence.point(sample, 1);
-            reading.rays += 1;
-            let region = self.guide.regions.at(last.triangle, last.side, last.at);
-            let real = self.bounce(&last, region, u, v).map_or_else(
-                |(light, _)| light,
-                |(met, chance)| {
-                    chance * met.reflectance * (met.direct + self.patch_indirect[met.patch as usize])
-                },
-            );
-            reading.difference = weight * (indirect - real);
+        reading.light = light + weight * last.indirect;
+        reading.error = last.error * (weight.element_sum() / 3.0);
+        if reading.checked {
+            reading.difference = weight;
         }
-        reading.light = light + weight * indirect;
-        reading.error = self.patch_error[last.patch as usize] * grey(weight);
-        reading
-    }
-
-    /// What a ray meets.
-    fn meet(&self, origin: Vec3, direction: Vec3) -> Meeting<Met> {
-        let (triangle, side, at, distance) = match self.scene.first_hit(origin, direction) {
-            SurfaceHit::Lit { triangle, side, at, distance } => (triangle, side, at, distance),
-            SurfaceHit::None => return Err(self.sky),
-            SurfaceHit::Back | SurfaceHit::Inside => return Err(Vec3::ZERO),
-        };
-        let patch = self.patches.at(triangle, side, at).ok_or(Vec3::ZERO)?;
-        let reflectance = self.reflectance(triangle, side, at);
-        let direct = self.direct_at(triangle, side, at, patch);
-        Ok(Met { triangle, side, at, patch, reflectance, direct, direction, distance })
-    }
-
-    /// What a surface's own light by bounces comes from: one sample, with its weight, placed by the guide for a region or by the cosine.
-    fn bounce(&self, from: &Met, region: Option<u32>, u: f32, v: f32) -> Result<(Met, f32), (Vec3, f32)> {
-        let surface = &self.scene.triangles[from.triangle as usize];
-        let position = surface.position(from.at.0, from.at.1);
-        let origin = self.scene.off_surface(from.triangle, from.side, position);
-        let normal = surface.side_normal(from.side);
-        let receiver = Receiver { position, origin, geometric_normal: normal, normal };
-        self.sample(&receiver, region, u, v)
-    }
-
-    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.
-    pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
-        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
-        let irradiance = self.direct_at(triangle, side, at, patch) + self.patch_indirect[patch as usize];
-        self.reflectance(triangle, side, at) * irradiance
-    }
-
-    fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
-        let scene_triangle = &self.scene.triangles[triangle as usize];
-        let surface = &self.scene.surfaces[scene_triangle.surface as usize];
-        if surface.varies() {
-            surface.reflectance(side, scene_triangle.vertices, [1.0 - u - v, u, v])
-        } else {
-            self.patches.reflectance(triangle, side)
-        }
-    }
-
-    /// Of the texel hit, or its part, or of the patch where no texel shows that side.
-    fn direct_at(&self, triangle: u32, side: Side, (u, v): (f32, f32), patch: u32) -> Vec3 {
-        if side == Side::Front {
-            let scene_triangle = &self.scene.triangles[triangle as usize];
-            let map = &self.layout.maps[scene_triangle.object as usize];
-            let [a, b, c] = scene_triangle.uv;
-            let uv = a + (b - a) * u + (c - a) * v;
-            let (x, y) = (uv.x as u32, uv.y as u32);
-            if x < map.width && y < map.height {
-                let index = map.first + (y * map.width + x) as usize;
-                let direct = self.direct[index];
-                if !direct.x.is_nan() {
-                    return direct;
-                }
-                if let Some(direct) = self.divided.at(index as u32, uv.fract()) {
-                    return direct;
-                }
-            }
-        }
-        self.patch_direct[patch as usize]
+        Some(last)
     }
 }

@@ -2,6 +2,7 @@
 //! that show none. Not the transport between patches that the gather reads.
 
 pub(crate) mod allocation;
+mod arriving;
 pub(crate) mod charts;
 pub(crate) mod chunks;
 pub(crate) mod divided_light;
@@ -16,6 +17,7 @@ pub(crate) mod late;
 mod light_ways;
 pub(crate) mod lighting;
 pub(crate) mod neighbours;
+pub(crate) mod outgoing;
 pub(crate) mod plane;
 pub(crate) mod resolution_error;
 pub(crate) mod rounds;

@@ -5,16 +5,18 @@
 //! Not the points themselves: that is `sampling`.
 
 use super::footprint::Texel;
-use crate::sampling::Sequence;
+use crate::sampling::{Sequence, SequenceSet};
 
 /// Texels along a tile's side, and in it.
 const SIDE: u32 = 8;
 const TEXELS: u32 = SIDE * SIDE;
 
 /// One texel's part of its tile's sequence.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct TileSequence {
     sequence: Sequence,
+    /// Its first dimension set, of which every sample has a point.
+    first_set: SequenceSet,
     /// The texel's place in its tile.
     place: u32,
     /// Points of a texel's first run.
@@ -27,7 +29,13 @@ impl TileSequence {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
         let sequence = Sequence::new(seed, purpose, tile).of(texel.object);
-        Self { sequence, place: morton(texel.x % SIDE, texel.y % SIDE), run: run.max(1) }
+        let place = morton(texel.x % SIDE, texel.y % SIDE);
+        Self { sequence, first_set: sequence.set(0), place, run: run.max(1) }
+    }
+
+    /// The texel's point `sample`, of dimension set 0.
+    pub fn first(&self, sample: u32) -> [f32; 4] {
+        self.first_set.point(self.index(sample))
     }
 
     /// The texel's point `sample`, of dimension set `set`.
@@ -82,7 +90,7 @@ mod tests {
         for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x + 4, y))) {
             let own = TileSequence::new(5, 1, &texel(x, y), 4);
             for sample in 0..4 {
-                let [u, v, ..] = own.point(sample, 0);
+                let [u, v, ..] = own.first(sample);
                 cells[(u * 8.0) as usize + 8 * (v * 8.0) as usize] += 1;
             }
         }

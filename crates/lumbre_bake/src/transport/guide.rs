@@ -14,8 +14,6 @@ pub(crate) struct Guide {
     /// Cut as patches are, but larger.
     pub regions: Patches,
     rows: Rows,
-    /// For each region, the share of the samples that it places.
-    shares: Vec<f32>,
 }
 
 /// Share of the samples that the guide places, at most; where the sky shines, which it does not know, fewer, in steps of one in
@@ -54,7 +52,6 @@ impl Guide {
         }
         let mut rows = Rows::new(regions.list.len());
         let mut exchange = vec![0.0f64; regions.list.len()];
-        let mut shares = Vec::with_capacity(regions.list.len());
         for members in members {
             let mut touched: Vec<u32> = Vec::new();
             for (other, g) in members.iter().flat_map(|&member| factors.row(member as usize)) {
@@ -79,48 +76,86 @@ impl Guide {
             let by_sky: f64 = members.iter().map(of_sky).sum();
             let share = by_bounces / (by_bounces + by_sky);
             let share = if share.is_finite() { (GUIDED * STEPS * share as f32).round() / STEPS } else { 0.0 };
-            rows.push(flux.into_iter().filter(|_| share > 0.0));
-            shares.push(share);
+            rows.push(share, flux.into_iter().filter(|_| share > 0.0));
         }
-        Self { regions, rows, shares }
+        Self { regions, rows }
     }
 
-    /// Whether the solution knows of light by bounces that arrives at a region.
-    pub fn knows(&self, region: u32) -> bool {
-        self.rows.knows(region)
+    /// The share of the samples at a region that it places, in [0, 1); none if the solution knows of no light by bounces that arrives there.
+    pub fn share(&self, region: u32) -> Option<f32> {
+        self.rows.share(region)
     }
 
-    /// The share of the samples at a region that it places, in [0, 1).
-    pub fn share(&self, region: u32) -> f32 {
-        self.shares[region as usize]
+    /// Where in the list of those that light `region` to look for the one at `u` in [0, 1).
+    pub fn near(&self, region: u32, u: f32) -> Part {
+        self.rows.near(region, u)
     }
 
-    /// Of those that light `region`, the one at `u` in [0, 1); the place within its interval, stretched to [0, 1); its probability.
-    pub fn pick(&self, region: u32, u: f32) -> Option<(u32, f32, f32)> {
-        self.rows.pick(region, u)
+    /// Of those that light a region, the one at `u`, of which `part` is [near](Self::near); the place within its interval, stretched to
+    /// [0, 1); its probability.
+    pub fn pick(&self, part: &Part, u: f32) -> Option<(u32, f32, f32)> {
+        self.rows.pick(part, u)
     }
 
-    /// The probability that [`pick`](Self::pick) takes `other`.
-    pub fn probability(&self, region: u32, other: u32) -> f32 {
-        self.rows.probability(region, other)
+    /// Where in the list of those that light `region` to look for `other`.
+    pub fn near_region(&self, region: u32, other: u32) -> Part {
+        self.rows.near_column(region, other)
+    }
+
+    /// The probability that [`pick`](Self::pick) takes `other`, of which `part` is [near](Self::near_region).
+    pub fn probability(&self, part: &Part, other: u32) -> f32 {
+        self.rows.probability(part, other)
     }
 }
 
-/// Discrete distributions over the same numbers, sparse.
+/// Discrete distributions over the same numbers, sparse. What is read together lies together: most of it is in no near cache.
 #[derive(Clone, Debug, Default)]
 struct Rows {
-    /// How many numbers there are.
-    numbers: u32,
-    /// Ends of the rows in the next two.
-    ends: Vec<usize>,
-    /// Ascending in each row.
-    columns: Vec<u32>,
-    /// Running sums of the probabilities of a row; the last is 1.
-    cumulative: Vec<f32>,
+    /// Columns of one part are the same but for so many of their lowest bits.
+    part_bits: u32,
+    heads: Vec<Head>,
+    /// Of all rows; columns ascend in each.
+    entries: Vec<Entry>,
     /// Of each row where its columns of each part of the numbers begin, and its sums of each part of [0, 1]: so few have to be looked
     /// through (Chen and Asau, "On Generating Random Variates from an Empirical Distribution", 1974).
     column_index: Vec<u32>,
     cumulative_index: Vec<u32>,
+}
+
+/// A row.
+#[derive(Clone, Copy, Debug)]
+struct Head {
+    /// Its first entry.
+    start: usize,
+    /// How many it has.
+    count: u32,
+    /// Share of the samples that it places.
+    share: f32,
+}
+
+/// Of a row: a column, and the running sum of the probabilities up to it; the last is 1.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    column: u32,
+    end: f32,
+}
+
+/// A part of a row, and what stands in its middle: read before it is needed, together with those of other samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
+    /// Where the row begins in the list of all entries, and how many it has; the rest counts from there.
+    begin: usize,
+    count: u32,
+    first: u32,
+    last: u32,
+    middle: u32,
+    entry: Entry,
+}
+
+impl Part {
+    /// Of no row.
+    pub const NONE: Self =
+        Self { begin: 0, count: 0, first: 0, last: 0, middle: 0, entry: Entry { column: 0, end: 1.0 } };
 }
 
 /// Parts of a row's index.
@@ -129,71 +164,82 @@ const PARTS: usize = 64;
 impl Rows {
     /// Of columns below `numbers`.
     fn new(numbers: usize) -> Self {
-        Self { numbers: numbers.max(1) as u32, ..Self::default() }
-    }
-
-    /// The part that a column is in.
-    fn part_of(&self, column: u32) -> usize {
-        (u64::from(column) * PARTS as u64 / u64::from(self.numbers)) as usize
+        let part_bits = numbers.div_ceil(PARTS).max(1).next_power_of_two().trailing_zeros();
+        Self { part_bits, ..Self::default() }
     }
 
     /// A row of weights at ascending numbers; empty if none is positive and finite.
-    fn push(&mut self, weights: impl Iterator<Item = (u32, f64)>) {
+    fn push(&mut self, share: f32, weights: impl Iterator<Item = (u32, f64)>) {
         let weights: Vec<(u32, f64)> =
             weights.filter(|(_, weight)| weight.is_finite() && *weight > 0.0).collect();
         let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
         let mut running = 0.0;
-        let start = self.columns.len();
-        for (place, (column, weight)) in weights.iter().enumerate() {
+        let start = self.entries.len();
+        for (place, &(column, weight)) in weights.iter().enumerate() {
             running += weight / sum;
-            self.columns.push(*column);
-            self.cumulative.push(if place + 1 == weights.len() { 1.0 } else { running as f32 });
+            let end = if place + 1 == weights.len() { 1.0 } else { running as f32 };
+            self.entries.push(Entry { column, end });
         }
-        self.ends.push(self.columns.len());
+        let row = &self.entries[start..];
+        self.heads.push(Head { start, count: row.len() as u32, share });
         for part in 0..=PARTS {
-            let columns = self.columns[start..].partition_point(|&column| self.part_of(column) < part);
-            self.column_index.push(columns as u32);
+            let first = (part as u64) << self.part_bits;
+            self.column_index.push(row.partition_point(|entry| u64::from(entry.column) < first) as u32);
             let least = part as f32 / PARTS as f32;
-            let sums = self.cumulative[start..].partition_point(|&end| end <= least);
-            self.cumulative_index.push(sums as u32);
+            self.cumulative_index.push(row.partition_point(|entry| entry.end <= least) as u32);
         }
     }
 
-    fn row(&self, row: u32) -> (&[u32], &[f32]) {
-        let start = if row == 0 { 0 } else { self.ends[row as usize - 1] };
-        let range = start..self.ends[row as usize];
-        (&self.columns[range.clone()], &self.cumulative[range])
-    }
-
-    /// Where a part of a row begins and ends, by one of the indices.
-    fn part(index: &[u32], row: u32, part: usize) -> (usize, usize) {
+    fn part(&self, index: &[u32], row: u32, part: usize) -> Part {
         let at = row as usize * (PARTS + 1) + part.min(PARTS - 1);
-        (index[at] as usize, index[at + 1] as usize)
+        let Head { start: begin, count, .. } = self.heads[row as usize];
+        let (first, last) = (index[at], index[at + 1]);
+        let middle = first.midpoint(last);
+        let entry =
+            self.entries.get(begin + middle as usize).copied().unwrap_or(Entry { column: 0, end: 1.0 });
+        Part { begin, count, first, last, middle, entry }
     }
 
-    fn knows(&self, row: u32) -> bool {
-        !self.row(row).0.is_empty()
+    fn share(&self, row: u32) -> Option<f32> {
+        let head = self.heads[row as usize];
+        (head.count > 0).then_some(head.share)
     }
 
-    fn pick(&self, row: u32, u: f32) -> Option<(u32, f32, f32)> {
-        let (columns, cumulative) = self.row(row);
-        let (first, last) = Self::part(&self.cumulative_index, row, (u * PARTS as f32) as usize);
-        let at = first + cumulative[first..last].partition_point(|&end| end <= u);
-        let column = *columns.get(at)?;
-        let start = if at == 0 { 0.0 } else { cumulative[at - 1] };
-        let probability = cumulative[at] - start;
+    fn near(&self, row: u32, u: f32) -> Part {
+        self.part(&self.cumulative_index, row, (u * PARTS as f32) as usize)
+    }
+
+    fn near_column(&self, row: u32, column: u32) -> Part {
+        self.part(&self.column_index, row, (column >> self.part_bits) as usize)
+    }
+
+    /// The first entry of a part that is not `before`, or the end of the part; and the end of the one before it.
+    fn find(&self, part: &Part, before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
+        let range = if part.first < part.last && before(&part.entry) {
+            part.middle + 1..part.last
+        } else {
+            part.first..part.middle
+        };
+        let within = &self.entries[part.begin + range.start as usize..part.begin + range.end as usize];
+        let at = range.start as usize + within.partition_point(before);
+        let start = if at == 0 { 0.0 } else { self.entries[part.begin + at - 1].end };
+        (self.entries.get(part.begin + at).filter(|_| at < part.count as usize), start)
+    }
+
+    fn pick(&self, part: &Part, u: f32) -> Option<(u32, f32, f32)> {
+        let (entry, start) = self.find(part, |entry| entry.end <= u);
+        let &Entry { column, end } = entry?;
+        let probability = end - start;
         (probability > 0.0)
             .then(|| (column, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
     }
 
-    fn probability(&self, row: u32, column: u32) -> f32 {
-        let (columns, cumulative) = self.row(row);
-        let (first, last) = Self::part(&self.column_index, row, self.part_of(column));
-        match columns[first..last].binary_search(&column).map(|at| first + at) {
-            Ok(0) => cumulative[0],
-            Ok(at) => cumulative[at] - cumulative[at - 1],
-            Err(_) => 0.0,
+    fn probability(&self, part: &Part, column: u32) -> f32 {
+        if part.first == part.last {
+            return 0.0;
         }
+        let (entry, start) = self.find(part, |entry| entry.column < column);
+        entry.filter(|entry| entry.column == column).map_or(0.0, |entry| entry.end - start)
     }
 }
 
@@ -203,50 +249,59 @@ mod tests {
 
     fn rows() -> Rows {
         let mut rows = Rows::new(8);
-        rows.push([(1, 2.0), (4, 6.0), (7, 0.0)].into_iter());
-        rows.push([(0, 0.0), (3, f64::NAN)].into_iter());
-        rows.push(std::iter::once((5, 1e-30)));
+        rows.push(0.4, [(1, 2.0), (4, 6.0), (7, 0.0)].into_iter());
+        rows.push(0.4, [(0, 0.0), (3, f64::NAN)].into_iter());
+        rows.push(0.25, std::iter::once((5, 1e-30)));
         rows
+    }
+
+    fn pick(rows: &Rows, row: u32, u: f32) -> Option<(u32, f32, f32)> {
+        rows.pick(&rows.near(row, u), u)
+    }
+
+    fn probability(rows: &Rows, row: u32, column: u32) -> f32 {
+        rows.probability(&rows.near_column(row, column), column)
     }
 
     #[test]
     fn probabilities_are_in_proportion_to_the_weights() {
         let rows = rows();
         for (row, column, expected) in [(0, 1, 0.25), (0, 4, 0.75), (0, 7, 0.0), (0, 5, 0.0), (2, 5, 1.0)] {
-            assert_eq!(rows.probability(row, column), expected);
+            assert_eq!(probability(&rows, row, column), expected);
         }
         for (u, column, within, probability) in
             [(0.125, 1, 0.5, 0.25), (0.25, 4, 0.0, 0.75), (0.625, 4, 0.5, 0.75)]
         {
-            assert_eq!(rows.pick(0, u), Some((column, within, probability)));
+            assert_eq!(pick(&rows, 0, u), Some((column, within, probability)));
         }
     }
 
     #[test]
     fn what_gets_no_light_is_not_guided() {
         let rows = rows();
-        assert!(rows.knows(0) && !rows.knows(1));
-        assert_eq!(rows.pick(1, 0.5), None);
+        assert_eq!([0, 1, 2].map(|row| rows.share(row)), [Some(0.4), None, Some(0.25)]);
+        assert_eq!(pick(&rows, 1, 0.5), None);
     }
 
     #[test]
     fn the_indices_find_what_a_search_through_the_whole_row_finds() {
         let mut rows = Rows::new(1000);
         let weight = |column: u32| if column % 7 < 3 { 0.0 } else { f64::from(column % 13).powi(4) };
-        rows.push((0..1000).map(|column| (column, weight(column))));
-        rows.push((0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0)));
+        rows.push(0.4, (0..1000).map(|column| (column, weight(column))));
+        rows.push(0.4, (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0)));
         for row in 0..2 {
-            let (columns, cumulative) = rows.row(row);
+            let head = rows.heads[row as usize];
+            let entries = &rows.entries[head.start..head.start + head.count as usize];
             for step in 0..5000 {
                 let u = step as f32 / 5000.0;
-                let at = cumulative.partition_point(|&end| end <= u);
-                assert_eq!(rows.pick(row, u).map(|found| found.0), Some(columns[at]), "{u}");
+                let at = entries.partition_point(|entry| entry.end <= u);
+                assert_eq!(pick(&rows, row, u).map(|found| found.0), Some(entries[at].column), "{u}");
             }
             for column in 0..1000 {
-                let expected = columns
-                    .binary_search(&column)
-                    .map_or(0.0, |at| cumulative[at] - if at == 0 { 0.0 } else { cumulative[at - 1] });
-                assert_eq!(rows.probability(row, column), expected, "{column}");
+                let expected = entries
+                    .binary_search_by_key(&column, |entry| entry.column)
+                    .map_or(0.0, |at| entries[at].end - if at == 0 { 0.0 } else { entries[at - 1].end });
+                assert_eq!(probability(&rows, row, column), expected, "{column}");
             }
         }
     }

@@ -16,7 +16,7 @@ use crate::scene::{BakeScene, SceneTriangle};
 pub(crate) struct Patch {
     pub triangle: u32,
     pub side: Side,
-    /// Which piece of its triangle: a cell, or with the highest bit a piece of one.
+    /// Which piece of its triangle: a cell's row and place in it, or with the highest bit a piece of one.
     cell: u32,
     /// Square canonical units.
     pub area: f32,
@@ -33,6 +33,7 @@ struct Cut {
     back: Option<u32>,
     /// Of the front's first patch and the back's: of all, where it does not vary.
     reflectance: [Vec3; 2],
+    varies: bool,
     /// Where the trees of its cells are listed; [`UNCUT`] if none is cut.
     roots: u32,
 }
@@ -41,6 +42,8 @@ struct Cut {
 const UNCUT: u32 = u32::MAX;
 /// Marks a piece of a cell.
 const PIECE: u32 = 1 << 31;
+/// Where in a patch's cell the row begins; both it and the place in it are below 2^11.
+const ROW: u32 = 16;
 
 /// All patches, and the way from a point to its patch.
 #[derive(Clone, Debug)]
@@ -91,6 +94,7 @@ impl Patches {
                     front: 0,
                     back: None,
                     reflectance: [Vec3::ZERO; 2],
+                    varies: false,
                     roots: UNCUT,
                 });
                 continue;
@@ -114,7 +118,7 @@ impl Patches {
                         _ => triangle.area * share(&corners),
                     };
                     let reflectance = mean_reflectance(scene, index, side, &corners);
-                    Patch { triangle: index as u32, side, cell, area, reflectance }
+                    Patch { triangle: index as u32, side, cell: packed(divisions, cell), area, reflectance }
                 };
                 list.extend((0..cells).map(patch));
                 for (cell, cut) in &cut {
@@ -130,7 +134,8 @@ impl Patches {
             let back = triangle.two_sided.then(|| add(Side::Back));
             let first = |patch: u32| list[patch as usize].reflectance;
             let reflectance = [first(front), back.map_or(Vec3::ZERO, first)];
-            cuts.push(Cut { divisions, front, back, reflectance, roots: own_roots });
+            let varies = scene.surfaces[triangle.surface as usize].varies();
+            cuts.push(Cut { divisions, front, back, reflectance, varies, roots: own_roots });
         }
         Self { list, cuts, roots, lines }
     }
@@ -155,16 +160,17 @@ impl Patches {
         Some(first + cell)
     }
 
-    /// Reflectance of a triangle's side that has the same all over.
-    pub fn reflectance(&self, triangle: u32, side: Side) -> Vec3 {
-        self.cuts[triangle as usize].reflectance[usize::from(side == Side::Back)]
+    /// Reflectance of a triangle's side, if it has the same all over.
+    pub fn reflectance(&self, triangle: u32, side: Side) -> Option<Vec3> {
+        let cut = &self.cuts[triangle as usize];
+        (!cut.varies).then_some(cut.reflectance[usize::from(side == Side::Back)])
     }
 
     /// Barycentric weights (second, third vertex) of a point of a patch given by weights of its own.
     pub fn point(&self, patch: &Patch, (u, v): (f32, f32)) -> (f32, f32) {
         if patch.cell & PIECE == 0 {
             let divisions = self.cuts[patch.triangle as usize].divisions.max(1);
-            return point_of_cell(divisions, patch.cell, u, v);
+            return point_in_row(divisions, patch.cell >> ROW, patch.cell & ((1 << ROW) - 1), u, v);
         }
         point_between(&self.lines.pieces[(patch.cell & !PIECE) as usize], u, v)
     }
@@ -307,7 +313,17 @@ fn cell_at(divisions: u32, u: f32, v: f32) -> u32 {
     a * (2 * divisions - a) + 2 * b + u32::from(beyond)
 }
 
-fn point_of_cell(divisions: u32, cell: u32, u: f32, v: f32) -> (f32, f32) {
+/// A cell, or a piece of one, as a patch keeps it: to find the row takes a root.
+fn packed(divisions: u32, cell: u32) -> u32 {
+    if cell & PIECE != 0 {
+        return cell;
+    }
+    let (row, within) = row_of_cell(divisions, cell);
+    row << ROW | within
+}
+
+/// A cell's row and place in it.
+fn row_of_cell(divisions: u32, cell: u32) -> (u32, u32) {
     let n = f64::from(divisions);
     // The largest a with a(2n - a) <= cell.
     let mut a = (n - (n * n - f64::from(cell)).max(0.0).sqrt()) as u32;
@@ -317,7 +333,15 @@ fn point_of_cell(divisions: u32, cell: u32, u: f32, v: f32) -> (f32, f32) {
     while (a + 1) * (2 * divisions - a - 1) <= cell && a + 1 < divisions {
         a += 1;
     }
-    let within = cell - a * (2 * divisions - a);
+    (a, cell - a * (2 * divisions - a))
+}
+
+fn point_of_cell(divisions: u32, cell: u32, u: f32, v: f32) -> (f32, f32) {
+    let (row, within) = row_of_cell(divisions, cell);
+    point_in_row(divisions, row, within, u, v)
+}
+
+fn point_in_row(divisions: u32, a: u32, within: u32, u: f32, v: f32) -> (f32, f32) {
     let b = within / 2;
     let (x, y) = if within.is_multiple_of(2) {
         (a as f32 + u, b as f32 + v)

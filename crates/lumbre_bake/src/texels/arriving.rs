@@ -1,0 +1,298 @@
+//! Where a receiver's light by bounces comes from: points by cosine rays and by the guide, several receivers at a time, so that what they
+//! read is on its way from memory together. Not what is made of it: that is `gather`.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Vec2, Vec3};
+
+use super::outgoing::Outgoing;
+use crate::sampling::{cosine_about, triangle_point};
+use crate::scene::SurfaceHit;
+use crate::scene::material::Side;
+use crate::transport::direct::Receiver;
+use crate::transport::guide::Part;
+
+/// A receiver that asks for a sample of its light by bounces.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    pub receiver: Receiver,
+    /// Its region of the guide; without one cosine rays only.
+    pub region: Option<u32>,
+    /// In the unit square.
+    pub u: f32,
+    pub v: f32,
+}
+
+impl Asked {
+    /// Fills the lists' empty places.
+    pub const NOWHERE: Self = Self {
+        receiver: Receiver {
+            position: Vec3::ZERO,
+            origin: Vec3::ZERO,
+            geometric_normal: Vec3::Z,
+            normal: Vec3::Z,
+        },
+        region: None,
+        u: 0.0,
+        v: 0.0,
+    };
+}
+
+/// A surface that a sample has met.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Met {
+    pub triangle: u32,
+    pub side: Side,
+    pub at: (f32, f32),
+    pub patch: u32,
+    pub reflectance: Vec3,
+    /// Irradiance there: direct, and the patch's by bounces.
+    pub direct: Vec3,
+    pub indirect: Vec3,
+    /// The patch's errors in that.
+    pub error: Vec2,
+    /// Of the ray, of unit length, and how far it went.
+    pub direction: Vec3,
+    pub distance: f32,
+}
+
+impl Met {
+    /// Nothing is read yet.
+    const UNREAD: Self = Self {
+        triangle: 0,
+        side: Side::Front,
+        at: (0.0, 0.0),
+        patch: 0,
+        reflectance: Vec3::ZERO,
+        direct: Vec3::ZERO,
+        indirect: Vec3::ZERO,
+        error: Vec2::ZERO,
+        direction: Vec3::ZERO,
+        distance: 0.0,
+    };
+}
+
+/// What a sample has found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arriving {
+    /// A surface that reflects.
+    pub met: Option<Met>,
+    /// Or else what arrives all the same, times π as all light is here: the sky's, or none. Weighted.
+    pub light: Vec3,
+    pub weight: f32,
+}
+
+impl Arriving {
+    /// No light and no weight: what the guide named is not to be seen.
+    pub const NOTHING: Self = Self { met: None, light: Vec3::ZERO, weight: 0.0 };
+}
+
+/// Where a sample looks.
+#[derive(Clone, Copy)]
+pub(super) enum Aim {
+    /// In a direction about the receiver's normal.
+    Around(Vec3),
+    /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
+    At(u32, f32, Met, Vec3),
+    Nowhere,
+}
+
+/// A sample under way.
+#[derive(Clone, Copy)]
+pub(super) struct Way {
+    aim: Aim,
+    /// Of the samples, what the guide places; none if it knows nothing of the receiver.
+    share: Option<f32>,
+    /// Part of the guide's row that is asked next.
+    part: Part,
+    /// Region and texel met, where they count, and the texel's direct light.
+    region: Option<u32>,
+    texel: usize,
+    direct: Vec3,
+}
+
+impl Way {
+    /// Nothing is known.
+    pub const NONE: Self = Self {
+        aim: Aim::Nowhere,
+        share: None,
+        part: Part::NONE,
+        region: None,
+        texel: usize::MAX,
+        direct: Vec3::ZERO,
+    };
+}
+
+/// What the direction of a ray about a receiver's normal is worth: cos θ / π, with what lies under the facet mirrored up.
+fn kernel(receiver: &Receiver, direction: Vec3) -> f32 {
+    let below = direction - receiver.geometric_normal * (2.0 * direction.dot(receiver.geometric_normal));
+    (direction.dot(receiver.normal).max(0.0) + below.dot(receiver.normal).max(0.0)) * FRAC_1_PI
+}
+
+/// A direction with density [`kernel`].
+#[inline]
+fn about(receiver: &Receiver, u: f32, v: f32) -> Vec3 {
+    let direction = cosine_about(receiver.normal, u, v);
+    let below = direction.dot(receiver.geometric_normal);
+    if below <= 0.0 {
+        // Under the facet though above the smooth surface: mirrored up.
+        return direction - receiver.geometric_normal * (2.0 * below);
+    }
+    direction
+}
+
+impl Outgoing<'_> {
+    /// For each receiver a point that its light by bounces comes from: some of the samples, if the guide knows the receiver's region, are
+    /// points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic (Veach and Guibas, "Optimally
+    /// Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
+    pub(super) fn arriving(&self, asked: &[Asked], ways: &mut [Way], found: &mut [Arriving]) {
+        // One thing for all samples before the next: the loops that read from afar do little else.
+        let (ways, found) = (&mut ways[..asked.len()], &mut found[..asked.len()]);
+        for (way, asked) in ways.iter_mut().zip(asked) {
+            way.share = asked.region.and_then(|region| self.guide.share(region));
+            if let (Some(region), Some(share)) = (asked.region, way.share)
+                && asked.u < share
+            {
+                way.part = self.guide.near(region, asked.u / share);
+            }
+        }
+        for (way, asked) in ways.iter_mut().zip(asked) {
+            self.aim(asked, way);
+        }
+        for ((way, asked), found) in ways.iter().zip(asked).zip(found.iter_mut()) {
+            self.follow(asked, way, found);
+        }
+        for (way, found) in ways.iter_mut().zip(found.iter_mut()) {
+            way.texel = usize::MAX;
+            let Some(met) = &mut found.met else { continue };
+            let Some(patch) = self.patches.at(met.triangle, met.side, met.at) else {
+                *found = Arriving::NOTHING;
+                continue;
+            };
+            way.region = match way.aim {
+                Aim::At(region, ..) => Some(region),
+                _ if way.share.is_some() => self.guide.regions.at(met.triangle, met.side, met.at),
+                _ => None,
+            };
+            met.patch = patch;
+            met.reflectance = self.reflectance(met.triangle, met.side, met.at);
+            way.texel = self.texel_at(met.triangle, met.side, met.at);
+        }
+        for way in ways.iter_mut() {
+            way.direct = self.direct.get(way.texel).copied().unwrap_or(Vec3::NAN);
+        }
+        for ((way, asked), found) in ways.iter_mut().zip(asked).zip(found.iter_mut()) {
+            let Some(met) = &mut found.met else { continue };
+            met.indirect = self.patch_indirect[met.patch as usize];
+            met.error = self.patch_error[met.patch as usize];
+            if let (Aim::Around(_), Some(own), Some(region)) = (&way.aim, asked.region, way.region) {
+                way.part = self.guide.near_region(own, region);
+            }
+        }
+        for ((way, asked), found) in ways.iter().zip(asked).zip(found) {
+            let Some(met) = &mut found.met else { continue };
+            met.direct = if way.direct.x.is_nan() {
+                self.direct_of_part(met.triangle, met.side, met.at, met.patch)
+            } else {
+                way.direct
+            };
+            if let Some(share) = way.share {
+                match self.weight(asked, way, share, met) {
+                    Some(weight) => found.weight = weight,
+                    None => *found = Arriving::NOTHING,
+                }
+            }
+        }
+    }
+
+    /// Where to look.
+    #[inline]
+    fn aim(&self, asked: &Asked, way: &mut Way) {
+        let &Asked { ref receiver, u, v, .. } = asked;
+        way.aim = match way.share {
+            None => Aim::Around(about(receiver, u, v)),
+            Some(share) if u >= share => Aim::Around(about(receiver, (u - share) / (1.0 - share), v)),
+            Some(share) => {
+                let picked = self.guide.pick(&way.part, u / share);
+                let point = picked
+                    .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v));
+                point.unwrap_or(Aim::Nowhere)
+            }
+        };
+    }
+
+    /// What is there, its light not read yet.
+    #[inline]
+    fn follow(&self, asked: &Asked, way: &Way, found: &mut Arriving) {
+        *found = Arriving::NOTHING;
+        let origin = asked.receiver.origin;
+        match &way.aim {
+            Aim::Nowhere => {}
+            Aim::At(_, _, met, end) => {
+                if !self.scene.blocked(origin, *end) {
+                    found.met = Some(*met);
+                    found.weight = 1.0;
+                }
+            }
+            &Aim::Around(direction) => {
+                // The sky is found by these alone.
+                let rest = 1.0 - way.share.unwrap_or(0.0);
+                match self.scene.first_hit(origin, direction) {
+                    SurfaceHit::Lit { triangle, side, at, distance } => {
+                        found.met = Some(Met { triangle, side, at, direction, distance, ..Met::UNREAD });
+                        found.weight = 1.0;
+                    }
+                    SurfaceHit::None => (found.light, found.weight) = (self.sky / rest, 1.0 / rest),
+                    SurfaceHit::Back | SurfaceHit::Inside => found.weight = 1.0 / rest,
+                }
+            }
+        }
+    }
+
+    /// The weight of a sample of which the guide places a share.
+    #[inline]
+    fn weight(&self, asked: &Asked, way: &Way, share: f32, met: &Met) -> Option<f32> {
+        let region = way.region?;
+        let probability = match way.aim {
+            Aim::At(_, probability, ..) => probability,
+            _ => self.guide.probability(&way.part, region),
+        };
+        // Densities over the surfaces' area.
+        let by_guide = probability / self.guide.regions.list[region as usize].area;
+        let normal = self.scene.triangles[met.triangle as usize].side_normal(met.side);
+        let cosine = -met.direction.dot(normal);
+        let by_cosine = kernel(&asked.receiver, met.direction) * cosine / (met.distance * met.distance);
+        let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
+        (cosine > 0.0 && weight.is_finite()).then_some(weight)
+    }
+
+    /// A point of a region, if it and the receiver face each other.
+    #[inline]
+    fn point_of(&self, receiver: &Receiver, index: u32, probability: f32, u: f32, v: f32) -> Option<Aim> {
+        let region = &self.guide.regions.list[index as usize];
+        let (triangle, side) = (region.triangle, region.side);
+        let at = self.guide.regions.point(region, triangle_point(u, v));
+        let surface = &self.scene.triangles[triangle as usize];
+        let position = surface.position(at.0, at.1);
+        let apart = position - receiver.position;
+        let distance = apart.length();
+        let direction = apart / distance;
+        let faces =
+            direction.dot(surface.side_normal(side)) < 0.0 && direction.dot(receiver.geometric_normal) > 0.0;
+        if !faces {
+            return None;
+        }
+        let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
+        let met = Met { triangle, side, at, direction, distance, ..Met::UNREAD };
+        Some(Aim::At(index, probability, met, end))
+    }
+
+    /// The receiver at a surface that was met.
+    pub(super) fn receiver_at(&self, met: &Met) -> Receiver {
+        let surface = &self.scene.triangles[met.triangle as usize];
+        let position = surface.position(met.at.0, met.at.1);
+        let origin = self.scene.off_surface(met.triangle, met.side, position);
+        let normal = surface.side_normal(met.side);
+        Receiver { position, origin, geometric_normal: normal, normal }
+    }
+}

@@ -1,0 +1,88 @@
+//! The light that leaves surfaces, as the gather reads it: direct light by texel, bounces by patch. Not where it is asked for: that is `gather`.
+
+use glam::{Vec2, Vec3};
+
+use super::divided_light::DividedLight;
+use crate::scene::material::Side;
+use crate::scene::{BakeScene, LightmapLayout};
+use crate::transport::guide::Guide;
+use crate::transport::patches::Patches;
+
+/// The light that leaves surfaces, as the gather reads it.
+pub(crate) struct Outgoing<'a> {
+    pub scene: &'a BakeScene,
+    pub layout: &'a LightmapLayout,
+    pub patches: &'a Patches,
+    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, or more than one.
+    pub direct: &'a [Vec3],
+    /// Of the texels that have more than one.
+    pub divided: &'a DividedLight,
+    /// Irradiance that a surface gets of an unhidden sky.
+    pub sky: Vec3,
+    /// Per patch, direct irradiance.
+    pub patch_direct: &'a [Vec3],
+    /// Per patch, irradiance by bounces and by the sky.
+    pub patch_indirect: &'a [Vec3],
+    /// Per patch, the errors of that, with their signs: by the form factors' noise, and by the patches' size.
+    pub patch_error: &'a [Vec2],
+    /// Hits nearer than this get a real bounce more, canonical units.
+    pub near: f32,
+    /// Where each patch's light comes from.
+    pub guide: &'a Guide,
+    /// Samples of each scramble in the first round.
+    pub run: u32,
+}
+
+impl Outgoing<'_> {
+    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.
+    pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
+        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
+        let irradiance = self.direct_at(triangle, side, at, patch) + self.patch_indirect[patch as usize];
+        self.reflectance(triangle, side, at) * irradiance
+    }
+
+    pub(super) fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
+        self.patches.reflectance(triangle, side).unwrap_or_else(|| {
+            let triangle = &self.scene.triangles[triangle as usize];
+            let surface = &self.scene.surfaces[triangle.surface as usize];
+            surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
+        })
+    }
+
+    /// Of the texel hit, or its part, or of the patch where no texel shows that side.
+    fn direct_at(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
+        let direct = self.direct_of(self.texel_at(triangle, side, at));
+        direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch))
+    }
+
+    /// The texel that shows a point, in the row of all maps; the greatest number where none does.
+    pub(super) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> usize {
+        let (index, _) = self.place_at(triangle, at);
+        index.filter(|_| side == Side::Front).unwrap_or(usize::MAX)
+    }
+
+    /// Of a texel, if it has one for all of it.
+    pub(super) fn direct_of(&self, texel: usize) -> Option<Vec3> {
+        self.direct.get(texel).copied().filter(|direct| !direct.x.is_nan())
+    }
+
+    /// Where the texel has none: of its part or of the patch.
+    #[cold]
+    pub(super) fn direct_of_part(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
+        let (index, uv) = self.place_at(triangle, at);
+        let index = index.filter(|_| side == Side::Front);
+        let divided = index.and_then(|index| self.divided.at(index as u32, uv.fract()));
+        divided.unwrap_or_else(|| self.patch_direct[patch as usize])
+    }
+
+    /// The texel at a point, if it is on the map, and the point on the map.
+    fn place_at(&self, triangle: u32, (u, v): (f32, f32)) -> (Option<usize>, Vec2) {
+        let scene_triangle = &self.scene.triangles[triangle as usize];
+        let map = &self.layout.maps[scene_triangle.object as usize];
+        let [a, b, c] = scene_triangle.uv;
+        let uv = a + (b - a) * u + (c - a) * v;
+        let (x, y) = (uv.x as u32, uv.y as u32);
+        let index = (x < map.width && y < map.height).then(|| map.first + (y * map.width + x) as usize);
+        (index, uv)
+    }
+}
