@@ -162,7 +162,8 @@ fn run(
     let layout = lay_out_with(&objects, space, density, options, &mut report.warnings)?;
 
     watch.stage("hierarchy", &mut report)?;
-    let scene = BakeScene::new(&objects, &layout, space, &mut report.warnings)?;
+    let mut scene = BakeScene::new(&objects, &layout, space, &mut report.warnings)?;
+    scene.dark_outside = Sources::new(&scene, placed.clone(), sky).are_inside();
     let sources = Sources::new(&scene, placed, sky);
     report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
     if sources.is_empty() {

@@ -8,6 +8,7 @@ use crate::rebake::TexelSamples;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
 use crate::texels::footprint::{Footprint, FootprintPoint, Texel};
 use crate::texels::gather::Gathered;
+use crate::texels::lanes::BESIDE_A_ROW;
 use crate::texels::smooth::Estimates;
 use crate::transport::direct::Direct;
 use crate::transport::patches::{Patch, Patches};
@@ -39,6 +40,11 @@ const COVERED: u64 = (size_of::<Texel>()
 /// that smoothing keeps in rows: estimates with their bias, those of the weighted fit, guides with the noise, products and nearness. Its place
 /// among the covered ones and its surface.
 const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8;
+
+/// What rows of texels have beside them, in texels.
+fn margins(layout: &LightmapLayout) -> u64 {
+    layout.maps.iter().map(|map| u64::from(map.height) * BESIDE_A_ROW as u64).sum()
+}
 
 /// Of a patch: itself, its direct light in two halves and together, its rows' heads, and sixteen lists of the solver for each channel.
 const PATCH: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8) as u64;
@@ -78,7 +84,7 @@ pub(crate) fn check_texels(
     let Some(limit) = options.memory else { return Ok(()) };
     let area = |t: &SceneTriangle| f64::from((t.uv[1] - t.uv[0]).perp_dot(t.uv[2] - t.uv[0]).abs()) / 2.0;
     let covered = scene.triangles.iter().map(area).sum::<f64>().min(layout.texels as f64) as u64;
-    let texels = covered * (COVERED + samples) + layout.texels as u64 * MAPPED;
+    let texels = covered * (COVERED + samples) + (layout.texels as u64 + margins(layout)) * MAPPED;
     let needed = texels + scene.triangles.len() as u64 * TRIANGLE + REST;
     if needed > limit {
         return Err(BakeError::Memory { needed, texels, covered, limit });
@@ -113,7 +119,7 @@ impl Plan {
         let points = listed.sum::<u64>();
         let for_texels = covered * (COVERED + samples)
             + points * size_of::<FootprintPoint>() as u64
-            + layout.texels as u64 * MAPPED;
+            + (layout.texels as u64 + margins(layout)) * MAPPED;
         let asked = Patches::count(scene, side);
         let (mut patches, mut fewest) = (asked, false);
         loop {

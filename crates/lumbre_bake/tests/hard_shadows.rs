@@ -132,3 +132,117 @@ fn plates_are_cut_out_and_where_they_are_too_many_left_to_rays() {
         assert!((found / expected - 1.0).abs() < 5e-3, "{side}: {found} {expected}");
     }
 }
+
+/// As [`unit`], of a point light.
+fn lamp(world: &mut World, light: Light, [x, y, z]: [f64; 3]) {
+    world.spawn((light, Transform::from_xyz(x, y, z)));
+}
+
+#[test]
+fn a_lamp_nearer_than_texels_are_large() {
+    // Half to a fifth of a texel above the floor, with a plate over some of it: nearly all light falls on a few texels.
+    for at in [[0.0, 0.03, 0.0], [0.31, 0.02, -0.34], [0.345, 0.012, -0.345]] {
+        let mut world = World::new();
+        let floor = floor(&mut world);
+        lamp(&mut world, unit(Light::point), at);
+        world.spawn((
+            square(0.004, Vec3::new(at[0] as f32 + 0.003, at[1] as f32 * 0.5, at[2] as f32)),
+            black(),
+            StaticObject,
+        ));
+        let height = at[1];
+        let whole = solid_angle(1.0, [-at[0], -at[2]], height) / 4.0;
+        let hidden = solid_angle(0.004, [0.003, 0.0], 0.5 * height) / 4.0;
+        let found = mean(&mut world, floor);
+        println!("{at:?}: {found:.4} of {:.4}", whole - hidden);
+        // Rays of one texel tell: 64 at the least, as even as they are, with a lamp's peak among them.
+        assert!((found / (whole - hidden) - 1.0).abs() < 0.1, "{at:?}: {found} {}", whole - hidden);
+    }
+}
+
+#[test]
+fn a_range_shorter_than_the_way_to_the_middle_of_a_tile() {
+    // Texels of 1/4 m, tiles of 2 m: the light reaches less than one of them.
+    let mut world = World::new();
+    let floor = world.spawn((square(4.0, Vec3::ZERO), black(), StaticObject)).id();
+    let mut light = unit(Light::point);
+    light.attenuation.range = 0.6;
+    lamp(&mut world, light, [1.15, 0.3, 1.2]);
+    let found = 64.0 * mean(&mut world, floor);
+    // E = h / d³ (1 - (d / range)⁴), over a disc: by numbers.
+    let (height, range, steps) = (0.3f64, 0.6f64, 100_000);
+    let reach = (range * range - height * height).sqrt();
+    let expected: f64 = (0..steps)
+        .map(|step| {
+            let radius = reach * (f64::from(step) + 0.5) / f64::from(steps);
+            let d = radius.hypot(height);
+            2.0 * std::f64::consts::PI * radius * height / d.powi(3) * (1.0 - (d / range).powi(4))
+        })
+        .sum::<f64>()
+        * reach
+        / f64::from(steps);
+    println!("{found:.4} of {expected:.4}");
+    assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
+}
+
+#[test]
+fn a_cone_with_a_sharp_edge() {
+    // A cutoff of 20 degrees from straight above: I = 1 within, so that a flux of 2 π (1 - cos 20°) arrives.
+    let mut world = World::new();
+    let floor = floor(&mut world);
+    let cutoff = 20f64.to_radians();
+    let cone = lumbre_optics::SpotCone::Exponent { cutoff: cutoff as f32, exponent: 0.0 };
+    let place = Transform::from_xyz(0.05, 1.0, 0.02).looking_at(DVec3::new(0.05, 0.0, 0.02), DVec3::X);
+    world.spawn((Light { spot: Some(cone), ..unit(Light::point) }, place));
+    let open = 4.0 * mean(&mut world, floor);
+    let expected = 2.0 * std::f64::consts::PI * (1.0 - cutoff.cos());
+    world.spawn((square(0.05, Vec3::new(0.1, 0.5, 0.0)), black(), StaticObject));
+    let hidden = solid_angle(0.05, [0.05, -0.02], 0.5);
+    let found = 4.0 * mean(&mut world, floor);
+    println!("{open:.5} of {expected:.5}; {found:.5} of {:.5}", expected - hidden);
+    // The edge goes through some forty texels, of eight samples each: half of one of them, at random, is 1 % of the light; two sigma.
+    assert!(
+        (open / expected - 1.0).abs() < 0.02 && (found - expected + hidden).abs() < 0.02 * expected,
+        "{open} {found}"
+    );
+}
+
+#[test]
+fn strips_thinner_than_a_texel_are_lit() {
+    // The edge of a board 2 mm thick, with a plate between it and one of two lights.
+    let mut world = World::new();
+    let board = world
+        .spawn((
+            Mesh(Arc::new(TriangleMesh {
+                positions: [[-1.0, 0.0], [-1.0, 0.002], [1.0, 0.002], [1.0, 0.0]]
+                    .map(|[x, z]| Vec3::new(x, 0.0, z))
+                    .to_vec(),
+                uv1: [[0.0, 0.0], [0.0, 0.002], [1.0, 0.002], [1.0, 0.0]].map(Vec2::from).to_vec(),
+                indices: vec![0, 1, 2, 0, 2, 3],
+                ..TriangleMesh::default()
+            })),
+            black(),
+            StaticObject,
+        ))
+        .id();
+    lamp(&mut world, unit(Light::point), [0.0, 1.0, 0.0]);
+    world.spawn((square(0.02, Vec3::new(0.1, 0.5, 0.0)), black(), StaticObject));
+    mean(&mut world, board);
+    let map = &world.get::<Lightmap>(board).expect("it was baked").image;
+    // Light between 1 and 2^-3/2, and less where the plate's shadow is, 8 cm wide: a texel is 6 cm.
+    let row: Vec<f64> = map.texels[..32].iter().map(|texel| f64::from(texel.y) / FRAC_1_PI).collect();
+    assert!(row.iter().all(|light| (0.3..1.001).contains(light)), "{row:?}");
+    assert!(row[19] < 0.6 && row[16] > 0.9 && row[22] > 0.75, "{row:?}");
+}
+
+/// A number that lights of the other kind read makes no light large.
+#[test]
+fn a_radius_is_not_read_in_the_sky() {
+    let mut world = World::new();
+    let floor = floor(&mut world);
+    let sun = Light { radius: 1e6, ..unit(Light::directional) };
+    world.spawn((sun, Transform::from_xyz(0.0, 1.0, 0.0).looking_at(DVec3::ZERO, DVec3::X)));
+    world.spawn((square(0.3, Vec3::Y * 0.4), black(), StaticObject));
+    let found = mean(&mut world, floor);
+    assert!((found - 0.91).abs() < 1e-3, "{found}");
+}

@@ -42,6 +42,16 @@ pub(crate) struct PlacedLight {
     pub axis: DVec3,
 }
 
+impl PlacedLight {
+    /// Whether it has a size: lights in the sky an angle, others a radius. The other number of each is not read.
+    pub fn is_sized(&self) -> bool {
+        match self.light.kind {
+            LightKind::Directional => self.light.angle > 0.0,
+            _ => self.light.radius > 0.0,
+        }
+    }
+}
+
 /// The static objects, in an order that depends on the entities only.
 pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
     // The only way to fail is a system that cannot run; the transforms are then as the caller left them.

@@ -9,6 +9,7 @@ mod leaks;
 mod lightmap_layout;
 pub(crate) mod material;
 mod occlusion;
+mod rooms;
 mod texture;
 mod texture_coordinates;
 mod triangles;

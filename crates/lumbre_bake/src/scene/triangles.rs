@@ -6,8 +6,9 @@ use lumbre_rays::{Bvh, triangle_extent};
 
 use super::duplicates::superseded;
 use super::hidden_side::closed_pieces;
-use super::leaks::{Extent, Leaks, all_within, rooms};
+use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
+use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, Object, SurfaceMaterial};
 use crate::BakeError;
@@ -123,6 +124,10 @@ pub(crate) struct BakeScene {
     pub masked: bool,
     /// Rays that ended where none should.
     pub leaks: Leaks,
+    /// The closed pieces that look inward.
+    pub rooms: Vec<Room>,
+    /// All that shines is inside of rooms: nothing leaves them.
+    pub dark_outside: bool,
 }
 
 /// Most triangles: patches and texels name them by 32 bits, the hierarchy by 29.
@@ -141,12 +146,13 @@ impl BakeScene {
             return Err(BakeError::TooManyTriangles { triangles: count, limit: MOST_TRIANGLES });
         }
         let (mut triangles, mut surfaces) = (Vec::with_capacity(count), Vec::new());
-        let mut rooms = Vec::new();
+        let (mut rooms, mut solids) = (Vec::new(), Vec::new());
         for (index, object) in objects.iter().enumerate() {
             let first = triangles.len();
             extract(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
-            rooms.extend(mark_closed(&mut triangles, first));
+            mark_closed(&mut triangles, first, &mut rooms, &mut solids);
         }
+        without_hollow(&mut triangles, &rooms, &solids);
         mark_superseded(&mut triangles, &surfaces, warnings);
         let solid: Vec<[Vec3; 3]> = triangles
             .iter()
@@ -156,7 +162,16 @@ impl BakeScene {
         let masked = surfaces.iter().any(SurfaceMaterial::is_masked);
         let closed_scene = all_within(&rooms, triangles.iter().map(|triangle| triangle.corners));
         let leaks = Leaks::new(closed_scene);
-        Ok(Self { space, bvh: Bvh::build(&solid), triangles, surfaces, masked, leaks })
+        Ok(Self {
+            space,
+            bvh: Bvh::build(&solid),
+            triangles,
+            surfaces,
+            masked,
+            leaks,
+            rooms,
+            dark_outside: false,
+        })
     }
 }
 
@@ -251,21 +266,48 @@ fn extract(
     }
 }
 
-/// Marks the closed pieces of an object whose triangles begin at `first`; returns the extents of those that look inward.
-fn mark_closed(triangles: &mut [SceneTriangle], first: usize) -> Vec<Extent> {
+/// A closed piece that looks outward: its number, and the box around it.
+type Solid = (u32, Vec3, Vec3);
+
+/// Marks the closed pieces of an object whose triangles begin at `first`, and lists them.
+fn mark_closed(
+    triangles: &mut [SceneTriangle],
+    first: usize,
+    rooms: &mut Vec<Room>,
+    solids: &mut Vec<Solid>,
+) {
     // Corners number the pieces.
     let number = |piece: u32| 3 * first as u32 + piece;
     let triangles = &mut triangles[first..];
     let corners: Vec<[Vec3; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
-    let pieces = closed_pieces(&corners);
-    let rooms = rooms(&corners, &pieces);
-    for (triangle, piece) in triangles.iter_mut().zip(&pieces) {
-        triangle.closed = piece.is_some();
-        triangle.two_sided &= piece.is_none();
-        let solid = piece.filter(|piece| rooms.binary_search_by_key(piece, |(room, _)| *room).is_err());
-        triangle.solid = solid.map(number);
+    let names = closed_pieces(&corners);
+    let pieces = pieces(&corners, &names);
+    for (triangle, name) in triangles.iter_mut().zip(&names) {
+        triangle.closed = name.is_some();
+        triangle.two_sided &= name.is_none();
+        let place = name.and_then(|name| pieces.binary_search_by_key(&name, |piece| piece.number).ok());
+        triangle.solid = place.filter(|&at| pieces[at].room.is_none()).map(|at| number(pieces[at].number));
     }
-    rooms.into_iter().map(|(_, extent)| extent).collect()
+    for piece in pieces {
+        match piece.room {
+            Some(room) => rooms.push(room),
+            None => solids.push((number(piece.number), piece.low, piece.high)),
+        }
+    }
+}
+
+/// Pairs of rooms and solids that are looked at: with more, none counts as solid.
+const MOST_PAIRS: usize = 1 << 24;
+
+/// What has a room inside of it, as a house's outside has, is no solid.
+fn without_hollow(triangles: &mut [SceneTriangle], rooms: &[Room], solids: &[Solid]) {
+    let all = rooms.len().saturating_mul(solids.len()) > MOST_PAIRS;
+    let is_hollow = |(_, low, high): &&Solid| all || rooms.iter().any(|room| room.is_within(*low, *high));
+    // Ascending, as objects and their corners are.
+    let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();
+    for triangle in triangles {
+        triangle.solid = triangle.solid.filter(|solid| hollow.binary_search(solid).is_err());
+    }
 }
 
 fn check_reflectance(diffuse: &Vec3, textured: bool, name: &str, warnings: &mut Vec<String>) {

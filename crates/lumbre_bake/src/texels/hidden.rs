@@ -97,7 +97,7 @@ enum Probe {
     Clear,
     /// Something at once.
     Pressed,
-    /// The inside of something, or a back, or the outside of rooms that hold the whole scene.
+    /// The inside of something, or a back, or nothing where it is dark outside.
     Hidden,
 }
 
@@ -108,7 +108,6 @@ fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
     let direction = cosine_about(receiver.geometric_normal, u, v);
     match scene.telling_hit(receiver.origin, direction) {
         SurfaceHit::Inside | SurfaceHit::Back => Probe::Hidden,
-        SurfaceHit::None if scene.leaks.closed_scene => Probe::Hidden,
         SurfaceHit::Lit { distance, .. } if distance < pressed(scene, texel) => Probe::Pressed,
         SurfaceHit::Lit { .. } | SurfaceHit::None => Probe::Clear,
     }
@@ -161,33 +160,32 @@ fn judge(scene: &BakeScene, texel: &mut Texel) -> (usize, u64) {
     (usize::from(reduced), rays)
 }
 
-/// Half the rays see the inside of something closed or leave a scene that rooms close, or all but one see backs or end at once: the
-/// point is hidden. With it come the rays cast: fewer where the others cannot change that.
+/// Half the rays see the inside of something closed, or all see backs or end at once, or all but one where some end at once: the point is
+/// hidden. With it come the rays cast: fewer where the others cannot change that.
 fn in_the_open(
     scene: &BakeScene,
     point: &FootprintPoint,
     sequence: Sequence,
     index: u32,
-    pressed: f32,
+    at_once: f32,
 ) -> (bool, u32) {
     let receiver = receiver(scene, point);
-    let (mut inside, mut clear) = (0, 0);
+    let (mut inside, mut pressed, mut clear) = (0, 0, 0);
     for ray in 0..JUDGES {
         let [u, v, ..] = sequence.point(index * JUDGES + ray, 0);
         match scene.telling_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
             SurfaceHit::Inside => inside += 1,
             SurfaceHit::Back => {}
-            SurfaceHit::Lit { distance, .. } => clear += u32::from(distance >= pressed),
-            SurfaceHit::None => {
-                let outside = scene.leaks.closed_scene;
-                *if outside { &mut inside } else { &mut clear } += 1;
-            }
+            SurfaceHit::Lit { distance, .. } if distance < at_once => pressed += 1,
+            SurfaceHit::Lit { .. } => clear += 1,
+            SurfaceHit::None => clear += 1,
         }
         let cast = ray + 1;
         if 2 * inside >= JUDGES {
             return (false, cast);
         }
-        if 2 * (cast - inside) > JUDGES && clear >= CLEAR {
+        let enough = if pressed > 0 { CLEAR } else { 1 };
+        if 2 * (cast - inside) > JUDGES && clear >= enough {
             return (true, cast);
         }
     }

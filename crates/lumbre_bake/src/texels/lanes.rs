@@ -13,6 +13,8 @@ use super::surroundings::{NONE, Surface};
 pub(crate) const LANES: usize = 8;
 /// Texels to each side that a neighbourhood may reach.
 pub(crate) const MARGIN: usize = 12;
+/// Cells of a row that no texel of its map has.
+pub(crate) const BESIDE_A_ROW: usize = MARGIN + LANES - 1;
 /// What eight texels see of a row.
 pub(crate) const WINDOW: usize = MARGIN + LANES + MARGIN;
 
@@ -66,7 +68,7 @@ impl Grid {
                 let start = cells.len();
                 cells.resize(start + MARGIN, NONE);
                 cells.extend(ground.by_ref().take(width as usize));
-                cells.resize(start + MARGIN + width as usize + LANES - 1, NONE);
+                cells.resize(start + width as usize + BESIDE_A_ROW, NONE);
                 let (first_block, mut column) = (blocks.len(), 0);
                 while let Some(gap) = cells[start + MARGIN + column..].iter().position(|&own| own != NONE) {
                     blocks.push((column + gap) as u32);

@@ -1,7 +1,7 @@
 //! What may stand between a tile of texels and point, spot and directional lights. Not between it and emissive surfaces: that is `shafts`.
 
 use glam::DVec3;
-use lumbre_optics::LightKind;
+use lumbre_optics::{LightKind, SpotCone};
 
 use crate::scene::{BakeScene, PlacedLight};
 use crate::transport::box_tree::BoxTree;
@@ -11,8 +11,8 @@ use crate::transport::lit_part::{Origin, Way};
 use crate::transport::shaft::{Area, Shaft, WIDEST};
 
 /// What is known of the lights' ways to an area of a flat surface, by the lights' numbers, in their order. Of many lights those that are the
-/// brightest there.
-pub(super) fn ways(sources: &Sources<'_>, area: &Area, tree: &BoxTree) -> Vec<(u32, Way)> {
+/// brightest there. `texel_side` is that of its texels.
+pub(super) fn ways(sources: &Sources<'_>, area: &Area, texel_side: f32, tree: &BoxTree) -> Vec<(u32, Way)> {
     let point = |x: f32, y: f32| {
         let [a, b, _, d] = area.corners;
         let position = (a + (b - a) * f64::from(x) + (d - a) * f64::from(y)).as_vec3();
@@ -23,9 +23,12 @@ pub(super) fn ways(sources: &Sources<'_>, area: &Area, tree: &BoxTree) -> Vec<(u
     let of_light = |(index, placed): (usize, &PlacedLight)| {
         let index = index as u32;
         let way = match arriving.binary_search(&index) {
-            Ok(_) => way(sources.scene, placed, area, tree)?,
+            Ok(_) if is_even(sources.scene, placed, area, texel_side) => {
+                way(sources.scene, placed, area, tree)?
+            }
+            Ok(_) => return None,
             // Of few lights all that arrive are among them.
-            Err(_) if sources.has_few_lights() => Way::Hidden,
+            Err(_) if sources.has_few_lights() => Way::Dark,
             Err(_) => return None,
         };
         Some((index, way))
@@ -33,13 +36,48 @@ pub(super) fn ways(sources: &Sources<'_>, area: &Area, tree: &BoxTree) -> Vec<(u
     sources.lights.iter().enumerate().filter_map(of_light).collect()
 }
 
+/// Whether a texel's light by a few of its points, and by the middles of its pieces, is that of all of it: the light is not as near as texels
+/// are large, no sharp edge of its cone goes through the area, and it is not so far away that numbers do not tell the shadows' edges.
+fn is_even(scene: &BakeScene, placed: &PlacedLight, area: &Area, texel_side: f32) -> bool {
+    if placed.light.kind == LightKind::Directional {
+        return true;
+    }
+    let place = scene.space.place(placed.position);
+    let [a, b, c, d] = area.corners;
+    let along = |side: DVec3| {
+        let squared = side.length_squared();
+        if squared > 0.0 { side * ((place - a).dot(side) / squared).clamp(0.0, 1.0) } else { DVec3::ZERO }
+    };
+    let away = place.distance(a + along(b - a) + along(d - a));
+    if !(away >= NEAR * f64::from(texel_side) && place.abs().max_element() < AFAR) {
+        return false;
+    }
+    let Some(cone) = placed.light.spot.filter(|cone| !cone.is_everywhere()) else { return true };
+    let (inner, outer) = match cone {
+        SpotCone::Exponent { cutoff, .. } => (cutoff, cutoff),
+        SpotCone::Smooth { inner, outer } => (inner, outer),
+    };
+    let (inner, outer) = (f64::from(inner), f64::from(outer));
+    let (middle, reach) = ((a + c) * 0.5, 0.5 * a.distance(c));
+    let from_light = middle - place;
+    let spread = (reach / from_light.length()).min(1.0).asin();
+    let angle = placed.axis.angle_between(from_light);
+    let beside = angle + spread < inner || angle - spread > outer;
+    beside || outer - inner > spread
+}
+
+/// Of texels' sides, how near a light may be.
+const NEAR: f64 = 2.0;
+/// Coordinates of lights so far away that the edges of their shadows are rounded by a thousandth of a texel in maps of 8192.
+const AFAR: f64 = (1 << 14) as f64;
+
 /// `None` where rays have to tell.
 fn way(scene: &BakeScene, placed: &PlacedLight, area: &Area, tree: &BoxTree) -> Option<Way> {
     let light = &placed.light;
     let (shaft, origin) = match light.kind {
         LightKind::Directional => {
             let (towards, half_angle) = (-placed.axis, 0.5 * f64::from(light.angle));
-            match half_angle > 0.0 {
+            match placed.is_sized() {
                 true if half_angle > WIDEST => return None,
                 true => (Shaft::in_cone(area, towards, half_angle), None),
                 false => (Shaft::towards(area, towards), Some(Origin::Direction(towards))),
@@ -47,13 +85,13 @@ fn way(scene: &BakeScene, placed: &PlacedLight, area: &Area, tree: &BoxTree) -> 
         }
         _ => {
             let place = scene.space.place(placed.position);
-            match f64::from(light.radius) * scene.space.scale {
-                radius if radius > 0.0 => (Shaft::to_ball(area, place, radius), None),
-                _ => (Shaft::to_point(area, place), Some(Origin::Point(place))),
+            match placed.is_sized() {
+                true => (Shaft::to_ball(area, place, f64::from(light.radius) * scene.space.scale), None),
+                false => (Shaft::to_point(area, place), Some(Origin::Point(place))),
             }
         }
     };
-    let Some(shaft) = shaft else { return Some(Way::Hidden) };
+    let Some(shaft) = shaft else { return Some(Way::Dark) };
     let blockers = shaft.triangles(scene, tree, MOST_BLOCKERS)?;
     if blockers.is_empty() {
         return Some(Way::Clear);

@@ -114,16 +114,13 @@ impl Light<'_> {
         point
     }
 
-    /// Not inside other geometry nor outside rooms that hold the whole scene, which show nothing of it.
+    /// Not inside other geometry, nor where it is dark outside, which show nothing of it.
     fn is_open(&self, receiver: &Receiver, sequence: Sequence) -> bool {
         let meets_inside = |ray: &u32| {
             let [u, v, ..] = sequence.point(*ray, 0);
             let direction = cosine_about(receiver.geometric_normal, u, v);
-            match self.scene.telling_hit(receiver.origin, direction) {
-                SurfaceHit::Inside | SurfaceHit::Back => true,
-                SurfaceHit::None => self.scene.leaks.closed_scene,
-                SurfaceHit::Lit { .. } => false,
-            }
+            let hit = self.scene.telling_hit(receiver.origin, direction);
+            matches!(hit, SurfaceHit::Inside | SurfaceHit::Back)
         };
         2 * (0..JUDGES).filter(meets_inside).count() < JUDGES as usize
     }

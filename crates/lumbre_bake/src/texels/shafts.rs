@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::footprint::{Footprint, Texel, receiver};
 use super::light_ways::ways;
-use super::tiles::{Tiles, area, positions_of};
+use super::tiles::{Tiles, area, positions_of, shows_plane};
 use crate::scene::BakeScene;
 use crate::transport::between::{BeforePart, Between};
 use crate::transport::box_tree::BoxTree;
@@ -76,6 +76,9 @@ impl<'a> Shafts<'a> {
         let mut positions = Vec::new();
         members().for_each(|texel| positions_of(self.scene, texel, &mut positions));
         let area = area(self.scene, first.triangle, &positions)?;
+        if !members().all(|texel| shows_plane(self.scene, texel, first.triangle)) {
+            return None;
+        }
         let anchor = receiver(self.scene, &first.point(self.scene, 0.5, 0.5)?);
         let part = |part: u32| {
             let emitters = self.sources.emitters_of(part)?;
@@ -88,7 +91,7 @@ impl<'a> Shafts<'a> {
             Some(OfPart { part, emitters: found })
         };
         let parts = self.sources.parts(&anchor).into_iter().filter_map(part).collect();
-        Some(OfTile { parts, lights: ways(self.sources, &area, tree) })
+        Some(OfTile { parts, lights: ways(self.sources, &area, first.side(self.scene), tree) })
     }
 
     /// What may stand between a texel, by its number, and those of the sources for which that is known.

@@ -62,6 +62,20 @@ pub(crate) fn positions_of(scene: &BakeScene, texel: &Texel, positions: &mut Vec
     }
 }
 
+/// Whether all that a texel shows is flat and looks where a triangle looks.
+pub(crate) fn shows_plane(scene: &BakeScene, texel: &Texel, triangle: u32) -> bool {
+    let normal = scene.triangles[triangle as usize].normal;
+    let same = |index: u32| {
+        let other = &scene.triangles[index as usize];
+        index == triangle || (other.flat && other.normal.dot(normal) > 0.9999)
+    };
+    match &texel.footprint {
+        Footprint::Whole(own) => same(*own),
+        Footprint::Points(points) => points.iter().all(|point| same(point.triangle)),
+        Footprint::Hidden => true,
+    }
+}
+
 /// A rectangle on a flat triangle around places on it; none where they are not in its plane.
 pub(crate) fn area(scene: &BakeScene, triangle: u32, positions: &[Vec3]) -> Option<Area> {
     let triangle = &scene.triangles[triangle as usize];

@@ -4,6 +4,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use lumbre_optics::LightKind;
 
 use super::between::{BeforePart, Between};
 use super::cut_out::Pieces;
@@ -168,6 +169,21 @@ impl<'a> Sources<'a> {
     /// Whether nothing shines.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty() && self.lights.is_empty() && !self.has_sky()
+    }
+
+    /// Whether all that shines is inside of rooms: outside of them it is dark.
+    pub fn are_inside(&self) -> bool {
+        let scene = self.scene;
+        let inside = |points: &[Vec3]| {
+            scene.rooms.iter().any(|room| points.iter().all(|&point| room.surely_holds(point)))
+        };
+        let light = |placed: &PlacedLight| {
+            placed.light.kind != LightKind::Directional && inside(&[scene.space.position(placed.position)])
+        };
+        !scene.masked
+            && !self.has_sky()
+            && self.lights.iter().all(light)
+            && self.emitters.iter().all(|emitter| inside(&emitter.corners))
     }
 
     /// Whether the sky shines.

@@ -27,7 +27,9 @@ pub(crate) enum Shown {
 pub(crate) enum Way {
     /// Nothing stands between; also to a light with a size.
     Clear,
-    /// Nothing arrives.
+    /// It does not shine here.
+    Dark,
+    /// Nothing of it arrives.
     Hidden,
     /// These shadows may fall on it.
     Shadows(Origin, Vec<Shadow>),
@@ -53,20 +55,22 @@ impl Origin {
         }
     }
 
-    /// Calls `visit` for the pieces of `shown` that are lit: with a point that stands for each, and the piece's share of the whole.
+    /// Calls `visit` for the pieces of `shown` that are lit: with a point that stands for each, and the piece's share of the whole. Returns
+    /// whether the shares are exact, and not those of points.
     pub fn lit(
         self,
         shown: &Shown,
         shadows: &[Shadow],
         room: &mut Pieces,
         mut visit: impl FnMut(DVec3, f64),
-    ) {
+    ) -> bool {
         let zero = self.zero();
         let is_lit = |point: DVec3| !shadows.iter().any(|shadow| shadow.hides(point - zero));
         match shown {
             Shown::Points(points) => {
                 let share = 1.0 / points.len() as f64;
                 points.iter().filter(|point| is_lit(**point)).for_each(|&point| visit(point, share));
+                false
             }
             Shown::Parallelogram(corners) => {
                 let corners = corners.map(|corner| corner - zero);
@@ -80,13 +84,14 @@ impl Origin {
                             visit(point, share);
                         }
                     }
-                    return;
+                    return false;
                 }
                 let (whole, _) = middle(&corners);
                 if is_left(whole, room) {
                     let parts = room.list().iter().map(Piece::corners).map(middle);
                     parts.for_each(|(area, middle)| visit(zero + middle, area / whole));
                 }
+                true
             }
         }
     }
@@ -94,7 +99,9 @@ impl Origin {
     /// Whether nothing of a parallelogram is lit.
     pub fn hides_all(self, corners: [DVec3; 4], shadows: &[Shadow], room: &mut Pieces) -> bool {
         let corners = corners.map(|corner| corner - self.zero());
-        room.begin(&corners).is_some() && left(room, shadows) && !is_left(middle(&corners).0, room)
+        let whole = middle(&corners).0;
+        // Of no area, nothing is known.
+        whole > 0.0 && room.begin(&corners).is_some() && left(room, shadows) && !is_left(whole, room)
     }
 }
 

@@ -42,7 +42,7 @@ struct Cut {
 const UNCUT: u32 = u32::MAX;
 /// Marks a piece of a cell.
 const PIECE: u32 = 1 << 31;
-/// Where in a patch's cell the row begins; both it and the place in it are below 2^11.
+/// Where in a patch's cell the row begins; both it and the place in it are below 2^11, as a triangle has at most 1024 divisions.
 const ROW: u32 = 16;
 
 /// All patches, and the way from a point to its patch.

@@ -79,6 +79,9 @@ pub(crate) struct Shaft {
     planes: Vec<Plane>,
     /// Largest absolute coordinate of what has a place.
     extent: f64,
+    /// Planes of which what touches them is outside, too: the first so many. Towards a light the others run together to a point, and what
+    /// meets along an edge there would leave a gap.
+    touched: usize,
 }
 
 /// Coordinates of a scene are below this; and longer than any way through it.
@@ -108,6 +111,7 @@ impl Shaft {
         let lowest = [p, q, r].iter().map(|corner| -corner.dot(shines)).fold(f64::MIN, f64::max);
         shaft.planes.push(Plane { normal: -shines, height: lowest });
         shaft.close(&[[0, 1], [1, 2], [2, 0]]);
+        shaft.touched = shaft.planes.len();
         Some(shaft)
     }
 
@@ -149,7 +153,7 @@ impl Shaft {
         let lowest = area.corners.iter().map(|corner| -corner.dot(area.normal)).fold(f64::MIN, f64::max);
         let mut planes = Vec::with_capacity(1 + 4 * ends.len());
         planes.push(Plane { normal: -area.normal, height: lowest });
-        Self { points, planes, extent }
+        Self { points, planes, extent, touched: 1 }
     }
 
     /// Whether something of the ends is before the area.
@@ -200,8 +204,9 @@ impl Shaft {
 
     /// Whether a triangle, whose largest absolute coordinate is `extent`, may reach into it.
     pub fn may_meet(&self, corners: &Corners, extent: f64) -> bool {
-        for plane in &self.planes {
-            let inner = plane.height - self.slack(plane.normal, extent);
+        for (place, plane) in self.planes.iter().enumerate() {
+            let slack = if place < self.touched { self.slack(plane.normal, extent) } else { 0.0 };
+            let inner = plane.height - slack;
             if corners.iter().all(|corner| plane.normal.dot(*corner) >= inner) {
                 return false;
             }

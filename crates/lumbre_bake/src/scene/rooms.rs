@@ -1,0 +1,150 @@
+//! Rooms: closed pieces that look inward. Not what is in them, and not the pieces that look outward, which are solids.
+
+use glam::{DVec3, Vec3};
+
+/// A closed piece that looks inward.
+#[derive(Clone, Debug)]
+pub(crate) struct Room {
+    low: Vec3,
+    high: Vec3,
+    /// Of a convex one its sides: unit normals that look inward, with their height. Empty if it is not, or has many.
+    sides: Vec<(DVec3, f64)>,
+}
+
+/// What touches, relative to coordinates.
+const TOUCHING: f32 = 64.0 / (1 << 24) as f32;
+/// Triangles of a room whose sides are kept.
+const FEW: usize = 256;
+
+impl Room {
+    fn new(triangles: &[[Vec3; 3]], low: Vec3, high: Vec3) -> Self {
+        let mut room = Self { low, high, sides: Vec::new() };
+        if triangles.len() <= FEW {
+            let side = |corners: &[Vec3; 3]| {
+                let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+                let normal = (b - a).cross(c - a).try_normalize()?;
+                Some((normal, normal.dot(a)))
+            };
+            room.sides = triangles.iter().filter_map(side).collect();
+            if !triangles.iter().flatten().all(|&corner| room.surely_holds(corner)) {
+                room.sides.clear();
+            }
+        }
+        room
+    }
+
+    fn slack(&self) -> f32 {
+        TOUCHING * self.low.abs().max(self.high.abs()).max_element()
+    }
+
+    /// Whether a point is inside of it, or on its sides; `false` where that is not known.
+    pub fn surely_holds(&self, point: Vec3) -> bool {
+        let (place, slack) = (point.as_dvec3(), f64::from(self.slack()));
+        !self.sides.is_empty()
+            && self.sides.iter().all(|(normal, height)| normal.dot(place) >= height - slack)
+    }
+
+    /// Whether all of some corners are in the box around it.
+    fn spans(&self, corners: &[Vec3; 3]) -> bool {
+        corners.iter().all(|corner| corner.cmpge(self.low).all() && corner.cmple(self.high).all())
+    }
+
+    /// Whether the box around it is within another one, or touches it from inside.
+    pub fn is_within(&self, low: Vec3, high: Vec3) -> bool {
+        let slack = self.slack();
+        (low - slack).cmple(self.low).all() && (high + slack).cmpge(self.high).all()
+    }
+}
+
+/// A closed piece: its number, and the box around it.
+pub(crate) struct Piece {
+    pub number: u32,
+    pub low: Vec3,
+    pub high: Vec3,
+    /// If it looks inward.
+    pub room: Option<Room>,
+}
+
+/// The closed pieces by ascending numbers. `pieces` names the one of each triangle, if any.
+pub(crate) fn pieces(triangles: &[[Vec3; 3]], pieces: &[Option<u32>]) -> Vec<Piece> {
+    let mut order: Vec<(u32, usize)> =
+        pieces.iter().enumerate().filter_map(|(index, piece)| Some(((*piece)?, index))).collect();
+    order.sort_unstable();
+    let piece = |same: &[(u32, usize)]| {
+        let corners: Vec<[Vec3; 3]> = same.iter().map(|&(_, index)| triangles[index]).collect();
+        let origin = corners[0][0].as_dvec3();
+        let (mut low, mut high, mut volume) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0);
+        for corners in &corners {
+            let [a, b, c]: [DVec3; 3] = corners.map(|corner| corner.as_dvec3() - origin);
+            volume += a.dot(b.cross(c));
+            for corner in corners {
+                (low, high) = (low.min(*corner), high.max(*corner));
+            }
+        }
+        let room = (volume < 0.0).then(|| Room::new(&corners, low, high));
+        Piece { number: same[0].0, low, high, room }
+    };
+    order.chunk_by(|a, b| a.0 == b.0).map(piece).collect()
+}
+
+/// Whether every triangle lies within the box around some room.
+pub(crate) fn all_within(rooms: &[Room], triangles: impl Iterator<Item = [Vec3; 3]>) -> bool {
+    let mut last = 0;
+    for corners in triangles {
+        // Mostly the one before.
+        if rooms.get(last).is_some_and(|room| room.spans(&corners)) {
+            continue;
+        }
+        match rooms.iter().position(|room| room.spans(&corners)) {
+            Some(room) => last = room,
+            None => return false,
+        }
+    }
+    !rooms.is_empty()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::hidden_side::closed_pieces;
+    use super::*;
+
+    fn found(triangles: &[[Vec3; 3]]) -> Vec<Room> {
+        pieces(triangles, &closed_pieces(triangles)).into_iter().filter_map(|piece| piece.room).collect()
+    }
+
+    #[test]
+    fn a_room_is_a_closed_piece_that_looks_inward() {
+        let block = lumbre_mesh::shapes::cuboid(Vec3::ONE, 1).triangle_positions().unwrap();
+        let room: Vec<[Vec3; 3]> = block.iter().map(|&[a, b, c]| [a * 4.0, c * 4.0, b * 4.0]).collect();
+        assert!(found(&block).is_empty());
+        let both = [room.clone(), block].concat();
+        let rooms = found(&both);
+        assert_eq!((rooms.len(), rooms[0].low, rooms[0].high), (1, Vec3::splat(-2.0), Vec3::splat(2.0)));
+        assert!(all_within(&rooms, both.iter().copied()));
+        assert!(!all_within(&rooms, std::iter::once([Vec3::ZERO, Vec3::X, Vec3::Y * 3.0])));
+        assert!(!all_within(&found(&both[1..]), room.iter().copied()));
+    }
+
+    #[test]
+    fn what_a_convex_room_holds_is_known_and_what_another_holds_is_not() {
+        let turn = glam::Quat::from_rotation_y(0.6);
+        let block = lumbre_mesh::shapes::cuboid(Vec3::splat(4.0), 1).triangle_positions().unwrap();
+        let convex: Vec<[Vec3; 3]> = block.iter().map(|&[a, b, c]| [a, c, b].map(|p| turn * p)).collect();
+        let room = &found(&convex)[0];
+        let inside = [Vec3::ZERO, Vec3::splat(1.9), Vec3::new(2.0, 0.0, 0.3)].map(|point| turn * point);
+        assert!(inside.into_iter().all(|point| room.surely_holds(point)));
+        // In its box, and outside of it.
+        let beside = Vec3::new(2.5, 0.0, 2.5);
+        assert!(room.spans(&[beside; 3]) && !room.surely_holds(beside));
+        // One corner pushed in.
+        let dented: Vec<[Vec3; 3]> = convex
+            .iter()
+            .map(|corners| {
+                corners.map(|p| if p.distance(turn * Vec3::splat(2.0)) < 1e-3 { p * 0.2 } else { p })
+            })
+            .collect();
+        let dented = &found(&dented)[0];
+        assert!(!dented.surely_holds(Vec3::ZERO));
+        assert!(room.is_within(room.low, room.high) && !room.is_within(room.low * 0.9, room.high));
+    }
+}
