@@ -335,3 +335,33 @@ fn what_stands_on_what_stands_on_the_floor() {
     let covered = report.coverage * report.texels as f64 * 16.0;
     assert!((report.leaked_rays as f64) < 1e-3 * covered, "{} of {covered}", report.leaked_rays);
 }
+
+/// A room, and the house around it in the very same places: what is inside of the house is no inside of a solid, and the sun shines on it.
+#[test]
+fn a_house_of_zero_thickness_is_lit_on_both_sides() {
+    let mut world = World::new();
+    let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), matt(0.6, 0.0));
+    let house = spawn(&mut world, sides(LOW, HIGH, false, |_| true), matt(0.6, 0.0));
+    add_light(&mut world, 0.5);
+    let alone = run(&mut world);
+    assert!(brightest(&world, room) > 1.0 && alone.leaked_rays < 1000, "{}", alone.leaked_rays);
+    assert_eq!(brightest(&world, house), 0.0);
+    let (place, from) = (place(), place().rotation * DVec3::new(3.0, 5.0, 2.0));
+    let at = place.translation + from;
+    let sun = Light { bake: BakeMode::Static, ..Light::directional(Vec3::ONE) };
+    world.spawn((sun, Transform::from_xyz(at.x, at.y, at.z).looking_at(place.translation, DVec3::Y)));
+    run(&mut world);
+    // The roof, off its rim: π n·l.
+    let expected = PI * 5.0 / 38f64.sqrt();
+    let is_roof = |at: DVec3| {
+        let rim = 2.0 * TEXEL;
+        let within =
+            |axis: usize| (f64::from(LOW[axis]) + rim..=f64::from(HIGH[axis]) - rim).contains(&at[axis]);
+        (at.y - f64::from(HIGH.y)).abs() < 1e-5 && within(0) && within(2)
+    };
+    let found = look_up(&world, house);
+    let roof: Vec<f64> =
+        found.iter().filter(|found| is_roof(found.position)).map(|found| found.irradiance).collect();
+    let lit = roof.iter().filter(|light| (**light / expected - 1.0).abs() < 0.01).count();
+    assert!(roof.len() > 1000 && lit as f64 > 0.98 * roof.len() as f64, "{lit} of {}", roof.len());
+}
