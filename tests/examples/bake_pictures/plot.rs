@@ -86,6 +86,9 @@ fn square(picture: &mut RgbImage, [x, y]: [f64; 2], color: Rgb<u8>, full: bool) 
     }
 }
 
+/// Pixels for a name's dot before it and the gap after it.
+const BESIDE_A_NAME: u32 = 36;
+
 const COLORS: [Rgb<u8>; 4] =
     [Rgb([20, 90, 180]), Rgb([215, 95, 15]), Rgb([30, 140, 60]), Rgb([140, 60, 150])];
 
@@ -154,7 +157,8 @@ fn panel_of(picture: &mut RgbImage, left: f64, scene: &str, rows: &[&Row]) {
             own.iter().for_each(|row| square(picture, at(row), color, found));
         }
         // Below, beside each other.
-        let [x, y] = [axes.left + 150.0 * place as f64 - 60.0, bottom + 62.0];
+        let before: u32 = variants[..place].iter().map(|before| dots::width(before) + BESIDE_A_NAME).sum();
+        let [x, y] = [axes.left + f64::from(before) - 60.0, bottom + 62.0];
         square(picture, [x, y], color, true);
         dots::write(picture, variant, [x as i64 + 12, y as i64 - 7], color);
     }
