@@ -1,7 +1,6 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
-mod arriving;
 pub(crate) mod between;
 pub(crate) mod box_tree;
 mod coarser;
@@ -35,4 +34,6 @@ pub(crate) mod punctual;
 pub(crate) mod shaft;
 mod share_variance;
 pub(crate) mod solver;
+mod unoccluded;
+mod unshadowed;
 mod visible_part;

@@ -5,12 +5,13 @@
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, LightKind, evaluate_light};
 
-use super::arriving::{Arriving, arriving, attenuation, of_center};
 use super::between::Between;
 use super::cut_out::{GAP, Pieces};
-use super::direct::{Direct, GROUPS, Receiver, Sources, Unoccluded, allotted, group_of, variance_of_mean};
+use super::direct::{Direct, GROUPS, Receiver, Sources, allotted, group_of, variance_of_mean};
 use super::lit_part::{Shown, Way};
 use super::share_variance::share_variance;
+use super::unoccluded::Unoccluded;
+use super::unshadowed::{Unshadowed, attenuation, of_center, unshadowed};
 use crate::sampling::{Sequence, cosine_direction, frame};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -191,10 +192,10 @@ impl Sources<'_> {
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
         let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
-        let (open, variance) =
-            Unoccluded::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
+        let open = || Unoccluded::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
         let (Way::Shadows(origin, shadows), Some(shown)) = (way, &between.shown) else {
             direct.seen.add(FIRST_ID + index, 1, 0);
+            let (open, variance) = open();
             return (open.x, variance);
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
@@ -205,6 +206,10 @@ impl Sources<'_> {
         });
         let (hidden, lit) = (u32::from(lit < 1.0 - GAP), (lit as f32).min(1.0));
         direct.seen.add(FIRST_ID + index, u32::from(lit > 0.0), hidden);
+        if lit == 0.0 {
+            return (0.0, 0.0);
+        }
+        let (open, variance) = open();
         // Pieces have one point each, all of the receiver several.
         let whole = arriving(&middle);
         let mean = match shown {
@@ -212,8 +217,7 @@ impl Sources<'_> {
             _ => sum as f32,
         };
         // Of points in four rows or more, an edge is off by half a row at most.
-        let by_points =
-            if hidden > 0 && lit > 0.0 && !exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
+        let by_points = if hidden > 0 && !exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
         (mean, variance * lit * lit + by_points)
     }
 
@@ -340,7 +344,7 @@ fn part(
     clear: bool,
 ) -> Option<Part> {
     let light = &placed.light;
-    let Arriving { axis, distance, strength } = arriving(scene, placed, receiver.position)?;
+    let Unshadowed { axis, distance, strength } = unshadowed(scene, placed, receiver.position)?;
     let directional = light.kind == LightKind::Directional;
     let sine =
         if directional { (0.5 * f64::from(light.angle)).sin() } else { f64::from(light.radius) / distance };

@@ -9,7 +9,7 @@ use super::direct::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
 
 /// What arrives at a point from a light, whatever lies between.
-pub(super) struct Arriving {
+pub(super) struct Unshadowed {
     /// Towards its centre.
     pub axis: DVec3,
     /// Metres; infinite for directional lights.
@@ -19,7 +19,7 @@ pub(super) struct Arriving {
 }
 
 /// `None` where nothing arrives.
-pub(super) fn arriving(scene: &BakeScene, placed: &PlacedLight, position: Vec3) -> Option<Arriving> {
+pub(super) fn unshadowed(scene: &BakeScene, placed: &PlacedLight, position: Vec3) -> Option<Unshadowed> {
     let light = &placed.light;
     let position = scene.space.world(position);
     let arriving = evaluate_light(light, placed.position, placed.axis, position);
@@ -27,12 +27,12 @@ pub(super) fn arriving(scene: &BakeScene, placed: &PlacedLight, position: Vec3) 
     let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
     let weakened = if directional { arriving.attenuation } else { attenuation(light, distance) };
     let strength = PI * weakened * arriving.spot;
-    (strength > 0.0).then_some(Arriving { axis: arriving.direction, distance, strength })
+    (strength > 0.0).then_some(Unshadowed { axis: arriving.direction, distance, strength })
 }
 
 /// Irradiance by a light without size, per unit of its colour, whatever lies between.
 pub(super) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver) -> f32 {
-    let Some(Arriving { axis, strength, .. }) = arriving(scene, placed, receiver.position) else {
+    let Some(Unshadowed { axis, strength, .. }) = unshadowed(scene, placed, receiver.position) else {
         return 0.0;
     };
     if axis.dot(receiver.geometric_normal.as_dvec3()) <= 0.0 {
