@@ -1,4 +1,4 @@
-//! Bakes a glTF file: `bake_file IN.glb OUT.glb [--map-size N] [--draft] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
+//! Bakes a glTF file, or a held-out scene by its name: `bake_file IN.glb|SCENE OUT.glb [--map-size N] [--draft] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
 //! With a reference it prints the error, with a folder it writes each map as a PNG to look at.
 
 use std::error::Error;
@@ -10,6 +10,8 @@ use lumbre_bake::{BakeOptions, Density, FormFactorMethod, Quality, bake};
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "../tests/held_out/mod.rs"]
+mod held_out;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut options = BakeOptions::default();
@@ -35,8 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let [input, output] = &paths[..] else { return Err("give an input and an output file".into()) };
-    let mut world = World::new();
-    lumbre_scene::load(&mut world, input)?;
+    let mut world = held_out::input::world_of(input)?;
     let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
     eprint!("{report}");
     if let Some(csv) = csv {

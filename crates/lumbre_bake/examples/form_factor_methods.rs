@@ -12,7 +12,7 @@ use lumbre_bake::{BakeOptions, Density, Quality, form_factor_errors};
 mod input;
 #[path = "../tests/held_out/random.rs"]
 mod random;
-#[path = "../tests/held_out/scenes.rs"]
+#[path = "../tests/held_out/scenes/mod.rs"]
 mod scenes;
 
 fn main() -> Result<(), Box<dyn Error>> {

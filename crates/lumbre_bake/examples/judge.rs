@@ -12,7 +12,7 @@ mod common;
 #[path = "../tests/held_out/mod.rs"]
 mod held_out;
 
-use held_out::judgement;
+use held_out::{judgement, reference_points};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let (mut paths, mut errors, mut scale) = (Vec::new(), None, 1.0);
@@ -29,8 +29,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut world = World::new();
     lumbre_scene::load(&mut world, baked)?;
     lumbre_scene::update_transforms(&mut world);
-    let found = judgement::judge(&mut world, &judgement::scaled(&judgement::read(points), scale));
-    eprintln!("{}: {found}", baked.display());
+    let found = judgement::judge(&mut world, &judgement::scaled(&reference_points::read(points), scale));
+    eprintln!("{}: {found}\n{}", baked.display(), found.local);
     for [position, normal, value, expected, error] in found.rows.iter().take(10) {
         eprintln!("  at {position:.3} facing {normal:.2}: {value:.4} instead of {expected:.4} ± {error:.4}");
     }

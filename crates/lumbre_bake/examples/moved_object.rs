@@ -16,7 +16,7 @@ use lumbre_scene::{Lightmap, Name, Transform};
 mod input;
 #[path = "../tests/held_out/random.rs"]
 mod random;
-#[path = "../tests/held_out/scenes.rs"]
+#[path = "../tests/held_out/scenes/mod.rs"]
 mod scenes;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -14,7 +14,8 @@ use lumbre_bake::{BakeOptions, Density, bake};
 mod common;
 mod held_out;
 
-use held_out::judgement::{Judgement, judge, read};
+use held_out::judgement::{Judgement, judge};
+use held_out::reference_points::read;
 use held_out::scenes;
 
 fn baked(scene: fn(u64, f64) -> World, name: &str, density: f64) -> Judgement {

@@ -6,8 +6,8 @@ use glam::DVec3;
 mod common;
 mod held_out;
 
-use held_out::judgement::read;
-use held_out::path_tracer::PathTracer;
+use held_out::path_tracer::{Effort, PathTracer};
+use held_out::reference_points::read;
 
 #[test]
 fn agrees_with_another_path_tracer() {
@@ -24,7 +24,7 @@ fn agrees_with_another_path_tracer() {
             .iter()
             .map(|p| (p.position + p.normal * (1e-5 * p.position.length()), p.normal))
             .collect();
-        let found = PathTracer::new(&mut world).at(&places, 8, 24, 5);
+        let found = PathTracer::new(&mut world).at(&places, Effort::fixed(8, 24), 5);
         let (mut difference, mut variance, mut sum) = (0.0, 0.0, 0.0);
         for (own, other) in found.iter().zip(&expected) {
             for channel in (0..3).filter(|&c| other.value[c].is_finite()) {

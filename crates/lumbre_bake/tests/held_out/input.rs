@@ -8,8 +8,7 @@ use super::scenes;
 
 /// The held-out scene of that name, at its own scale, or what the file holds.
 pub fn world_of(input: &Path) -> Result<World, lumbre_scene::LoadError> {
-    if let Some((_, scene, layout)) = scenes::all().into_iter().find(|(name, ..)| input.as_os_str() == *name)
-    {
+    if let Some((scene, layout)) = input.to_str().and_then(scenes::find) {
         return Ok(scene(layout, 1.0));
     }
     let mut world = World::new();

@@ -1,10 +1,9 @@
 //! What a bake is off at reference points, with the reference's own noise taken out. Not the lookup: that is `common`.
 
-use std::path::Path;
-
 use bevy_ecs::world::World;
 use glam::DVec3;
 
+use super::local_errors::{LocalErrors, local_errors};
 use super::path_tracer::Irradiance;
 use crate::common;
 
@@ -26,6 +25,8 @@ pub struct Judgement {
     pub leaks: (usize, f64),
     /// Position, normal, found, expected and the reference's error; the worst first.
     pub rows: Vec<[DVec3; 5]>,
+    /// Relative to the light around the points.
+    pub local: LocalErrors,
 }
 
 impl Judgement {
@@ -49,17 +50,6 @@ impl std::fmt::Display for Judgement {
     }
 }
 
-/// Points with their errors from a file of the conformance suite's columns; NaN where a channel is unknown.
-pub fn read(path: &Path) -> Vec<Irradiance> {
-    let text = std::fs::read_to_string(path).expect("the reference file is readable text");
-    let rows = text.lines().skip(1).map(|line| {
-        let v: Vec<f64> = line.split(',').map(|field| field.parse().unwrap_or(f64::NAN)).collect();
-        let column = |i: usize| DVec3::new(v[i], v[i + 1], v[i + 2]);
-        Irradiance { position: column(0), normal: column(3), value: column(6), error: column(9) }
-    });
-    rows.collect()
-}
-
 /// The same points at another scale of the scene.
 pub fn scaled(points: &[Irradiance], scale: f64) -> Vec<Irradiance> {
     points.iter().map(|p| Irradiance { position: p.position * scale, ..*p }).collect()
@@ -68,6 +58,7 @@ pub fn scaled(points: &[Irradiance], scale: f64) -> Vec<Irradiance> {
 pub fn judge(world: &mut World, points: &[Irradiance]) -> Judgement {
     let surfaces = common::lightmapped(world);
     let mut found = Judgement::default();
+    let mut pairs = Vec::new();
     for point in points {
         let wanted = common::ReferencePoint {
             position: point.position,
@@ -76,11 +67,13 @@ pub fn judge(world: &mut World, points: &[Irradiance]) -> Judgement {
         };
         match common::look_up(&surfaces, &wanted) {
             Some(value) => {
+                pairs.push((*point, value));
                 found.rows.push([point.position, point.normal, value, point.value, point.error]);
             }
             None => found.missed += 1,
         }
     }
+    found.local = local_errors(&pairs);
     let known = |row: &[DVec3; 5]| {
         let row = *row;
         (0..3).filter(move |&c| row[3][c].is_finite()).map(move |c| [row[2][c], row[3][c], row[4][c]])

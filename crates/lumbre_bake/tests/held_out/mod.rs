@@ -3,7 +3,12 @@
 
 #![allow(dead_code, reason = "every test and example uses its own part of this module")]
 
+pub mod flip;
+pub mod input;
 pub mod judgement;
+pub mod local_errors;
 pub mod path_tracer;
 pub mod random;
+pub mod reference_points;
 pub mod scenes;
+pub mod view;

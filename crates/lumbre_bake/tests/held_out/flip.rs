@@ -1,0 +1,175 @@
+//! How different two pictures look when one flips between them: LDR-FLIP (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and
+//! Fairchild, "FLIP: A Difference Evaluator for Alternating Images", 2020), with its published constants. Not a difference of light.
+
+use std::f64::consts::PI;
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// Pixels per degree of a monitor of 0.7 m and 3840 pixels, seen from 0.7 m.
+pub const PIXELS_PER_DEGREE: f64 = 0.7 * 3840.0 / 0.7 * PI / 180.0;
+
+/// Colours in sRGB, each channel in [0, 1], row by row.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub width: usize,
+    pub pixels: Vec<DVec3>,
+}
+
+/// White of D65 by the matrix below.
+const WHITE: DVec3 = DVec3::new(0.950_428_545, 1.0, 1.088_900_371);
+/// Weights and widths of each channel's contrast sensitivity: two Gaussians.
+const SENSITIVITY: [[f64; 4]; 3] =
+    [[1.0, 0.0047, 0.0, 1e-5], [1.0, 0.0053, 0.0, 1e-5], [34.1, 0.04, 13.5, 0.025]];
+/// Width in degrees of what detects edges and points.
+const FEATURE: f64 = 0.082;
+/// The exponent of colour differences, and of feature differences.
+const COLOR_EXPONENT: f64 = 0.7;
+const FEATURE_EXPONENT: f64 = 0.5;
+/// Differences up to this share of the largest one are spread over this share of [0, 1].
+const KNEE: [f64; 2] = [0.4, 0.95];
+
+/// The difference of each pixel, in [0, 1].
+pub fn flip(reference: &Picture, test: &Picture, pixels_per_degree: f64) -> Vec<f64> {
+    let color = color_differences(reference, test, pixels_per_degree);
+    let feature = feature_differences(reference, test, pixels_per_degree);
+    color.iter().zip(feature).map(|(color, feature)| color.powf(1.0 - feature)).collect()
+}
+
+pub fn mean_flip(reference: &Picture, test: &Picture) -> f64 {
+    let map = flip(reference, test, PIXELS_PER_DEGREE);
+    map.iter().sum::<f64>() / map.len() as f64
+}
+
+fn linear(color: DVec3) -> DVec3 {
+    let channel = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    DVec3::from(color.to_array().map(channel))
+}
+
+/// Linear sRGB to XYZ.
+fn to_xyz() -> DMat3 {
+    DMat3::from_cols(
+        DVec3::new(10_135_552.0 / 24_577_794.0, 2_613_072.0 / 12_288_897.0, 1_425_312.0 / 73_733_382.0),
+        DVec3::new(8_788_810.0 / 24_577_794.0, 8_788_810.0 / 12_288_897.0, 8_788_810.0 / 73_733_382.0),
+        DVec3::new(4_435_075.0 / 24_577_794.0, 887_015.0 / 12_288_897.0, 70_074_185.0 / 73_733_382.0),
+    )
+}
+
+/// Luminance and two opponent colours, linear in XYZ.
+fn opponent(linear: DVec3) -> DVec3 {
+    let v = to_xyz() * linear / WHITE;
+    DVec3::new(116.0 * v.y - 16.0, 500.0 * (v.x - v.y), 200.0 * (v.y - v.z))
+}
+
+fn from_opponent(color: DVec3) -> DVec3 {
+    let y = (color.x + 16.0) / 116.0;
+    to_xyz().inverse() * (DVec3::new(y + color.y / 500.0, y, y - color.z / 200.0) * WHITE)
+}
+
+/// CIELAB, its colours weaker where it is dark (Hunt).
+fn hunt_lab(linear: DVec3) -> DVec3 {
+    let curve = |t: f64| {
+        let delta: f64 = 6.0 / 29.0;
+        if t > delta.powi(3) { t.cbrt() } else { t / (3.0 * delta * delta) + 4.0 / 29.0 }
+    };
+    let v = DVec3::from((to_xyz() * linear / WHITE).to_array().map(curve));
+    let lightness = 116.0 * v.y - 16.0;
+    let weaker = 0.01 * lightness;
+    DVec3::new(lightness, weaker * 500.0 * (v.x - v.y), weaker * 200.0 * (v.y - v.z))
+}
+
+fn color_distance(a: DVec3, b: DVec3) -> f64 {
+    ((a.x - b.x).abs() + (a.y - b.y).hypot(a.z - b.z)).powf(COLOR_EXPONENT)
+}
+
+fn color_differences(reference: &Picture, test: &Picture, pixels_per_degree: f64) -> Vec<f64> {
+    let [reference, test] = [reference, test].map(|picture| filtered(picture, pixels_per_degree));
+    let largest = color_distance(hunt_lab(DVec3::Y), hunt_lab(DVec3::Z));
+    let knee = KNEE[0] * largest;
+    let spread = |difference: f64| match difference < knee {
+        true => KNEE[1] / knee * difference,
+        false => KNEE[1] + (difference - knee) / (largest - knee) * (1.0 - KNEE[1]),
+    };
+    reference.iter().zip(&test).map(|(a, b)| spread(color_distance(*a, *b))).collect()
+}
+
+/// What an eye resolves of a picture, in the space that colours are compared in.
+fn filtered(picture: &Picture, pixels_per_degree: f64) -> Vec<DVec3> {
+    let widest = SENSITIVITY.iter().flat_map(|s| [s[1], s[3]]).fold(0.0, f64::max);
+    let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i64;
+    let gaussians = |s: [f64; 4], squared: f64| {
+        let one = |weight: f64, width: f64| weight * (PI / width).sqrt() * (-PI * PI * squared / width).exp();
+        one(s[0], s[1]) + one(s[2], s[3])
+    };
+    let kernel = kernel(radius, |x, y| {
+        let squared = (x * x + y * y) / (pixels_per_degree * pixels_per_degree);
+        DVec3::from(SENSITIVITY.map(|s| gaussians(s, squared)))
+    });
+    let sum: DVec3 = kernel.iter().sum();
+    let opponents: Vec<_> = picture.pixels.iter().map(|color| opponent(linear(*color))).collect();
+    let seen = convolved(&opponents, picture.width, radius, &kernel);
+    let clamped = |color: DVec3| from_opponent(color / sum).clamp(DVec3::ZERO, DVec3::ONE);
+    seen.into_iter().map(|color| hunt_lab(clamped(color))).collect()
+}
+
+fn feature_differences(reference: &Picture, test: &Picture, pixels_per_degree: f64) -> Vec<f64> {
+    let [reference, test] = [reference, test].map(|picture| features(picture, pixels_per_degree));
+    let difference = |(a, b): (&[f64; 2], &[f64; 2])| {
+        let largest = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+        (largest / 2f64.sqrt()).powf(FEATURE_EXPONENT)
+    };
+    reference.iter().zip(&test).map(difference).collect()
+}
+
+/// How much of an edge and of a point is at each pixel.
+fn features(picture: &Picture, pixels_per_degree: f64) -> Vec<[f64; 2]> {
+    let deviation = 0.5 * FEATURE * pixels_per_degree;
+    let radius = (3.0 * deviation).ceil() as i64;
+    let lightness: Vec<_> = picture
+        .pixels
+        .iter()
+        .map(|color| DVec3::splat((opponent(linear(*color)).x + 16.0) / 116.0))
+        .collect();
+    let along = |turned: bool, point: bool| {
+        let mut weights = kernel(radius, |x, y| {
+            let bell = (-(x * x + y * y) / (2.0 * deviation * deviation)).exp();
+            let along = if turned { y } else { x };
+            let weight = if point { (along / deviation).powi(2) - 1.0 } else { -along };
+            DVec3::splat(weight * bell)
+        });
+        // What is positive sums to 1, what is negative to -1.
+        let sums = [1.0, -1.0].map(|sign| weights.iter().map(|w| (sign * w.x).max(0.0)).sum::<f64>());
+        weights.iter_mut().for_each(|w| *w /= if w.x > 0.0 { sums[0] } else { sums[1] });
+        convolved(&lightness, picture.width, radius, &weights)
+    };
+    let [edge_x, edge_y] = [false, true].map(|turned| along(turned, false));
+    let [point_x, point_y] = [false, true].map(|turned| along(turned, true));
+    let strength = |i: usize| [edge_x[i].x.hypot(edge_y[i].x), point_x[i].x.hypot(point_y[i].x)];
+    (0..lightness.len()).map(strength).collect()
+}
+
+fn kernel(radius: i64, weight: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
+    let side = -radius..=radius;
+    side.clone()
+        .flat_map(|y| side.clone().map(move |x| (x, y)))
+        .map(|(x, y)| weight(x as f64, y as f64))
+        .collect()
+}
+
+/// Channel by channel; what is beyond the border is as the border.
+fn convolved(pixels: &[DVec3], width: usize, radius: i64, kernel: &[DVec3]) -> Vec<DVec3> {
+    let height = pixels.len() / width;
+    let at = |x: i64, y: i64| {
+        let (x, y) = (x.clamp(0, width as i64 - 1), y.clamp(0, height as i64 - 1));
+        pixels[y as usize * width + x as usize]
+    };
+    let pixel = |index: usize| {
+        let (x, y) = ((index % width) as i64, (index / width) as i64);
+        let rows = kernel.chunks_exact(2 * radius as usize + 1).zip(-radius..);
+        rows.flat_map(|(row, dy)| {
+            row.iter().zip(-radius..).map(move |(weight, dx)| *weight * at(x + dx, y + dy))
+        })
+        .sum()
+    };
+    (0..pixels.len()).into_par_iter().map(pixel).collect()
+}

@@ -1,0 +1,162 @@
+//! Triangles in double precision and a bounding volume hierarchy over them. Not what light does at them.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use lumbre_scene::Image;
+
+pub struct Triangle {
+    pub a: DVec3,
+    pub ab: DVec3,
+    pub ac: DVec3,
+    pub normal: DVec3,
+    pub area: f64,
+    pub reflectance: DVec3,
+    pub emission: DVec3,
+    /// What multiplies the emission, and where its corners are in it.
+    pub picture: Option<(Arc<Image>, [DVec2; 3])>,
+    /// Mesh by its place in the query, triangle of the mesh.
+    pub source: [usize; 2],
+}
+
+struct Node {
+    low: DVec3,
+    high: DVec3,
+    /// Triangles from here, `count` of them; inner nodes have none, their first child follows and the second is here.
+    first: usize,
+    count: usize,
+}
+
+#[derive(Clone, Copy)]
+pub struct Hit {
+    pub distance: f64,
+    pub triangle: usize,
+}
+
+pub struct Hierarchy {
+    pub triangles: Vec<Triangle>,
+    nodes: Vec<Node>,
+}
+
+impl Triangle {
+    pub fn point(&self, u: f64, v: f64) -> DVec3 {
+        let root = u.sqrt();
+        self.a + self.ab * (root * (1.0 - v)) + self.ac * (root * v)
+    }
+
+    /// Möller and Trumbore, both sides.
+    fn hit(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let p = direction.cross(self.ac);
+        let determinant = self.ab.dot(p);
+        if determinant == 0.0 {
+            return None;
+        }
+        let d = origin - self.a;
+        let u = d.dot(p) / determinant;
+        if !(-1e-12..=1.0 + 1e-12).contains(&u) {
+            return None;
+        }
+        let q = d.cross(self.ab);
+        let v = direction.dot(q) / determinant;
+        (v >= -1e-12 && u + v <= 1.0 + 1e-12).then(|| self.ac.dot(q) / determinant)
+    }
+
+    /// Shares of the second and third corner at a point of its plane.
+    pub fn shares(&self, point: DVec3) -> DVec2 {
+        let d = point - self.a;
+        let size = 2.0 * self.area;
+        DVec2::new(d.cross(self.ac).dot(self.normal), self.ab.cross(d).dot(self.normal)) / size
+    }
+
+    fn corners(&self) -> [DVec3; 3] {
+        [self.a, self.a + self.ab, self.a + self.ac]
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.a + (self.ab + self.ac) / 3.0
+    }
+}
+
+impl Hierarchy {
+    pub fn new(mut triangles: Vec<Triangle>) -> Self {
+        let mut nodes = Vec::new();
+        let count = triangles.len();
+        build(&mut triangles, 0, count, &mut nodes);
+        Self { triangles, nodes }
+    }
+
+    /// Lowest and highest corner of all.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        [self.nodes[0].low, self.nodes[0].high]
+    }
+
+    pub fn hidden(&self, from: DVec3, to: DVec3) -> bool {
+        self.walk(from, to - from, 1.0, true).is_some()
+    }
+
+    /// Whether anything lies along a direction, however far.
+    pub fn hidden_along(&self, from: DVec3, direction: DVec3) -> bool {
+        self.walk(from, direction, f64::INFINITY, true).is_some()
+    }
+
+    pub fn closest(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        self.walk(origin, direction, f64::INFINITY, false)
+    }
+
+    fn walk(&self, origin: DVec3, direction: DVec3, mut most: f64, any: bool) -> Option<Hit> {
+        let inverse = direction.recip();
+        let mut stack = [0usize; 64];
+        let mut depth = 1;
+        let mut found = None;
+        while depth > 0 {
+            depth -= 1;
+            let index = stack[depth];
+            let node = &self.nodes[index];
+            let (s, t) = ((node.low - origin) * inverse, (node.high - origin) * inverse);
+            let enters = s.min(t).max_element();
+            let leaves = s.max(t).min_element();
+            if enters > leaves * (1.0 + 1e-9) || leaves < 0.0 || enters > most {
+                continue;
+            }
+            if node.count == 0 {
+                stack[depth] = index + 1;
+                stack[depth + 1] = node.first;
+                depth += 2;
+                continue;
+            }
+            for triangle in node.first..node.first + node.count {
+                let hit = self.triangles[triangle].hit(origin, direction).filter(|&t| t > 0.0 && t < most);
+                if let Some(distance) = hit {
+                    most = distance;
+                    found = Some(Hit { distance, triangle });
+                    if any {
+                        return found;
+                    }
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Halves by the median along the longest axis; children follow their parent.
+fn build(triangles: &mut [Triangle], first: usize, end: usize, nodes: &mut Vec<Node>) {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for corner in triangles[first..end].iter().flat_map(Triangle::corners) {
+        low = low.min(corner);
+        high = high.max(corner);
+    }
+    let index = nodes.len();
+    let count = end - first;
+    nodes.push(Node { low, high, first, count: if count <= 2 { count } else { 0 } });
+    if count <= 2 {
+        return;
+    }
+    let size = high - low;
+    let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+    triangles[first..end].sort_by(|a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));
+    let middle = first + count / 2;
+    build(triangles, first, middle, nodes);
+    nodes[index].first = nodes.len();
+    build(triangles, middle, end, nodes);
+}

@@ -1,0 +1,201 @@
+//! Light that comes straight from emissive triangles: pieces of them are chosen near a place, and of a few candidates one by what it would give
+//! unhidden (resampled importance sampling: Talbot, Cline and Egbert, 2005), without bias. Not punctual lights.
+
+use glam::{DVec2, DVec3};
+use lumbre_scene::Image;
+
+use super::super::random::Random;
+use super::choice::{Choice, ChoiceGrid};
+use super::hierarchy::{Hierarchy, Triangle};
+
+/// A part of an emissive triangle: a corner and two edges in shares of the triangle's second and third corner.
+struct Piece {
+    triangle: usize,
+    corner: DVec2,
+    edges: [DVec2; 2],
+    middle: DVec3,
+    /// The longest edge.
+    size: f64,
+    area: f64,
+    power: f64,
+}
+
+pub struct Lamps {
+    pieces: Vec<Piece>,
+    near: ChoiceGrid,
+}
+
+/// Pieces along the edge of a triangle whose emission varies, and points along the edge of a piece that its power is taken from.
+const PIECES: u32 = 64;
+const POINTS: u32 = 8;
+/// Of each that sends a shadow ray, at most.
+const CANDIDATES: usize = 8;
+
+/// A point that shines.
+struct Candidate {
+    /// Just before it.
+    target: DVec3,
+    /// Irradiance where nothing is in the way, over the density of the point.
+    light: DVec3,
+    weight: f64,
+}
+
+impl Lamps {
+    pub fn new(scene: &Hierarchy) -> Self {
+        let mut pieces = Vec::new();
+        for (index, triangle) in scene.triangles.iter().enumerate() {
+            if triangle.emission == DVec3::ZERO {
+                continue;
+            }
+            let mut own = cut(index, triangle);
+            // Of what is between the points nothing is known: none is left out.
+            let share = own.iter().map(|piece| piece.power).sum::<f64>() / own.len() as f64;
+            own.iter_mut().for_each(|piece| piece.power += 0.03 * share);
+            pieces.extend(own.into_iter().filter(|piece| piece.power > 0.0));
+        }
+        let things: Vec<_> = pieces.iter().map(|piece| (piece.middle, piece.size, piece.power)).collect();
+        Self { near: ChoiceGrid::new(scene.bounds(), &things), pieces }
+    }
+
+    /// A choice for one place and the way it faces.
+    pub fn choice_for(&self, scene: &Hierarchy, origin: DVec3, normal: DVec3) -> Choice {
+        let weight = |piece: &Piece| {
+            let towards = piece.middle - origin;
+            let squared = towards.length_squared();
+            if squared < 9.0 * piece.size * piece.size {
+                return piece.power / squared.max(0.01 * piece.size * piece.size);
+            }
+            let direction = towards / squared.sqrt();
+            // All of it may be under the horizon, or only its middle.
+            let cosine = |cosine: f64| cosine.max(0.0) + 0.01 + piece.size / squared.sqrt();
+            let emitted = -scene.triangles[piece.triangle].normal.dot(direction);
+            piece.power / squared * cosine(normal.dot(direction)) * cosine(emitted)
+        };
+        Choice::new(self.pieces.iter().map(weight))
+    }
+
+    pub fn choice_near(&self, origin: DVec3) -> Option<&Choice> {
+        self.near.at(origin)
+    }
+
+    /// Irradiance by one shadow ray.
+    pub fn irradiance(
+        &self,
+        scene: &Hierarchy,
+        [origin, normal]: [DVec3; 2],
+        choice: &Choice,
+        [u, v]: [f64; 2],
+        random: &mut Random,
+        offset: f64,
+    ) -> DVec3 {
+        let count = self.pieces.len().min(CANDIDATES);
+        let mut candidates: [Option<Candidate>; CANDIDATES] = Default::default();
+        let mut sum = 0.0;
+        for (index, candidate) in candidates[..count].iter_mut().enumerate() {
+            // Spread evenly over the choice: each by itself is where `u` would put it.
+            let number = (index as f64 + u) / count as f64;
+            let v = if index == 0 { v } else { random.uniform() };
+            *candidate = self.candidate(scene, [origin, normal], choice, [number, v], offset);
+            sum += candidate.as_ref().map_or(0.0, |candidate| candidate.weight);
+        }
+        let mut left = random.uniform() * sum;
+        for candidate in candidates.iter().flatten() {
+            left -= candidate.weight;
+            if left < 0.0 {
+                if scene.hidden(origin, candidate.target) {
+                    return DVec3::ZERO;
+                }
+                return candidate.light * (sum / candidate.weight / count as f64);
+            }
+        }
+        DVec3::ZERO
+    }
+
+    fn candidate(
+        &self,
+        scene: &Hierarchy,
+        [origin, normal]: [DVec3; 2],
+        choice: &Choice,
+        [number, v]: [f64; 2],
+        offset: f64,
+    ) -> Option<Candidate> {
+        let (index, probability, u) = choice.pick(number)?;
+        let piece = &self.pieces[index];
+        let triangle = &scene.triangles[piece.triangle];
+        let root = u.sqrt();
+        let shares = piece.corner + piece.edges[0] * (root * (1.0 - v)) + piece.edges[1] * (root * v);
+        let target = triangle.a + triangle.ab * shares.x + triangle.ac * shares.y;
+        let towards = target - origin;
+        let squared = towards.length_squared();
+        let direction = towards / squared.sqrt();
+        let cosines = normal.dot(direction).max(0.0) * (-triangle.normal.dot(direction)).max(0.0);
+        if cosines <= 0.0 {
+            return None;
+        }
+        let light = emission(triangle, shares) * (cosines / squared * piece.area / probability);
+        let weight = light.element_sum();
+        let target = target + triangle.normal * offset;
+        (weight > 0.0).then_some(Candidate { target, light, weight })
+    }
+}
+
+fn cut(index: usize, triangle: &Triangle) -> Vec<Piece> {
+    let sides = if triangle.picture.is_some() { PIECES } else { 1 };
+    let step = 1.0 / f64::from(sides);
+    let mut pieces = Vec::new();
+    for i in 0..sides {
+        for j in 0..sides - i {
+            let corner = DVec2::new(f64::from(i), f64::from(j)) * step;
+            pieces.push((corner, [DVec2::X * step, DVec2::Y * step]));
+            if i + j + 1 < sides {
+                pieces.push((corner + step, [DVec2::NEG_X * step, DVec2::NEG_Y * step]));
+            }
+        }
+    }
+    let area = triangle.area * step * step;
+    let size =
+        triangle.ab.length().max(triangle.ac.length()).max((triangle.ac - triangle.ab).length()) * step;
+    let piece = |(corner, edges): (DVec2, [DVec2; 2])| {
+        let middle = corner + (edges[0] + edges[1]) / 3.0;
+        let mut power = triangle.emission.element_sum();
+        if triangle.picture.is_some() {
+            let points = (0..POINTS * POINTS).map(|point| {
+                let [s, t] =
+                    [point % POINTS, point / POINTS].map(|i| (f64::from(i) + 0.5) / f64::from(POINTS));
+                let root = s.sqrt();
+                emission(triangle, corner + edges[0] * (root * (1.0 - t)) + edges[1] * (root * t))
+            });
+            power = points.sum::<DVec3>().element_sum() / f64::from(POINTS * POINTS);
+        }
+        let middle = triangle.a + triangle.ab * middle.x + triangle.ac * middle.y;
+        Piece { triangle: index, corner, edges, middle, size, area, power: power * area }
+    };
+    pieces.into_iter().map(piece).collect()
+}
+
+/// Radiance at a point of a triangle.
+fn emission(triangle: &Triangle, shares: DVec2) -> DVec3 {
+    let Some((image, [a, b, c])) = &triangle.picture else { return triangle.emission };
+    triangle.emission * bilinear(image, *a + (*b - *a) * shares.x + (*c - *a) * shares.y)
+}
+
+/// Linear colour of a picture in sRGB, clamped at its border.
+fn bilinear(image: &Image, at: DVec2) -> DVec3 {
+    let size = DVec2::new(f64::from(image.width), f64::from(image.height));
+    let at = at * size - 0.5;
+    let low = at.floor();
+    let f = at - low;
+    let read = |dx: f64, dy: f64| {
+        let place = (low + DVec2::new(dx, dy)).clamp(DVec2::ZERO, size - 1.0);
+        let first = 4 * (place.y as usize * image.width as usize + place.x as usize);
+        DVec3::from([0, 1, 2].map(|channel| linear(image.rgba[first + channel])))
+    };
+    let (top, bottom) = (read(0.0, 0.0).lerp(read(1.0, 0.0), f.x), read(0.0, 1.0).lerp(read(1.0, 1.0), f.x));
+    top.lerp(bottom, f.y)
+}
+
+/// IEC 61966-2-1.
+fn linear(value: u8) -> f64 {
+    let v = f64::from(value) / 255.0;
+    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
