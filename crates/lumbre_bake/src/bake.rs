@@ -201,7 +201,8 @@ fn run(
     let changes = usable.map(|u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels));
     let known =
         changes.as_ref().map_or_else(Vec::new, |changes| changes.known_direct(&sources, &texels, &charts));
-    let direct = lighting::direct_light(&sources, &layout, &texels, &known, options, &mut watch)?;
+    let (direct, local) =
+        lighting::direct_light(&sources, &layout, &texels, &charts, &known, options, &mut watch)?;
     let relit = |index: usize| known.get(index).is_none_or(Option::is_none);
     let new = direct.iter().enumerate().filter(|(index, _)| relit(*index));
     report.rays += new.map(|(_, direct)| u64::from(direct.rays)).sum::<u64>();
@@ -220,7 +221,7 @@ fn run(
         Some(exchange) => {
             watch.stage("final gather", &mut report)?;
             let straddling = straddling(&layout, &texels, &crossed);
-            let [_, samples, _] = options.quality.effort().direct;
+            let [_, samples, _] = options.effort().direct;
             let (divided, rays) = DividedLight::new(&sources, &texels, &straddling, (samples, options.seed));
             report.rays += rays;
             watch.advance(0.0)?;
@@ -241,14 +242,14 @@ fn run(
                 patch_error: &exchange.indirect_error,
                 near: exchange.near,
                 guide: &exchange.guide,
-                run: options.quality.effort().gather[0] / SCRAMBLES as u32,
+                run: options.effort().gather[0] / SCRAMBLES as u32,
             };
             let leaked_before = scene.leaks.count();
             if let Some(change) = &change {
                 kept = Some(change.keep(exchange, &texels, options, &mut watch)?);
             }
             let receivers =
-                Receivers { texels: &texels, charts: &charts, direct: &direct, kept: kept.as_ref() };
+                Receivers { texels: &texels, charts: &charts, direct: &direct, local: &local, kept: kept.as_ref() };
             let gathered = rounds::gather(&outgoing, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
             let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
@@ -273,7 +274,7 @@ fn run(
         report.rebake = Some(rebake_report(changes, &texels, relit, kept.as_ref(), &report));
     }
     if exchange.is_none() {
-        note_direct_error(&texels, variances, options, &mut report);
+        note_direct_error(&texels, variances, &local, options, &mut report);
         report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }

@@ -106,7 +106,7 @@ impl Plan {
         options: &BakeOptions,
         report: &mut BakeReport,
     ) -> Result<Self, BakeError> {
-        let effort = options.quality.effort();
+        let effort = options.effort();
         let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
         let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
         let mut plan = Self { patch_side: side, form_factor_rays: effort.form_factor_rays };

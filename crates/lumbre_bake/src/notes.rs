@@ -2,6 +2,8 @@
 
 use crate::progress::Watch;
 use crate::texels::footprint::Texel;
+use crate::texels::local_light::LocalLight;
+use crate::texels::rounds::{open_sum, relative_to};
 use crate::transport::direct::Sources;
 use crate::{BakeOptions, BakeReport, ErrorAtTime, RebakeReport};
 use glam::Vec3;
@@ -58,15 +60,14 @@ pub(crate) fn note_mean(texels: &[Texel], values: &[Vec3], report: &mut BakeRepo
 pub(crate) fn note_direct_error(
     texels: &[Texel],
     variances: &[f32],
+    local: &LocalLight,
     options: &BakeOptions,
     report: &mut BakeReport,
 ) {
-    let open = texels.iter().zip(variances).filter(|(texel, _)| !texel.is_hidden());
-    let (sum, count) =
-        open.fold((0.0, 0u32), |(sum, count), (_, variance)| (sum + f64::from(*variance), count + 1));
+    let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
-    let error = (sum / f64::from(count.max(1))).sqrt();
-    report.estimated_error = if mean > 0.0 { error / mean } else { 0.0 };
+    report.estimated_error = (open_sum(texels, &local.relative(variances)) / open).sqrt();
+    report.error_of_mean = relative_to(mean, open_sum(texels, variances) / open);
     report.error_reached = report.estimated_error <= options.error;
 }
 

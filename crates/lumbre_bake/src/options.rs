@@ -48,7 +48,7 @@ pub enum Quality {
 pub struct BakeOptions {
     /// How many texels a surface gets.
     pub density: Density,
-    /// Relative RMSE that sampling may leave in the lightmap (0.01 is one per cent of the mean); positive.
+    /// Relative RMSE that sampling may leave in the lightmap (0.01 is one per cent of the light around each texel); positive.
     /// Gathering stops there, or at the quality's largest number of rays.
     pub error: f64,
     /// Wall-clock time after which no more samples are taken: the map is complete, with what there was time for. Bits then depend on
@@ -118,18 +118,25 @@ pub(crate) struct Effort {
     pub patch_texels: f32,
     /// Shadow samples of a texel before and after a penumbra is found in it, and at most.
     pub direct: [u32; 3],
+    /// Samples of a texel of the sources that share them: first round and most.
+    pub shared: [u32; 2],
     /// Gather rays of a texel: first round and most.
     pub gather: [u32; 2],
 }
 
+/// The error from which on the first rays are half of the quality's: with fewer, smoothing has too little to tell edges from noise, and rounds
+/// that have to be added cost more than was spared.
+const COARSE: f64 = 0.04;
+
 impl Quality {
-    pub(crate) fn effort(self) -> Effort {
+    fn effort(self) -> Effort {
         match self {
             Self::Draft => Effort {
                 patches: 3_000,
                 form_factor_rays: 600_000,
                 patch_texels: 6.0,
                 direct: [4, 16, 16],
+                shared: [16, 64],
                 gather: [16, 16],
             },
             Self::Final => Effort {
@@ -137,6 +144,7 @@ impl Quality {
                 form_factor_rays: 1_500_000,
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
+                shared: [16, 1024],
                 gather: [16, 1024],
             },
             Self::Reference => Effort {
@@ -144,6 +152,7 @@ impl Quality {
                 form_factor_rays: 20_000_000,
                 patch_texels: 2.0,
                 direct: [64, 1024, 4096],
+                shared: [256, 8192],
                 gather: [256, 8192],
             },
         }
@@ -151,6 +160,27 @@ impl Quality {
 }
 
 impl BakeOptions {
+    /// The quality's effort, less where a larger error is asked for: what is cast before anything is known must not cost more than what was
+    /// asked.
+    pub(crate) fn effort(&self) -> Effort {
+        let mut effort = self.quality.effort();
+        if self.quality == Quality::Reference {
+            return effort;
+        }
+        let fewer = |samples: u32| match self.error {
+            error if error >= COARSE => (samples / 2).max(4),
+            _ => samples,
+        };
+        effort.gather[0] = fewer(effort.gather[0]);
+        effort.shared[0] = fewer(effort.shared[0]);
+        if self.error >= COARSE {
+            effort.patches = effort.patches.min(4_000);
+            effort.form_factor_rays = effort.form_factor_rays.min(500_000);
+            effort.direct[1] = effort.direct[1].min(16);
+        }
+        effort
+    }
+
     /// Names the first option that is out of its range.
     pub(crate) fn check(&self) -> Result<(), crate::BakeError> {
         let wrong =

@@ -133,8 +133,10 @@ pub struct BakeReport {
     pub gather_rays: f64,
     /// Mean irradiance over covered texels, W/m², linear RGB.
     pub mean_irradiance: [f64; 3],
-    /// Estimated relative RMSE that sampling leaves in the lightmap.
+    /// Estimated RMSE that sampling leaves in the lightmap, of each texel relative to the light around it: what an eye in that room sees.
     pub estimated_error: f64,
+    /// The same errors relative to the mean irradiance of the whole level.
+    pub error_of_mean: f64,
     /// That error against time: after each round of the final gather (or after direct light, where nothing bounces), and at the end. Empty
     /// where there was nothing to bake.
     pub curve: Vec<ErrorAtTime>,
@@ -176,8 +178,9 @@ impl std::fmt::Display for BakeReport {
         )?;
         writeln!(
             f,
-            "estimated error {:.2} % of the mean irradiance: {}",
+            "estimated error {:.2} % of the light around, {:.2} % of the level's mean: {}",
             100.0 * self.estimated_error,
+            100.0 * self.error_of_mean,
             self.ended
         )?;
         if self.resolution.points > 0 {

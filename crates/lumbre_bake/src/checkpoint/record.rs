@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
 use crate::texels::resolution_error::DensePoint;
+use crate::texels::shared_light::Shared;
 use crate::transport::direct::{Direct, Seen};
 use crate::transport::form_factors::Cast;
 
@@ -86,6 +87,7 @@ pub(crate) use fields;
 
 fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, sampled: bool, seen: Seen });
 fields!(Seen { partly: bool, signature: u32 });
+fields!(Shared { sums: [Vec3; SCRAMBLES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
 fields!(Gathered {
     sums: [Vec3; SCRAMBLES],
     weights: [Weights; SCRAMBLES],

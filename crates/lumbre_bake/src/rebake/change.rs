@@ -9,7 +9,7 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::blocks::Blocks;
+use crate::texels::blocks::Blocks;
 use super::changes::{ChangedBox, Changes};
 use super::estimate::{Estimate, Range, cap, in_cap};
 use super::kept::Kept;

@@ -13,7 +13,6 @@
 //! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the change that is seen at first hand as
 //! its source (what the boxes hide or show, and what direct light has changed). That is solved on the patches, so that it brings no noise where nothing changes. What is neglected is added to the stated error.
 
-mod blocks;
 pub(crate) mod change;
 mod changes;
 mod estimate;

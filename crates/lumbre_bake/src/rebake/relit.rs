@@ -7,7 +7,7 @@ use glam::Vec3;
 use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
-use super::blocks::Blocks;
+use crate::texels::blocks::Blocks;
 use super::changes::ChangedBox;
 use crate::scene::{Canonical, PlacedLight};
 use crate::texels::footprint::{Texel, receiver};

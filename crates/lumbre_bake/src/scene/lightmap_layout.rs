@@ -8,7 +8,7 @@ use lumbre_mesh::uv_validation::validate_uv1;
 use lumbre_mesh::{TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
 
 use super::texture_coordinates::{free_second, sets_read};
-use super::{Canonical, Object};
+use super::{Canonical, Object, SceneTriangle};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The texels of one object.
@@ -35,6 +35,16 @@ pub(crate) struct LightmapLayout {
     pub texels: usize,
     /// Texels per canonical unit that were aimed at.
     pub density: f64,
+}
+
+impl LightmapLayout {
+    /// The texel at a point of a triangle, in the row of all maps; none where it is not on its map.
+    pub fn texel_at(&self, triangle: &SceneTriangle, at: (f32, f32)) -> Option<usize> {
+        let map = &self.maps[triangle.object as usize];
+        let place = triangle.place_on_map(at);
+        let (x, y) = (place.x as u32, place.y as u32);
+        (x < map.width && y < map.height).then(|| map.first + (y * map.width + x) as usize)
+    }
 }
 
 /// Texels that [`Density::Automatic`] aims at.

@@ -104,6 +104,12 @@ impl SceneTriangle {
         (a * (1.0 - u - v) + b * u + c * v).normalize_or(self.normal)
     }
 
+    /// The same point on its map, in texels.
+    pub fn place_on_map(&self, (u, v): (f32, f32)) -> Vec2 {
+        let [a, b, c] = self.uv;
+        a + (b - a) * u + (c - a) * v
+    }
+
     /// The unit geometric normal of a side.
     pub fn side_normal(&self, side: Side) -> Vec3 {
         match side {

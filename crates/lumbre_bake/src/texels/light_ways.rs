@@ -6,34 +6,30 @@ use lumbre_optics::{LightKind, SpotCone};
 use crate::scene::{BakeScene, PlacedLight};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::cut_out::{Pieces, Shadow};
-use crate::transport::direct::{Receiver, Sources};
+use crate::transport::direct::Sources;
 use crate::transport::lit_part::{Origin, Way};
 use crate::transport::shaft::{Area, Shaft, WIDEST};
 
-/// What is known of the lights' ways to an area of a flat surface, by the lights' numbers, in their order. Of many lights those that are the
-/// brightest there. `texel_side` is that of its texels.
-pub(super) fn ways(sources: &Sources<'_>, area: &Area, texel_side: f32, tree: &BoxTree) -> Vec<(u32, Way)> {
-    let point = |x: f32, y: f32| {
-        let [a, b, _, d] = area.corners;
-        let position = (a + (b - a) * f64::from(x) + (d - a) * f64::from(y)).as_vec3();
-        let normal = area.normal.as_vec3();
-        Some(Receiver { position, origin: position, geometric_normal: normal, normal })
-    };
-    let arriving = sources.brightest_lights(&point);
-    let of_light = |(index, placed): (usize, &PlacedLight)| {
-        let index = index as u32;
-        let way = match arriving.binary_search(&index) {
-            Ok(_) if is_even(sources.scene, placed, area, texel_side) => {
+/// What is known of the ways of some lights, by ascending number, to an area of a flat surface. `texel_side` is that of its texels.
+pub(super) fn ways(
+    sources: &Sources<'_>,
+    lights: &[u32],
+    area: &Area,
+    texel_side: f32,
+    tree: &BoxTree,
+) -> Vec<(u32, Way)> {
+    let of_light = |&index: &u32| {
+        let placed = &sources.lights[index as usize];
+        let way = match is_out_of_range(sources.scene, placed, area) {
+            true => Way::Dark,
+            false if is_even(sources.scene, placed, area, texel_side) => {
                 way(sources.scene, placed, area, tree)?
             }
-            Ok(_) => return None,
-            // Of few lights all that arrive are among them.
-            Err(_) if sources.has_few_lights() => Way::Dark,
-            Err(_) => return None,
+            false => return None,
         };
         Some((index, way))
     };
-    sources.lights.iter().enumerate().filter_map(of_light).collect()
+    lights.iter().filter_map(of_light).collect()
 }
 
 /// Whether a texel's light by a few of its points, and by the middles of its pieces, is that of all of it: the light is not as near as texels
@@ -64,6 +60,16 @@ fn is_even(scene: &BakeScene, placed: &PlacedLight, area: &Area, texel_side: f32
     let angle = placed.axis.angle_between(from_light);
     let beside = angle + spread < inner || angle - spread > outer;
     beside || outer - inner > spread
+}
+
+/// Whether a light ends before it reaches an area.
+fn is_out_of_range(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> bool {
+    let range = f64::from(placed.light.attenuation.range) * scene.space.scale;
+    if placed.light.kind == LightKind::Directional || !(range > 0.0) {
+        return false;
+    }
+    let (middle, reach) = ((area.corners[0] + area.corners[2]) * 0.5, 0.5 * area.corners[0].distance(area.corners[2]));
+    scene.space.place(placed.position).distance(middle) > (range + reach) * (1.0 + f64::from(f32::EPSILON))
 }
 
 /// Of texels' sides, how near a light may be.

@@ -1,10 +1,15 @@
-//! Direct light of every covered texel, in two passes: a few shadow rays everywhere, many where the first pass, there or
-//! next to it, saw a source partly or differently, unless it was exact. A penumbra's faint ends are found by their neighbours.
+//! Direct light of every covered texel. Sources that matter by themselves, in passes: a few shadow rays everywhere, many where the first pass,
+//! there or next to it, saw a source partly or differently, unless it was exact (a penumbra's faint ends are found by their neighbours),
+//! then more where the error asked for is not in sight. The other sources share samples: that is `shared_light`.
 
 use super::allocation::allot;
 use super::chunks::{in_chunks, in_chunks_in_time};
 use super::footprint::{Texel, receiver};
+use super::light_cuts::LightCuts;
+use super::local_light::LocalLight;
 use super::shafts::Shafts;
+use super::shared_light::SharedLight;
+use super::surroundings::Surroundings;
 use crate::progress::Watch;
 use crate::sampling::Sequence;
 use crate::scene::LightmapLayout;
@@ -14,26 +19,33 @@ use crate::{BakeError, BakeOptions};
 /// How far a penumbra is suspected around a texel that saw one, in texels.
 const REACH: u32 = 2;
 
-/// Direct light of every covered texel. What is `known` of a former bake stays as it is; an empty list knows nothing.
+/// Direct light of every covered texel, and the light around it. What is `known` of a former bake stays as it is; an empty list knows nothing.
 pub(crate) fn direct_light(
     sources: &Sources<'_>,
     layout: &LightmapLayout,
     texels: &[Texel],
+    charts: &[u32],
     known: &[Option<Direct>],
     options: &BakeOptions,
     watch: &mut Watch<'_>,
-) -> Result<Vec<Direct>, BakeError> {
+) -> Result<(Vec<Direct>, LocalLight), BakeError> {
     let scene = sources.scene;
     let known = |index: u32| known.get(index as usize).copied().flatten();
-    let [few, many, most] = options.quality.effort().direct;
-    let shafts = Shafts::new(scene, sources, texels, |index| known(index).is_none());
+    let [few, many, most] = options.effort().direct;
+    eprintln!("DBG begin {:.2}", watch.seconds());
+    let cuts = LightCuts::new(sources, texels, charts);
+    watch.advance(0.0)?;
+    eprintln!("DBG cuts {:.2}", watch.seconds());
+    let shafts = Shafts::new(scene, sources, texels, &cuts, |index| known(index).is_none());
+    watch.advance(0.0)?;
+    eprintln!("DBG shafts {:.2}", watch.seconds());
     let light = |place: usize, samples: u32| {
         let texel = &texels[place];
         if texel.is_hidden() {
             return Direct::default();
         }
         let sequence = Sequence::new(options.seed, 4, texel.index);
-        sources.irradiance_past(&shafts.between(place, texel), sequence, samples, &|x, y| {
+        sources.own(cuts.of(place), &shafts.between(place, texel), sequence, samples, &|x, y| {
             texel.point(scene, x, y).map(|point| receiver(scene, &point))
         })
     };
@@ -49,23 +61,40 @@ pub(crate) fn direct_light(
     for (&index, found) in unknown.iter().zip(found) {
         direct[index as usize] = found;
     }
+    eprintln!("DBG first own {:.2}", watch.seconds());
+    let shared = match cuts.share_samples() {
+        true => {
+            let surroundings = Surroundings::new(scene, layout, texels, charts, &cuts.keys());
+            let wanted = |place: usize| known(place as u32).is_none();
+            watch.pass(PASS);
+            Some(SharedLight::new(sources, surroundings, &cuts, wanted, options, watch)?)
+        }
+        false => None,
+    };
+    watch.pass(PASS_OF_LOCAL_LIGHT);
+    eprintln!("DBG first shared {:.2}", watch.seconds());
+    let so_far = shared.as_ref().map(|shared| shared.with(&direct));
+    let local = so_far.as_ref().unwrap_or(&direct);
+    let local = LocalLight::new(sources, layout, texels, charts, local, watch)?;
+    eprintln!("DBG local {:.2}", watch.seconds());
+    let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
+    let goal = OWN_SHARE * open * options.error.powi(2);
+    let own_goal = if shared.is_some() { 0.5 * goal } else { goal };
+
     let mut again = in_doubt(layout, texels, &direct);
     again.retain(|&index| known(index).is_none() && direct[index as usize].sampled);
     watch.pass(PASS);
     let better = in_chunks_in_time(again.len(), watch, |place| light(again[place] as usize, many))?;
     replace(&mut direct, &again, better);
     // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
-    let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
-    let grey = |direct: &Direct| f64::from(direct.baked.element_sum()) / 3.0;
-    let mean = direct.iter().map(grey).sum::<f64>() / open;
-    let goal = OWN_SHARE * open * (options.error * mean).powi(2);
     let mut samples = vec![many; texels.len()];
     loop {
-        let variances: Vec<f32> = direct.iter().map(|direct| direct.variance).collect();
-        if variances.iter().map(|&variance| f64::from(variance)).sum::<f64>() <= goal {
+        let relative = relative(&direct, &local);
+        eprintln!("DBG own {:.2}s: {:.4} goal {:.4} in doubt {}", watch.seconds(), (sum(&relative)/open).sqrt(), (own_goal/open).sqrt(), again.len());
+        if sum(&relative) <= own_goal {
             break;
         }
-        let wanted = allot(again.iter().copied(), &variances, &samples, most, ORDER, goal);
+        let wanted = allot(again.iter().copied(), &relative, &samples, most, ORDER, own_goal);
         watch.pass(PASS);
         let better = in_chunks_in_time(wanted.len(), watch, |place| {
             light(wanted[place].index as usize, wanted[place].samples)
@@ -79,19 +108,33 @@ pub(crate) fn direct_light(
         let again: Vec<u32> = wanted.iter().map(|wanted| wanted.index).collect();
         replace(&mut direct, &again, better);
     }
-    Ok(direct)
+    if let Some(shared) = shared {
+        let left = goal - sum(&relative(&direct, &local));
+        shared.finish(&mut direct, &local, left.max(own_goal), watch)?;
+    }
+    Ok((direct, local))
 }
 
 /// Of the squared error asked for, what direct light may have for itself.
-const OWN_SHARE: f64 = 0.25;
+const OWN_SHARE: f64 = 0.35;
 /// Order of the variance's fall with the samples at straight edges of shadows, as measured.
 const ORDER: f64 = 1.5;
 
 /// A pass's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.5;
+const PASS_OF_LOCAL_LIGHT: f32 = 0.2;
 
 /// Shadow rays of a texel when the time is up: their spread still tells the error.
 const LATE: u32 = 4;
+/// The variances, in shares of the squared light around.
+fn relative(direct: &[Direct], local: &LocalLight) -> Vec<f32> {
+    let variances: Vec<f32> = direct.iter().map(|direct| direct.variance).collect();
+    local.relative(&variances)
+}
+
+fn sum(numbers: &[f32]) -> f64 {
+    numbers.iter().map(|&number| f64::from(number)).sum()
+}
 
 /// Those that there was time for.
 fn replace(direct: &mut [Direct], at: &[u32], better: Vec<Direct>) {

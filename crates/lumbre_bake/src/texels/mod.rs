@@ -3,6 +3,7 @@
 
 pub(crate) mod allocation;
 mod arriving;
+pub(crate) mod blocks;
 pub(crate) mod charts;
 pub(crate) mod chunks;
 pub(crate) mod divided_light;
@@ -14,8 +15,10 @@ pub(crate) mod guides;
 pub(crate) mod hidden;
 pub(crate) mod lanes;
 pub(crate) mod late;
+mod light_cuts;
 mod light_ways;
 pub(crate) mod lighting;
+pub(crate) mod local_light;
 pub(crate) mod neighbours;
 pub(crate) mod outgoing;
 pub(crate) mod plane;
@@ -23,6 +26,7 @@ pub(crate) mod resolution_error;
 pub(crate) mod rounds;
 pub(crate) mod seams;
 pub(crate) mod shafts;
+pub(crate) mod shared_light;
 pub(crate) mod smooth;
 pub(crate) mod smoothing_bias;
 pub(crate) mod straddling;

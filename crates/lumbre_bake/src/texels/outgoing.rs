@@ -77,12 +77,7 @@ impl Outgoing<'_> {
 
     /// The texel at a point, if it is on the map, and the point on the map.
     fn place_at(&self, triangle: u32, (u, v): (f32, f32)) -> (Option<usize>, Vec2) {
-        let scene_triangle = &self.scene.triangles[triangle as usize];
-        let map = &self.layout.maps[scene_triangle.object as usize];
-        let [a, b, c] = scene_triangle.uv;
-        let uv = a + (b - a) * u + (c - a) * v;
-        let (x, y) = (uv.x as u32, uv.y as u32);
-        let index = (x < map.width && y < map.height).then(|| map.first + (y * map.width + x) as usize);
-        (index, uv)
+        let triangle = &self.scene.triangles[triangle as usize];
+        (self.layout.texel_at(triangle, (u, v)), triangle.place_on_map((u, v)))
     }
 }

@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use super::allocation::{Allotment, allot};
 use super::chunks::in_chunks_in_time;
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
-use super::footprint::Texel;
+use super::footprint::{Texel, receiver};
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
 use super::late::from_patches;
+use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
 use crate::progress::Watch;
@@ -46,6 +47,8 @@ pub(crate) struct Receivers<'a> {
     pub texels: &'a [Texel],
     pub charts: &'a [u32],
     pub direct: &'a [Direct],
+    /// The light around them, beside which their errors count.
+    pub local: &'a LocalLight,
     /// Of a former bake.
     pub kept: Option<&'a Kept>,
 }
@@ -58,15 +61,15 @@ pub(crate) fn gather(
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
 ) -> Result<Bounced, BakeError> {
-    let Receivers { texels, charts, direct, kept } = receivers;
-    let [first, most] = options.quality.effort().gather.map(|samples| samples / SCRAMBLES as u32);
+    let Receivers { texels, charts, direct, local, kept } = receivers;
+    let [first, most] = options.effort().gather.map(|samples| samples / SCRAMBLES as u32);
     let nothing = || vec![Gathered::default(); texels.len()];
     let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
     let open_texels = (0..texels.len() as u32).filter(|&index| !texels[index as usize].is_hidden());
     let open = open_texels.clone().count().max(1) as f64;
     let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
     let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
-    let surroundings = Surroundings::new(outgoing.scene, outgoing.layout, texels, charts);
+    let surroundings = Surroundings::new(outgoing.scene, outgoing.layout, texels, charts, &[]);
     let mut wanted: Vec<Allotment> = open_texels
         .clone()
         .filter(|&index| gathered[index as usize].samples == 0)
@@ -114,25 +117,53 @@ pub(crate) fn gather(
         let total = mean_direct + estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
         let variances = variances(direct, Some(&errors), total as f32);
         let of_patches = |part: fn(&PatchBias) -> f32| -> f64 {
-            let open = texels.iter().zip(&patch_bias).filter(|(texel, _)| !texel.is_hidden());
-            open.map(|(_, bias)| f64::from(part(bias))).sum()
+            let parts: Vec<f32> = patch_bias.iter().map(part).collect();
+            open_sum(texels, &local.relative(&parts))
         };
         // What chance leaves in single texels falls out of their mean.
         let by_chance = of_patches(|bias| bias.rest) - of_patches(|bias| bias.expected).max(0.0);
-        let sum: f64 = open_variances(texels, &variances).sum::<f64>() - by_chance;
-        report.estimated_error = if total > 0.0 { (sum / open).sqrt() / total } else { 0.0 };
+        let sum = open_sum(texels, &local.relative(&variances)) - by_chance;
+        report.estimated_error = (sum / open).max(0.0).sqrt();
+        report.error_of_mean = relative_to(total, open_sum(texels, &variances) / open);
+        {
+            let rms = |numbers: Vec<f32>| (open_sum(texels, &local.relative(&numbers)) / open).sqrt();
+            let unsolved = (report.residual_bound as f32).powi(2);
+            eprintln!("DBG gather {:.2}s: all {:.4} direct {:.4} spread {:.4} bias {:.4} patch_error {:.4} rest {:.4} unsolved {:.4} samples {:.1}", watch.seconds(), report.estimated_error,
+                rms(direct.iter().map(|d| d.variance).collect()), rms(spread.clone()), rms(smoothing_bias.clone()),
+                rms(gathered.iter().map(|g| g.patch_error().powi(2)).collect()), rms(patch_bias.iter().map(|b| b.rest).collect()),
+                rms(estimates.iter().map(|e| unsolved * (mean(e).element_sum()/3.0).powi(2)).collect()),
+                4.0 * gathered.iter().map(|g| f64::from(g.samples)).sum::<f64>() / open);
+        }
+        if std::env::var_os("DBG").is_some() {
+            let rel = local.relative(&variances);
+            let mut order: Vec<usize> = (0..texels.len()).filter(|&i| !texels[i].is_hidden()).collect();
+            order.sort_by(|a, b| rel[*b].total_cmp(&rel[*a]));
+            let all: f64 = order.iter().map(|&i| f64::from(rel[i])).sum();
+            let mut by_object = std::collections::BTreeMap::<u32, (f64, usize)>::new();
+            for &i in &order { let e = by_object.entry(texels[i].object).or_default(); e.0 += f64::from(rel[i]); e.1 += 1; }
+            let mut objects: Vec<_> = by_object.into_iter().collect();
+            objects.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
+            for (o, (sum, n)) in objects.iter().take(6) { eprintln!("  DBG object {o}: {:.1} % of the squared error, {n} texels, rms {:.3}", 100.0 * sum / all, (sum / *n as f64).sqrt()); }
+            for q in [0.5, 0.9, 0.99, 0.999] { let i = order[((1.0 - q) * order.len() as f64) as usize]; eprintln!("  DBG q{q}: {:.4}", rel[i].sqrt()); }
+            for &i in order.iter().step_by(97).take(12) {
+                let t = &texels[i];
+                let p = t.point(outgoing.scene, 0.5, 0.5).map(|p| outgoing.scene.space.world(receiver(outgoing.scene, &p).position));
+                eprintln!("  DBG worst object {} at {:?} L {:.5} direct {:.5} indirect {:.5} sigma {:.5} spread {:.5} rest {:.5} samples {}", t.object, p, local.at(i), direct[i].baked.x, mean(&estimates[i]).x, variances[i].sqrt(), spread[i].sqrt(), patch_bias[i].rest.sqrt(), gathered[i].samples);
+            }
+            eprintln!("  DBG mean {total}");
+        }
         report.error_reached = report.estimated_error <= options.error;
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
         watch.advance(1.0)?;
         let late = !in_time || watch.clock().late();
         // Of the error, the part that more rays make smaller: what the patches leave stays.
-        let by_rays = errors.by_rays();
-        let helped: f64 = open_variances(texels, &by_rays).sum();
+        let by_rays = local.relative(&errors.by_rays());
+        let helped = open_sum(texels, &by_rays);
         let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
         helped_before = helped;
         // The part that rays may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
         let rest = sum - helped;
-        let asked = open * (options.error * total).powi(2);
+        let asked = open * options.error.powi(2);
         let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         wanted = allot(open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
@@ -155,8 +186,13 @@ fn corrected(estimates: &[Estimates], bias: &[PatchBias]) -> Vec<Vec3> {
     corrected.collect()
 }
 
-/// The variances of texels that show a surface.
-fn open_variances<'a>(texels: &'a [Texel], variances: &'a [f32]) -> impl Iterator<Item = f64> + 'a {
-    let open = texels.iter().zip(variances).filter(|(texel, _)| !texel.is_hidden());
-    open.map(|(_, variance)| f64::from(*variance))
+/// The sum over texels that show a surface.
+pub(crate) fn open_sum(texels: &[Texel], numbers: &[f32]) -> f64 {
+    let open = texels.iter().zip(numbers).filter(|(texel, _)| !texel.is_hidden());
+    open.map(|(_, number)| f64::from(*number)).sum()
+}
+
+/// The root of a squared error, relative to a mean; 0 where there is no light.
+pub(crate) fn relative_to(mean: f64, squared: f64) -> f64 {
+    if mean > 0.0 { squared.max(0.0).sqrt() / mean } else { 0.0 }
 }

@@ -4,13 +4,15 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::footprint::{Footprint, Texel, receiver};
+use super::footprint::{Footprint, Texel};
+use super::light_cuts::LightCuts;
 use super::light_ways::ways;
 use super::tiles::{Tiles, area, positions_of, shows_plane};
 use crate::scene::BakeScene;
 use crate::transport::between::{BeforePart, Between};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::direct::Sources;
+use crate::transport::light_cut::LightCut;
 use crate::transport::lit_part::{Shown, Way};
 use crate::transport::shaft::Shaft;
 
@@ -43,6 +45,7 @@ impl<'a> Shafts<'a> {
         scene: &'a BakeScene,
         sources: &'a Sources<'a>,
         texels: &[Texel],
+        cuts: &LightCuts,
         wanted: impl Fn(u32) -> bool + Sync,
     ) -> Self {
         let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
@@ -58,8 +61,9 @@ impl<'a> Shafts<'a> {
                 if !members.iter().any(|&place| wanted(place)) {
                     return OfTile::default();
                 }
+                let cut = cuts.of(members[0] as usize);
                 let members = || members.iter().map(|&place| &texels[place as usize]);
-                shafts.of_tile(&tree, members).unwrap_or_default()
+                shafts.of_tile(&tree, cut, members).unwrap_or_default()
             })
             .collect();
         shafts
@@ -69,6 +73,7 @@ impl<'a> Shafts<'a> {
     fn of_tile<'t, T: Iterator<Item = &'t Texel>>(
         &self,
         tree: &BoxTree,
+        cut: &LightCut,
         members: impl Fn() -> T,
     ) -> Option<OfTile> {
         let mut open = members().filter(|texel| !texel.is_hidden());
@@ -79,19 +84,18 @@ impl<'a> Shafts<'a> {
         if !members().all(|texel| shows_plane(self.scene, texel, first.triangle)) {
             return None;
         }
-        let anchor = receiver(self.scene, &first.point(self.scene, 0.5, 0.5)?);
-        let part = |part: u32| {
-            let emitters = self.sources.emitters_of(part)?;
+        let lamp = |&part: &u32| {
             let mut found = Vec::new();
-            for emitter in emitters {
+            for &emitter in self.sources.emitters_of(part) {
                 if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {
                     found.push((emitter, shaft.triangles(self.scene, tree, MOST_BLOCKERS)?));
                 }
             }
-            Some(OfPart { part, emitters: found })
+            (found.len() <= MOST_EMITTERS).then_some(OfPart { part, emitters: found })
         };
-        let parts = self.sources.parts(&anchor).into_iter().filter_map(part).collect();
-        Some(OfTile { parts, lights: ways(self.sources, &area, first.side(self.scene), tree) })
+        let parts = cut.lamps.iter().filter_map(lamp).collect();
+        let lights = ways(self.sources, &cut.lights, &area, first.side(self.scene), tree);
+        Some(OfTile { parts, lights })
     }
 
     /// What may stand between a texel, by its number, and those of the sources for which that is known.
@@ -138,5 +142,6 @@ fn shown(scene: &BakeScene, texel: &Texel) -> Shown {
     }
 }
 
-/// Most triangles that may stand before an emitter: beyond, rays are quicker.
+/// Most triangles that may stand before an emitter, and most emitters of a lamp that shine on a tile: beyond, rays are quicker.
 const MOST_BLOCKERS: usize = 32;
+const MOST_EMITTERS: usize = 8;

@@ -22,36 +22,44 @@ pub(crate) struct Surroundings<'a> {
     firsts: Vec<usize>,
 }
 
-/// Triangles of one chart with the very same normal.
+/// Triangles of one chart with the very same normal, in texels of one group.
 #[derive(Clone, Copy)]
 pub(crate) struct Surface {
     pub chart: u32,
     pub normal: Vec3,
+    pub group: u32,
 }
 
 /// No texel, no surface.
 pub(crate) const NONE: u32 = u32::MAX;
 
 impl<'a> Surroundings<'a> {
-    pub fn new(scene: &'a BakeScene, layout: &LightmapLayout, texels: &'a [Texel], charts: &[u32]) -> Self {
+    /// Texels of different groups are not compared with each other; an empty list has all in one.
+    pub fn new(
+        scene: &'a BakeScene,
+        layout: &LightmapLayout,
+        texels: &'a [Texel],
+        charts: &[u32],
+        groups: &[u32],
+    ) -> Self {
         let mut surfaces: Vec<Surface> = Vec::new();
-        let mut numbers: HashMap<(u32, [u32; 3]), u32> = HashMap::new();
-        let surface = |(triangle, &chart): (&crate::scene::SceneTriangle, &u32)| {
-            let key = (chart, triangle.normal.to_array().map(f32::to_bits));
-            *numbers.entry(key).or_insert_with(|| {
-                surfaces.push(Surface { chart, normal: triangle.normal });
-                surfaces.len() as u32 - 1
-            })
-        };
-        let surface_of: Vec<u32> = scene.triangles.iter().zip(charts).map(surface).collect();
+        let mut numbers: HashMap<(u32, [u32; 3], u32), u32> = HashMap::new();
         let mut places = vec![NONE; layout.texels];
+        let mut ground = vec![NONE; layout.texels];
         for (index, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
+            let (chart, normal) =
+                (charts[texel.triangle as usize], scene.triangles[texel.triangle as usize].normal);
+            let group = groups.get(index).copied().unwrap_or(0);
+            let key = (chart, normal.to_array().map(f32::to_bits), group);
+            let surface = *numbers.entry(key).or_insert_with(|| {
+                surfaces.push(Surface { chart, normal, group });
+                surfaces.len() as u32 - 1
+            });
             places[texel.index as usize] = index as u32;
+            ground[texel.index as usize] = surface;
         }
         let sizes = layout.maps.iter().map(|map| (map.width, map.height));
-        let ground = places.iter().map(|&place| {
-            texels.get(place as usize).map_or(NONE, |texel| surface_of[texel.triangle as usize])
-        });
+        let ground = ground.into_iter();
         let grid = Grid::new(sizes, ground, surfaces);
         let (mut first_rows, mut firsts) = (Vec::new(), Vec::new());
         for map in &layout.maps {
@@ -103,5 +111,5 @@ pub(crate) fn goes_on(surfaces: &[Surface], surface: u32, other: u32) -> bool {
     let [Some(own), Some(other)] = [surface, other].map(|index| surfaces.get(index as usize)) else {
         return false;
     };
-    own.chart == other.chart && own.normal.dot(other.normal) > 0.9
+    own.chart == other.chart && own.group == other.group && own.normal.dot(other.normal) > 0.9
 }

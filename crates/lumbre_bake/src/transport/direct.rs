@@ -3,13 +3,16 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lumbre_optics::LightKind;
 
 use super::between::{BeforePart, Between};
 use super::cut_out::Pieces;
 use super::emitter_tree::EmitterTree;
 use super::emitters::{Emitter, emitters, lamps};
+use super::light_cut::{FEW_LIGHTS, LightCut};
+use super::light_tree::{LightTree, has_place};
+use super::polygon::point_to_triangle;
 use super::share_variance::{share_variance, uneven_variance};
 use super::unoccluded::Unoccluded;
 use super::visible_part::visible_part;
@@ -77,8 +80,11 @@ impl Direct {
 pub(crate) struct Sources<'a> {
     pub scene: &'a BakeScene,
     pub emitters: Vec<Emitter>,
-    tree: EmitterTree,
+    pub(super) emitter_tree: EmitterTree,
     pub lights: Vec<PlacedLight>,
+    pub(super) light_tree: LightTree,
+    /// Lights that have samples of their own everywhere, by number: those in the sky, and all where they are few.
+    pub(super) lights_apart: Vec<u32>,
     /// Irradiance that a surface gets of an unhidden sky: π times its radiance, W/m². Not direct light here: the rays of the
     /// form factors and of the final gather find it where they meet nothing.
     pub sky: Vec3,
@@ -107,15 +113,27 @@ impl<'a> Sources<'a> {
     /// Of a scene, its punctual lights and its sky's radiance.
     pub fn new(scene: &'a BakeScene, lights: Vec<PlacedLight>, sky: Vec3) -> Self {
         let emitters = emitters(scene);
-        let tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
-        Self { scene, emitters, tree, lights, sky: sky * PI }
+        let emitter_tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
+        let few = lights.len() <= FEW_LIGHTS;
+        let shares_samples = |index: &u32| !few && has_place(&lights[*index as usize]);
+        let (together, lights_apart) = (0..lights.len() as u32).partition(shares_samples);
+        let light_tree = LightTree::new(&lights, together, scene.space);
+        Self { scene, emitters, emitter_tree, lights, light_tree, lights_apart, sky: sky * PI }
     }
 
     /// The emissive triangles among them that are to be kept, and no lights.
     pub fn only_emitters(&self, keep: impl Fn(&Emitter) -> bool) -> Self {
         let emitters: Vec<Emitter> = self.emitters.iter().filter(|emitter| keep(emitter)).cloned().collect();
-        let tree = EmitterTree::new(&emitters, &lamps(self.scene, &emitters));
-        Self { scene: self.scene, emitters, tree, lights: Vec::new(), sky: Vec3::ZERO }
+        let emitter_tree = EmitterTree::new(&emitters, &lamps(self.scene, &emitters));
+        Self {
+            scene: self.scene,
+            emitters,
+            emitter_tree,
+            lights: Vec::new(),
+            light_tree: LightTree::default(),
+            lights_apart: Vec::new(),
+            sky: Vec3::ZERO,
+        }
     }
 
     /// Whether nothing shines.
@@ -143,49 +161,53 @@ impl<'a> Sources<'a> {
         self.sky != Vec3::ZERO
     }
 
-    /// The parts of the emissive surfaces whose shadows are told apart at a receiver.
-    pub fn parts(&self, receiver: &Receiver) -> Vec<u32> {
-        self.tree.groups(receiver)
+    /// The emitters of a part of the emissive surfaces, by number.
+    pub fn emitters_of(&self, part: u32) -> &[u32] {
+        self.emitter_tree.emitters_of(part)
     }
 
-    /// The emitters of such a part, if they are few.
-    pub fn emitters_of(&self, part: u32) -> Option<Vec<u32>> {
-        self.tree.emitters_of(part, FEW_EMITTERS)
-    }
-
-    /// Mean irradiance of a receiver by `samples` shadow rays to the emitters and to each light; `point` maps the unit
-    /// square onto its surface.
+    /// Mean irradiance of a receiver by `samples` shadow rays to each source that matters and some to the others together; `point` maps the
+    /// unit square onto its surface.
     pub fn irradiance(
         &self,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
     ) -> Direct {
-        self.irradiance_past(&Between::UNKNOWN, sequence, samples, point)
+        let Some(anchor) = point(0.5, 0.5) else { return Direct::default() };
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
+        let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
+        let cut = self.cut(&anchor, reach);
+        let mut direct = self.own(&cut, &Between::UNKNOWN, sequence, samples, point);
+        self.rest(&cut.rest, sequence, SAMPLES_OF_REST * samples, point, &mut direct);
+        direct
     }
 
-    /// As [`irradiance`](Self::irradiance), without shadow rays to the sources for which it is known what may stand `between`: those are as
-    /// exact as the receiver's points.
-    pub fn irradiance_past(
+    /// Mean irradiance by the sources that have samples of their own; without shadow rays where it is known what may stand `between`: those
+    /// are as exact as the receiver's points.
+    pub fn own(
         &self,
+        cut: &LightCut,
         between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
     ) -> Direct {
         let mut direct = Direct::default();
-        if !self.emitters.is_empty() {
-            let light = self.emitted(between, sequence, samples, point, &mut direct);
+        if !cut.lamps.is_empty() {
+            let light = self.emitted(&cut.lamps, between, sequence, samples, point, &mut direct);
             direct.baked += light;
         }
-        self.punctual(between, sequence, samples, point, &mut direct);
+        self.punctual(&cut.lights, between, sequence, samples, point, &mut direct);
         direct
     }
 
-    /// E = Σ (mean of the exact unoccluded light) x (seen light / all light, by the same samples) over groups of lamps: exact in
+    /// E = Σ (mean of the exact unoccluded light) x (seen light / all light, by the same samples) over lamps: exact in
     /// full light and in full shadow of each, and in between its error is that of the share alone.
     fn emitted(
         &self,
+        parts: &[u32],
         between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
@@ -193,21 +215,18 @@ impl<'a> Sources<'a> {
         direct: &mut Direct,
     ) -> Vec3 {
         let Some(anchor) = point(0.5, 0.5) else { return Vec3::ZERO };
-        let groups = self.tree.groups(&anchor);
-        let weights: Vec<f32> = groups.iter().map(|&group| self.tree.weight(group, &anchor)).collect();
+        let weights: Vec<f32> =
+            parts.iter().map(|&part| self.emitter_tree.weight(part, &anchor, 0.0)).collect();
         let brightest = weights.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         let grey = |light: Vec3| light.element_sum() / 3.0;
         let mut irradiance = Vec3::ZERO;
-        for (place, (&group, weight)) in groups.iter().zip(weights).enumerate() {
+        for (place, (&part, weight)) in parts.iter().zip(weights).enumerate() {
             let own = allotted(samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
-            let unoccluded = || {
-                Unoccluded::mean(|x, y| {
-                    point(x, y).map(|receiver| self.tree.unoccluded(&self.emitters, group, &receiver))
-                })
-            };
+            let unoccluded =
+                || Unoccluded::mean(|x, y| point(x, y).map(|receiver| self.unoccluded(part, &receiver)));
             let known =
-                between.parts.iter().find(|between| between.part == group).and_then(|between| match between
+                between.parts.iter().find(|between| between.part == part).and_then(|between| match between
                     .emitters
                     .is_empty()
                 {
@@ -216,23 +235,33 @@ impl<'a> Sources<'a> {
                 });
             if let Some((light, variance)) = known {
                 irradiance += light;
-                direct.variance += variance + (self.tree.error() * grey(light)).powi(2);
+                direct.variance += variance;
                 continue;
             }
-            let mut share = self.seen_share(group, &anchor, sequence, (own, set), point, direct);
+            let mut share = self.seen_share(part, &anchor, sequence, (own, set), point, direct);
             if share.mean == Vec3::ZERO && share.asked > 0 {
                 continue;
             }
             let (light, uneven) = unoccluded();
             if share.asked == 0 && light != Vec3::ZERO {
                 // Of few samples all may be of sides that look away.
-                share = self.seen_share(group, &anchor, sequence, (AGAIN * own, set), point, direct);
+                share = self.seen_share(part, &anchor, sequence, (AGAIN * own, set), point, direct);
             }
             irradiance += light * share.mean;
             direct.variance += grey(light).powi(2) * share.variance + uneven * grey(share.mean).powi(2);
-            direct.variance += (self.tree.error() * grey(light * share.mean)).powi(2);
         }
         irradiance
+    }
+
+    /// Irradiance by a part of the emissive surfaces as if nothing were between.
+    pub(super) fn unoccluded(&self, part: u32, receiver: &Receiver) -> Vec3 {
+        let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
+        let of = |&index: &u32| {
+            let emitter = &self.emitters[index as usize];
+            let factor = point_to_triangle(position, normal, &emitter.corners_f64);
+            emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor)
+        };
+        self.emitters_of(part).iter().map(of).sum::<DVec3>().as_vec3()
     }
 
     /// The light of a part of which it is known what may stand between, at as many points as are worth so many shadow rays, and its variance;
@@ -283,10 +312,10 @@ impl<'a> Sources<'a> {
         Some((mean, uneven_variance(std::array::from_fn(of_group), most - least, count)))
     }
 
-    /// The part of a group's light that is seen, by so many samples of dimension set `set`.
+    /// The share of a part's light that is seen, by so many samples of dimension set `set`.
     fn seen_share(
         &self,
-        group: u32,
+        part: u32,
         anchor: &Receiver,
         sequence: Sequence,
         (samples, set): (u32, u32),
@@ -300,28 +329,16 @@ impl<'a> Sources<'a> {
             let at = group_of(sample, samples);
             let [x, y, u, v] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
-            let (chosen, u, probability) = self.tree.pick(group, anchor, u);
+            let (chosen, u, probability) = self.emitter_tree.pick(part, anchor, u);
             let emitter = &self.emitters[chosen];
-            let (a, b) = triangle_point(u, v);
-            let [p, q, r] = emitter.corners;
-            let target = p + (q - p) * a + (r - p) * b;
-            let towards = target - receiver.position;
-            let distance_squared = towards.length_squared();
-            let direction = towards.normalize_or_zero();
-            let (cosine, emitted) = (direction.dot(receiver.normal), -direction.dot(emitter.normal));
-            if cosine <= 0.0 || emitted <= 0.0 || direction.dot(receiver.geometric_normal) <= 0.0 {
-                continue;
-            }
-            let light =
-                emitter.radiance * (cosine * emitted * emitter.area / (distance_squared * probability));
+            let Some(sample) = sample_emitter(emitter, &receiver, (u, v)) else { continue };
+            let light = sample.light / probability;
             if !light.is_finite() {
                 continue;
             }
             all += light;
             group_all[at] += light.element_sum() / 3.0;
-            let target =
-                self.scene.off_surface_seen_from(emitter.triangle, emitter.side, target, receiver.origin);
-            if self.scene.blocked(receiver.origin, target) {
+            if self.hides(emitter, &sample, &receiver) {
                 hidden += 1;
             } else {
                 visible += 1;
@@ -331,7 +348,7 @@ impl<'a> Sources<'a> {
         }
         direct.rays += visible + hidden;
         direct.sampled = true;
-        direct.seen.add(group, visible, hidden);
+        direct.seen.add(part, visible, hidden);
         let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
         let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
         let grey = share(group_seen.iter().sum(), group_all.iter().sum());
@@ -342,6 +359,92 @@ impl<'a> Sources<'a> {
         let asked = visible + hidden;
         Share { mean, variance: share_variance(shares, grey, asked), asked }
     }
+
+    /// Whether something stands before a point of an emitter.
+    pub(super) fn hides(&self, emitter: &Emitter, sample: &EmitterSample, receiver: &Receiver) -> bool {
+        let (triangle, side) = (emitter.triangle, emitter.side);
+        let target = self.scene.off_surface_seen_from(triangle, side, sample.target, receiver.origin);
+        self.scene.blocked(receiver.origin, target)
+    }
+}
+
+/// A point of an emitter, and the irradiance that the emitter would bring if it were all like this point.
+pub(super) struct EmitterSample {
+    pub target: Vec3,
+    pub light: Vec3,
+    pub distance: f32,
+}
+
+/// The point of an emitter at (u, v) of the unit square; none where no light leaves or arrives.
+pub(super) fn sample_emitter(
+    emitter: &Emitter,
+    receiver: &Receiver,
+    (u, v): (f32, f32),
+) -> Option<EmitterSample> {
+    let [p, q, r] = emitter.corners.map(|corner| corner - receiver.position);
+    let (a, b) = triangle_point(u, v);
+    let mut towards = p + (q - p) * a + (r - p) * b;
+    let height = -p.dot(emitter.normal);
+    if height <= 0.0 {
+        return None;
+    }
+    // What a point of it is worth differs by the distance where it is near: there directions are drawn evenly instead.
+    let nearest = p.length_squared().min(q.length_squared()).min(r.length_squared());
+    let by_direction = match emitter.area > WIDE * nearest.max(height * height) {
+        true => spherical_triangle([p, q, r], u, v),
+        false => None,
+    };
+    let mut per_cosine = 0.0;
+    if let Some((direction, solid_angle)) = by_direction {
+        let down = -direction.dot(emitter.normal);
+        if down <= 0.0 {
+            return None;
+        }
+        (towards, per_cosine) = (direction * (height / down), solid_angle);
+    }
+    let distance_squared = towards.length_squared();
+    let direction = towards.normalize_or_zero();
+    let (cosine, emitted) = (direction.dot(receiver.normal), -direction.dot(emitter.normal));
+    if cosine <= 0.0 || emitted <= 0.0 || direction.dot(receiver.geometric_normal) <= 0.0 {
+        return None;
+    }
+    if by_direction.is_none() {
+        per_cosine = emitted * emitter.area / distance_squared;
+    }
+    let target = receiver.position + towards;
+    let light = emitter.radiance * (cosine * per_cosine);
+    Some(EmitterSample { target, light, distance: distance_squared.sqrt() })
+}
+
+/// Of an emitter's area, over its squared distance, from which on its directions are sampled and not its points.
+const WIDE: f32 = 0.05;
+
+/// A direction at (u, v) of the unit square to a triangle, evenly spread over its solid angle, and that angle (Arvo, "Stratified Sampling of
+/// Spherical Triangles", 1995). None where it is too narrow for numbers of single precision.
+fn spherical_triangle(corners: [Vec3; 3], u: f32, v: f32) -> Option<(Vec3, f32)> {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3().normalize_or_zero());
+    let normal = |p: DVec3, q: DVec3| p.cross(q).try_normalize();
+    let (ab, bc, ca) = (normal(a, b)?, normal(b, c)?, normal(c, a)?);
+    let (alpha, beta, gamma) = (ab.angle_between(-ca), bc.angle_between(-ab), ca.angle_between(-bc));
+    let solid_angle = alpha + beta + gamma - std::f64::consts::PI;
+    if solid_angle.is_nan() || solid_angle <= 1e-6 {
+        return None;
+    }
+    let part = std::f64::consts::PI + f64::from(u) * solid_angle;
+    let ((sine, cosine), (sine_part, cosine_part)) = (alpha.sin_cos(), part.sin_cos());
+    let (s, t) =
+        (sine_part * cosine - cosine_part * sine, cosine_part * cosine + sine_part * sine);
+    let (k, l) = (t + cosine, s - sine * a.dot(b));
+    let along = (l + (l * t - k * s) * cosine) / ((l * s + k * t) * sine);
+    if along.is_nan() {
+        return None;
+    }
+    let along = along.clamp(-1.0, 1.0);
+    let beside = |p: DVec3, axis: DVec3| (p - axis * p.dot(axis)).normalize_or_zero();
+    let edge = a * along + beside(c, a) * (1.0 - along * along).sqrt();
+    let height = 1.0 - f64::from(v) * (1.0 - edge.dot(b));
+    let direction = b * height + beside(edge, b) * (1.0 - height * height).max(0.0).sqrt();
+    direction.is_finite().then(|| (direction.as_vec3(), solid_angle as f32))
 }
 
 /// The part of a source that is seen, per channel, and its variance.
@@ -355,12 +458,13 @@ struct Share {
 /// So many times the samples where none of them could bring light, though there is some.
 const AGAIN: u32 = 16;
 
-/// Most emitters of a part of which it is asked what stands before each.
-const FEW_EMITTERS: usize = 8;
 /// Shadow rays that take about as long as one point that sees a source exactly.
 const RAYS_OF_A_POINT: u32 = 8;
 
-/// The dimension sets of groups begin here: before it are the punctual lights'.
+/// Samples of the sources that share them, for each of a source that has samples of its own.
+const SAMPLES_OF_REST: u32 = 4;
+
+/// The dimension sets of lamps begin here: before it are the punctual lights'.
 const FIRST_SET: u32 = 34;
 
 /// Of `samples` for the brightest source, those of one that brings `part` of it: a power of two, as runs are best spread.

@@ -1,23 +1,20 @@
 //! Emissive triangles as a hierarchy: lamps (pieces that hang together), lamps of lamps, and the parts of a lamp, each with the
 //! ball it lies in, where it shines to and how much (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with
-//! Adaptive Tree Splitting", 2018). It tells the unoccluded light of a part, exactly near by and in one term far away, which
-//! parts have a shadow of their own, and takes samples. Not visibility: that is `direct`.
+//! Adaptive Tree Splitting", 2018). It tells about how much of the light each part brings, and takes samples. Not visibility: that is
+//! `direct`; not which parts have samples of their own: that is `light_cut`.
 
-use std::f32::consts::PI;
-
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::direct::Receiver;
 use super::emitters::Emitter;
-use super::polygon::point_to_triangle;
 
 /// Emissive triangles as a hierarchy.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EmitterTree {
     /// Children after their parents; the first is the root.
     nodes: Vec<Node>,
-    /// Parts of at most this sine of their radius against their distance count as one term.
-    opening: f32,
+    /// The emitters, those of each part side by side.
+    order: Vec<u32>,
 }
 
 /// Some emitters.
@@ -30,14 +27,13 @@ struct Node {
     /// Unit, or zero: by power, where it shines to; no normal differs from it by more than `spread`, a chord.
     axis: Vec3,
     spread: f32,
-    /// Σ radiance · area.
-    light: Vec3,
-    /// Sum of its channels.
+    /// Σ radiance · area, sum of the channels.
     power: f32,
-    /// Σ radiance · area · normal: a column for each channel.
-    moments: Mat3,
     /// Lamps in it, wholly or in part.
     lamps: u32,
+    /// Emitters in it: the first, in the order of all, and how many.
+    first: u32,
+    emitters: u32,
     kind: Kind,
 }
 
@@ -48,27 +44,13 @@ enum Kind {
     Inner([u32; 2]),
 }
 
-/// Up to this many emitters every one is summed exactly wherever it is.
-const EXACT_EMITTERS: usize = 48;
-/// Beyond: one term differs from a part of radius r at distance d by about (r/d)², here a quarter of a per cent, and by (r/d) times what
-/// its normals differ by.
-const OPENING: f32 = 0.05;
-/// A part of which some may look away is opened no further where it can bring no more than this share of what was found before.
-const NEGLIGIBLE: f32 = 0.003;
-/// What one term for a part leaves of the light of a lamp: root of the mean square, as a test measures it.
-const TERM_ERROR: f32 = 0.005;
-/// Most groups of lamps whose shadows are told apart at a receiver.
-const MOST_GROUPS: usize = 16;
-/// Lamps whose common ball has at most this sine cast one shadow.
-const NARROW: f32 = 0.02;
 /// Least share of a cosine in a weight, so that none is 0 where light may arrive.
-const LEAST_COSINE: f32 = 0.02;
+pub(super) const LEAST_COSINE: f32 = 0.02;
 
 impl EmitterTree {
     /// Over all emitters; `lamps[i]` numbers the lamp of emitter i.
     pub fn new(emitters: &[Emitter], lamps: &[u32]) -> Self {
-        let opening = if emitters.len() <= EXACT_EMITTERS { 0.0 } else { OPENING };
-        let mut tree = Self { nodes: Vec::with_capacity(2 * emitters.len()), opening };
+        let mut tree = Self { nodes: Vec::with_capacity(2 * emitters.len()), order: Vec::new() };
         if emitters.is_empty() {
             return tree;
         }
@@ -92,7 +74,7 @@ impl EmitterTree {
             lamps.iter().flat_map(|&lamp| members[lamp as usize].iter().copied()).collect();
         all.sort_unstable();
         let index = self.nodes.len() as u32;
-        self.nodes.push(Node::over(emitters, &all, lamps.len() as u32));
+        self.nodes.push(Node::over(emitters, &all, lamps.len() as u32, self.order.len() as u32));
         let place = |lamp: &u32| middle(emitters, &members[*lamp as usize]);
         let half = split(lamps, place);
         let (near, far) = lamps.split_at_mut(half);
@@ -104,8 +86,10 @@ impl EmitterTree {
     /// A node over some emitters of one lamp.
     fn add(&mut self, emitters: &[Emitter], some: &mut [u32]) -> u32 {
         let index = self.nodes.len() as u32;
-        self.nodes.push(Node::over(emitters, some, 1));
-        if some.len() > 1 {
+        self.nodes.push(Node::over(emitters, some, 1, self.order.len() as u32));
+        if let [emitter] = *some {
+            self.order.push(emitter);
+        } else {
             let half = split(some, |emitter| middle(emitters, &[*emitter]));
             let (near, far) = some.split_at_mut(half);
             let children = [self.add(emitters, near), self.add(emitters, far)];
@@ -114,102 +98,41 @@ impl EmitterTree {
         index
     }
 
-    /// The groups of lamps whose shadows are told apart at a receiver: the brightest that subtend an angle are parted first.
-    pub fn groups(&self, receiver: &Receiver) -> Vec<u32> {
-        let mut groups: Vec<u32> = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
-        while groups.len() < MOST_GROUPS {
-            let weight = |&(_, group): &(usize, &u32)| self.weight(*group, receiver);
-            let parted = groups
-                .iter()
-                .enumerate()
-                .filter(|(_, group)| {
-                    let node = &self.nodes[**group as usize];
-                    node.lamps > 1 && node.radius > NARROW * node.center.distance(receiver.position)
-                })
-                .max_by(|a, b| weight(a).total_cmp(&weight(b)).then(b.1.cmp(a.1)));
-            let Some((place, &group)) = parted else { break };
-            let Kind::Inner(children) = self.nodes[group as usize].kind else { break };
-            groups[place] = children[0];
-            groups.push(children[1]);
-        }
-        groups
+    /// The part that holds all emitters; none where there are none.
+    pub fn root(&self) -> Option<u32> {
+        (!self.nodes.is_empty()).then_some(0)
     }
 
-    /// The emitters of a part, if they are at most `most`.
-    pub fn emitters_of(&self, part: u32, most: usize) -> Option<Vec<u32>> {
-        let (mut found, mut open) = (Vec::new(), vec![part]);
-        while let Some(index) = open.pop() {
-            match self.nodes[index as usize].kind {
-                Kind::Leaf(emitter) => found.push(emitter),
-                Kind::Inner([near, far]) => open.extend([far, near]),
-            }
-            if found.len() + open.len() > most {
-                return None;
-            }
+    /// The two parts of a part, unless it is one emitter.
+    pub fn children(&self, part: u32) -> Option<[u32; 2]> {
+        match self.nodes[part as usize].kind {
+            Kind::Leaf(_) => None,
+            Kind::Inner(children) => Some(children),
         }
-        Some(found)
     }
 
-    /// Irradiance of a part as if nothing were between.
-    pub fn unoccluded(&self, emitters: &[Emitter], part: u32, receiver: &Receiver) -> Vec3 {
-        let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
-        let mut sum = DVec3::ZERO;
-        let mut open = Vec::with_capacity(64);
-        open.push(part);
-        while let Some(index) = open.pop() {
-            let node = &self.nodes[index as usize];
-            let children = match node.kind {
-                Kind::Leaf(emitter) => {
-                    let emitter = &emitters[emitter as usize];
-                    let factor = point_to_triangle(position, normal, &emitter.corners_f64);
-                    sum += emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor);
-                    continue;
-                }
-                Kind::Inner(children) => children,
-            };
-            let towards = node.center - receiver.position;
-            let height = towards.dot(receiver.normal);
-            if height <= -node.radius {
-                continue;
-            }
-            let distance = towards.length();
-            if node.radius < self.opening * distance && height > node.radius {
-                let direction = towards / distance;
-                let (faces, may_differ) = (-direction.dot(node.axis), node.spread + node.radius / distance);
-                if faces + may_differ <= 0.0 {
-                    continue;
-                }
-                let per_power = height / (distance * distance * distance);
-                if faces >= may_differ {
-                    let moment = (node.moments.transpose() * -direction).max(Vec3::ZERO);
-                    sum += moment.as_dvec3() * f64::from(per_power);
-                    continue;
-                }
-                let most = node.power * per_power * (faces + may_differ).min(1.0);
-                if f64::from(most) < f64::from(NEGLIGIBLE) * sum.element_sum() {
-                    // The mean of max(0, cosine) over cosines spread evenly.
-                    let mean = match node.spread > faces.abs() {
-                        true => (faces + node.spread).powi(2) / (4.0 * node.spread),
-                        false => faces.max(0.0),
-                    };
-                    sum += (node.light * (per_power * mean)).as_dvec3();
-                    continue;
-                }
-            }
-            // The brighter first: it tells what is negligible.
-            let [a, b] = children.map(|child| {
-                let child = &self.nodes[child as usize];
-                child.power * (child.spread * distance + (receiver.position - child.center).dot(child.axis))
-            });
-            let [near, far] = children;
-            open.extend(if a > b { [far, near] } else { [near, far] });
-        }
-        sum.as_vec3()
+    /// How many lamps a part holds, wholly or in part.
+    pub fn lamps(&self, part: u32) -> u32 {
+        self.nodes[part as usize].lamps
     }
 
-    /// Relative error of [`unoccluded`](Self::unoccluded).
-    pub fn error(&self) -> f32 {
-        if self.opening > 0.0 { TERM_ERROR } else { 0.0 }
+    /// How many emitters a part holds.
+    pub fn emitters(&self, part: u32) -> u32 {
+        self.nodes[part as usize].emitters
+    }
+
+    /// The sine under which a part's ball, larger by `reach`, appears from a receiver, at most 1.
+    pub fn sine(&self, part: u32, receiver: &Receiver, reach: f32) -> f32 {
+        let node = &self.nodes[part as usize];
+        let distance = node.center.distance(receiver.position);
+        let size = node.radius + reach;
+        if size < distance { size / distance } else { 1.0 }
+    }
+
+    /// The emitters of a part, by number.
+    pub fn emitters_of(&self, part: u32) -> &[u32] {
+        let node = &self.nodes[part as usize];
+        &self.order[node.first as usize..(node.first + node.emitters) as usize]
     }
 
     /// An emitter of a part at `u` in [0, 1), the place within its interval stretched to [0, 1), and its probability: about in
@@ -221,7 +144,7 @@ impl EmitterTree {
                 Kind::Leaf(emitter) => return (emitter as usize, u, probability),
                 Kind::Inner(children) => children,
             };
-            let [a, b] = [near, far].map(|child| self.weight(child, receiver));
+            let [a, b] = [near, far].map(|child| self.weight(child, receiver, 0.0));
             let first = if a + b > 0.0 && (a + b).is_finite() { a / (a + b) } else { 0.5 };
             (index, u) = if u < first { (near, u / first) } else { (far, (u - first) / (1.0 - first)) };
             probability *= if index == near { first } else { 1.0 - first };
@@ -229,35 +152,31 @@ impl EmitterTree {
         }
     }
 
-    /// About what a part brings a receiver; positive.
-    pub fn weight(&self, index: u32, receiver: &Receiver) -> f32 {
+    /// About what a part brings receivers within `reach` of one (irradiance, sum of the channels); positive.
+    pub fn weight(&self, index: u32, receiver: &Receiver, reach: f32) -> f32 {
         let node = &self.nodes[index as usize];
         let towards = node.center - receiver.position;
-        let squared = towards.length_squared() + node.radius * node.radius;
-        let direction = towards.normalize_or_zero();
-        let subtends = node.radius / squared.sqrt();
-        let receives = (direction.dot(receiver.normal) + subtends).clamp(LEAST_COSINE, 1.0);
-        let emits = (node.spread + subtends - direction.dot(node.axis)).clamp(LEAST_COSINE, 1.0);
-        PI * node.power * receives * emits / squared
+        let size = node.radius + reach;
+        let squared = towards.length_squared() + size * size;
+        // Directions are a little short where the part is near: all of it counts there anyway.
+        let inverse = 1.0 / squared.sqrt();
+        let subtends = size * inverse;
+        let receives = (towards.dot(receiver.normal) * inverse + subtends).clamp(LEAST_COSINE, 1.0);
+        let emits = (node.spread + subtends - towards.dot(node.axis) * inverse).clamp(LEAST_COSINE, 1.0);
+        node.power * receives * emits * inverse * inverse
     }
 }
 
 impl Node {
-    fn over(emitters: &[Emitter], some: &[u32], lamps: u32) -> Self {
+    fn over(emitters: &[Emitter], some: &[u32], lamps: u32, first: u32) -> Self {
         let of = |&index: &u32| &emitters[index as usize];
-        let (mut power, mut sum) = (0.0f64, DVec3::ZERO);
+        let mut power = 0.0f64;
         let (mut center, mut axis) = (DVec3::ZERO, DVec3::ZERO);
-        let mut moments = [DVec3::ZERO; 3];
         for emitter in some.iter().map(of) {
-            let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
-            let own = light.element_sum();
+            let own = emitter.radiance.as_dvec3().element_sum() * f64::from(emitter.area);
             power += own;
-            sum += light;
             center += own * emitter.middle().as_dvec3();
             axis += own * emitter.normal.as_dvec3();
-            for (channel, moment) in moments.iter_mut().enumerate() {
-                *moment += light[channel] * emitter.normal.as_dvec3();
-            }
         }
         let middle = middle(emitters, some).as_dvec3();
         let center = if power > 0.0 { center / power } else { middle }.as_vec3();
@@ -265,10 +184,9 @@ impl Node {
         let corners = some.iter().map(of).flat_map(|emitter| emitter.corners);
         let radius = corners.map(|corner| corner.distance(center)).fold(0.0, f32::max);
         let spread = some.iter().map(of).map(|e| e.normal.distance(axis)).fold(0.0, f32::max);
-        let [red, green, blue] = moments.map(|moment| moment.as_vec3());
         let kind = Kind::Leaf(some.first().copied().unwrap_or(0));
-        let moments = Mat3::from_cols(red, green, blue);
-        Self { center, radius, axis, spread, light: sum.as_vec3(), power: power as f32, moments, lamps, kind }
+        let emitters = some.len() as u32;
+        Self { center, radius, axis, spread, power: power as f32, lamps, first, emitters, kind }
     }
 }
 
@@ -279,7 +197,7 @@ fn middle(emitters: &[Emitter], some: &[u32]) -> Vec3 {
 }
 
 /// Orders things along the widest axis of their places; the number that goes to the first half.
-fn split(some: &mut [u32], place: impl Fn(&u32) -> Vec3) -> usize {
+pub(super) fn split(some: &mut [u32], place: impl Fn(&u32) -> Vec3) -> usize {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let mut placed: Vec<(Vec3, u32)> = some.iter().map(|thing| (place(thing), *thing)).collect();
     for (place, _) in &placed {

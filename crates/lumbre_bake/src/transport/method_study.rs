@@ -55,7 +55,7 @@ pub fn form_factor_errors(
     let scene = BakeScene::new(&objects, &layout, space, &mut warnings)?;
     let sources = Sources::new(&scene, lights(world), sky(world));
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-    let patches = Patches::new(&scene, (2.0 * area / options.quality.effort().patches as f32).sqrt());
+    let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut watch = Watch::new(&mut carry_on, None);
     let mut sample = |method, rays, seed| {

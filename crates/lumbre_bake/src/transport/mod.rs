@@ -23,6 +23,8 @@ mod global_lines;
 pub(crate) mod guide;
 #[cfg(test)]
 mod lambert_integral;
+pub(crate) mod light_cut;
+mod light_tree;
 pub(crate) mod lit_part;
 pub(crate) mod method_study;
 mod near_pairs;
@@ -33,6 +35,7 @@ pub(crate) mod polygon;
 pub(crate) mod punctual;
 pub(crate) mod shaft;
 mod share_variance;
+pub(crate) mod shared_samples;
 pub(crate) mod solver;
 mod unoccluded;
 mod unshadowed;

@@ -3,23 +3,20 @@
 //! `direct`.
 
 use glam::{DVec3, Vec3};
-use lumbre_optics::{BakeMode, LightKind, evaluate_light};
+use lumbre_optics::{BakeMode, LightKind};
 
 use super::between::Between;
 use super::cut_out::{GAP, Pieces};
-use super::direct::{Direct, GROUPS, Receiver, Sources, allotted, group_of, variance_of_mean};
+use super::direct::{Direct, GROUPS, Receiver, Sources, group_of, variance_of_mean};
 use super::lit_part::{Shown, Way};
 use super::share_variance::share_variance;
 use super::unoccluded::Unoccluded;
-use super::unshadowed::{Unshadowed, attenuation, of_center, unshadowed};
+use super::unshadowed::{Unshadowed, of_center, unshadowed};
 use crate::sampling::{Sequence, cosine_direction, frame};
 use crate::scene::{BakeScene, PlacedLight};
 
-/// Up to this many lights at a receiver have samples of their own: the brightest. The others share.
-const OWN: usize = 16;
-
 /// Numbers of the lights as sources begin here: before it are parts of emissive surfaces.
-const FIRST_ID: u32 = 1 << 31;
+pub(super) const FIRST_ID: u32 = 1 << 31;
 
 /// Inside the sphere, or near it, its disc is at most this large: a sine. It bounds what one sample weighs to 1/√(1 - this²) = 7.
 const LARGEST_SINE: f64 = 0.99;
@@ -28,12 +25,12 @@ const LARGEST_SINE: f64 = 0.99;
 const HALF_A_ROW: f32 = 0.125;
 
 /// One light as one sample meets it, per unit of its colour: irradiance.
-struct Part {
+pub(super) struct Part {
     /// Of the light's centre, where the receiver faces it.
     center: f32,
     /// Of a point of its disc; not above 0 where that is under the receiver's horizon.
-    disc: f32,
-    visible: bool,
+    pub disc: f32,
+    pub visible: bool,
 }
 
 /// A light at a receiver, by all its samples.
@@ -84,40 +81,20 @@ impl Sum {
 }
 
 impl Sources<'_> {
-    /// Adds the light of all punctual lights to `direct`: mean over a receiver, by about `samples` shadow rays to each of the
-    /// brightest and as many to the others together; by none to those for which it is known what may stand `between`.
+    /// Adds the light of some punctual lights, by number, to `direct`: mean over a receiver, by `samples` shadow rays to each; by none to those
+    /// for which it is known what may stand `between`.
     pub(super) fn punctual(
         &self,
+        lights: &[u32],
         between: &Between<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) {
-        if self.has_few_lights() {
-            for index in 0..self.lights.len() as u32 {
-                self.one(index, between, sequence, samples, point, direct);
-            }
-            return;
+        for &index in lights {
+            self.one(index, between, sequence, samples, point, direct);
         }
-        let Some(lights) = self.brightness(point) else { return };
-        let (lights, others) = brightest(lights);
-        let most = lights.iter().map(|(_, weight)| *weight).fold(f32::MIN_POSITIVE, f32::max);
-        for (index, weight) in lights {
-            self.one(index, between, sequence, allotted(samples, weight / most), point, direct);
-        }
-        self.others(others, sequence, samples, point, direct);
-    }
-
-    /// Whether every light has samples of its own.
-    pub fn has_few_lights(&self) -> bool {
-        self.lights.len() <= OWN
-    }
-
-    /// The lights that may reach a receiver, by ascending numbers; of many those that may bring it the most.
-    pub fn brightest_lights(&self, point: &impl Fn(f32, f32) -> Option<Receiver>) -> Vec<u32> {
-        let lights = self.brightness(point).unwrap_or_default();
-        brightest(lights).0.into_iter().map(|(index, _)| index).collect()
     }
 
     fn one(
@@ -220,114 +197,6 @@ impl Sources<'_> {
         let by_points = if hidden > 0 && !exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
         (mean, variance * lit * lit + by_points)
     }
-
-    /// Lights with their weights, each sample to one of them.
-    fn others(
-        &self,
-        mut lights: Vec<(u32, f32)>,
-        sequence: Sequence,
-        samples: u32,
-        point: &impl Fn(f32, f32) -> Option<Receiver>,
-        direct: &mut Direct,
-    ) {
-        if lights.is_empty() {
-            return;
-        }
-        lights.sort_unstable_by_key(|(index, _)| *index);
-        let sum: f64 = lights.iter().map(|(_, weight)| f64::from(*weight)).sum();
-        let mut running = 0.0;
-        let ends: Vec<f32> = lights
-            .iter()
-            .map(|(_, weight)| {
-                running += f64::from(*weight);
-                (running / sum) as f32
-            })
-            .collect();
-        let (mut visible, mut hidden) = (0, 0);
-        let mut groups = [0.0f32; GROUPS];
-        let per_sample = 1.0 / samples.max(1) as f32;
-        for sample in 0..samples {
-            let [x, y, u, v] = sequence.point(sample, 33);
-            let Some(receiver) = point(x, y) else { continue };
-            let at = ends.partition_point(|&end| end <= u).min(ends.len() - 1);
-            let start = if at == 0 { 0.0 } else { ends[at - 1] };
-            let probability = (ends[at] - start).max(f32::MIN_POSITIVE);
-            let u = ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON);
-            let light = &self.lights[lights[at].0 as usize];
-            let Some(part) = part(self.scene, light, &receiver, (u, v), false) else { continue };
-            if !part.visible {
-                hidden += 1;
-                continue;
-            }
-            visible += 1;
-            let seen = light.light.diffuse * (part.disc / probability);
-            match light.light.bake {
-                BakeMode::Static => {
-                    direct.baked += seen * per_sample;
-                    groups[group_of(sample, samples)] += seen.element_sum() / 3.0;
-                }
-                BakeMode::Mixed | BakeMode::Dynamic => direct.mixed += seen * per_sample,
-            }
-        }
-        direct.rays += visible + hidden;
-        direct.sampled = true;
-        // Which lights these are differs from receiver to receiver: only a part tells of a shadow.
-        direct.seen.add(FIRST_ID - 1, visible, hidden);
-        direct.variance += variance_of_mean(groups.map(|sum| sum * per_sample * GROUPS as f32));
-    }
-
-    /// The lights that may reach a receiver, by number, each with about what it brings: never 0 where any of its points gets light.
-    fn brightness(&self, point: &impl Fn(f32, f32) -> Option<Receiver>) -> Option<Vec<(u32, f32)>> {
-        let anchor = point(0.5, 0.5)?;
-        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
-        let reach = corners.iter().filter_map(|&(x, y)| point(x, y));
-        // Twice, since a footprint of points may not have its farthest in the corners.
-        let size = 2.0 * reach.map(|p| p.position.distance(anchor.position)).fold(0.0, f32::max);
-        let space = self.scene.space;
-        let (position, size) = (space.world(anchor.position), f64::from(size) / space.scale);
-        let normal = anchor.normal.as_dvec3();
-        let weight = |(index, placed): (usize, &PlacedLight)| {
-            let light = &placed.light;
-            let away = if light.kind == LightKind::Directional {
-                0.0
-            } else {
-                let away = placed.position.distance(position);
-                if away - size > f64::from(light.attenuation.range) {
-                    return None;
-                }
-                away
-            };
-            let arriving = evaluate_light(light, placed.position, placed.axis, position);
-            let attenuation = match light.kind {
-                LightKind::Directional => 1.0,
-                // Not as far as its range ends.
-                _ => attenuation(
-                    light,
-                    (away - size).max((0.25 * away).min(0.5 * f64::from(light.attenuation.range))),
-                ),
-            };
-            // Raised by what the receiver and the light subtend, and above 0 everywhere.
-            let spread = if away > 0.0 { (size + f64::from(light.radius)) / away } else { 0.0 };
-            let cosine = (arriving.direction.dot(normal) + spread).clamp(0.02, 1.0);
-            let strength = attenuation * arriving.spot.max(0.02) * cosine;
-            let weight = f64::from(light.diffuse.element_sum()) * strength;
-            (weight > 0.0).then_some((index as u32, weight.min(f64::from(f32::MAX)) as f32))
-        };
-        Some(self.lights.iter().enumerate().filter_map(weight).collect())
-    }
-}
-
-/// Lights by their numbers, with about what they bring.
-type Weighted = Vec<(u32, f32)>;
-
-/// Those of which each has samples of its own, by number, and the others.
-fn brightest(mut lights: Weighted) -> (Weighted, Weighted) {
-    if lights.len() > OWN {
-        lights.select_nth_unstable_by(OWN, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    }
-    let others = lights.split_off(OWN.min(lights.len()));
-    lights.sort_unstable_by_key(|(index, _)| *index);
-    (lights, others)
 }
 
 /// What a point of a receiver gets of a light whose disc is sampled at (u, v) of the unit square; `None` where it gets nothing
@@ -336,7 +205,7 @@ fn brightest(mut lights: Weighted) -> (Weighted, Weighted) {
 /// The disc is that of directions within the sphere's silhouette, sin θ = radius / distance, sampled evenly in its projection onto
 /// the plane across the axis to its centre. With ω the direction, E = strength · ⟨V n·ω / a·ω⟩: a sphere of one radiance gives
 /// exactly n·a where it is whole above the horizon, as a point does.
-fn part(
+pub(super) fn part(
     scene: &BakeScene,
     placed: &PlacedLight,
     receiver: &Receiver,

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::texels::footprint::Texel;
+use super::footprint::Texel;
 
 /// Blocks of texels that are not hidden.
 pub(crate) struct Blocks {

@@ -1,0 +1,201 @@
+//! Direct light of the sources that share samples, of every covered texel: a few samples everywhere, smoothed over neighbours that have the
+//! same light cut, then more where they are worth most, until what direct light may leave of the error asked for is reached. Not the
+//! samples: those are `shared_samples`'; not the sources that have samples of their own: those are `lighting`'s.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::allocation::{Allotment, allot};
+use super::chunks::{in_chunks, in_chunks_in_time};
+use super::error_estimate::spread;
+use super::footprint::{Texel, receiver};
+use super::gather::SCRAMBLES;
+use super::light_cuts::LightCuts;
+use super::local_light::LocalLight;
+use super::smooth::{Estimates, mean, smooth};
+use super::surroundings::Surroundings;
+use super::tile_sequence::TileSequence;
+use crate::progress::Watch;
+use crate::sampling::hash;
+use crate::transport::direct::{Direct, Sources};
+use crate::transport::light_cut::Rest;
+use crate::{BakeError, BakeOptions};
+
+/// What a texel has found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shared {
+    /// Sum of the samples of each scramble, of what is baked.
+    pub sums: [Vec3; SCRAMBLES],
+    /// Sum of all samples, of mixed lights.
+    pub mixed: Vec3,
+    /// Sum of 1 / distance to what was asked, canonical units.
+    pub inverse_distances: f32,
+    /// Samples of each scramble.
+    pub samples: u32,
+    /// Rays cast.
+    pub rays: u32,
+}
+
+/// Purposes of the scrambles' sequences begin here.
+const PURPOSE: u32 = 96;
+/// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
+const ORDER: f64 = 1.25;
+/// A round's usual share of the time that this one and those after it take.
+const PASS: f32 = 0.6;
+
+impl Shared {
+    fn estimates(&self) -> Estimates {
+        self.sums.map(|sum| sum / self.samples.max(1) as f32)
+    }
+
+    fn inverse_distance(&self) -> f32 {
+        self.inverse_distances / (self.samples.max(1) * SCRAMBLES as u32) as f32
+    }
+
+    /// Adds samples up to `samples` of each scramble.
+    fn add(&mut self, sources: &Sources<'_>, rest: &Rest, texel: &Texel, run: u32, samples: u32, seed: u32) {
+        for (scramble, sum) in self.sums.iter_mut().enumerate() {
+            let sequence = TileSequence::new(seed, PURPOSE + scramble as u32, texel, run);
+            for sample in self.samples..samples {
+                let [x, y, ..] = sequence.first(sample);
+                let Some(point) = texel.point(sources.scene, x, y) else { continue };
+                let receiver = receiver(sources.scene, &point);
+                let [choice, u, v, _] = sequence.point(sample, 1);
+                let found = sources.sample(rest, &receiver, [choice, u, v]);
+                *sum += found.baked;
+                self.mixed += found.mixed;
+                self.inverse_distances += found.inverse_distance;
+                self.rays += u32::from(found.asked);
+            }
+        }
+        self.samples = self.samples.max(samples);
+    }
+}
+
+/// The texels, as this stage needs them.
+pub(crate) struct SharedLight<'a> {
+    sources: &'a Sources<'a>,
+    texels: &'a [Texel],
+    cuts: &'a LightCuts,
+    surroundings: Surroundings<'a>,
+    options: &'a BakeOptions,
+    /// Samples of each scramble: in the first round, and at most.
+    first: u32,
+    most: u32,
+    pub found: Vec<Shared>,
+}
+
+impl<'a> SharedLight<'a> {
+    /// The first round: a few samples of every texel that is `wanted`, by its place.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
+    pub fn new(
+        sources: &'a Sources<'a>,
+        surroundings: Surroundings<'a>,
+        cuts: &'a LightCuts,
+        wanted: impl Fn(usize) -> bool + Sync,
+        options: &'a BakeOptions,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, BakeError> {
+        let texels = surroundings.texels;
+        let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(SCRAMBLES as u32));
+        let mut light =
+            Self { sources, texels, cuts, surroundings, options, first, most, found: Vec::new() };
+        light.found = in_chunks(texels.len(), watch, |place| {
+            let mut own = Shared::default();
+            if wanted(place) {
+                light.add(place, &mut own, first);
+            }
+            own
+        })?;
+        Ok(light)
+    }
+
+    fn add(&self, place: usize, own: &mut Shared, samples: u32) {
+        let (texel, rest) = (&self.texels[place], &self.cuts.of(place).rest);
+        if !texel.is_hidden() && !rest.is_empty() {
+            own.add(self.sources, rest, texel, self.first, samples, hash(self.options.seed ^ PURPOSE));
+        }
+    }
+
+    /// What is known so far, without smoothing, in addition to the light of the sources that have samples of their own.
+    pub fn with(&self, direct: &[Direct]) -> Vec<Direct> {
+        let both = |(direct, own): (&Direct, &Shared)| {
+            let mut both = *direct;
+            both.baked += mean(&own.estimates());
+            both
+        };
+        direct.par_iter().zip(&self.found).map(both).collect()
+    }
+
+    /// More rounds, and what they bring, added to `direct`. `goal` is the sum over all texels of squared errors, relative to the light around
+    /// them, that may be left.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
+    pub fn finish(
+        mut self,
+        direct: &mut [Direct],
+        local: &LocalLight,
+        goal: f64,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), BakeError> {
+        let (estimates, variances) = loop {
+            let raw: Vec<Estimates> = self.found.par_iter().map(Shared::estimates).collect();
+            let (estimates, bias) = match self.options.denoise {
+                true => {
+                    let near: Vec<f32> = self.found.par_iter().map(Shared::inverse_distance).collect();
+                    smooth(&self.surroundings, &raw, &near)
+                }
+                false => (raw, vec![0.0; self.found.len()]),
+            };
+            watch.advance(1.0)?;
+            let spread = spread(&self.surroundings, &estimates);
+            let variances: Vec<f32> = spread.iter().zip(&bias).map(|(spread, bias)| spread + bias).collect();
+            let relative = local.relative(&variances);
+            let asked = |place: &u32| self.found[*place as usize].samples > 0;
+            let places = (0..self.texels.len() as u32).filter(asked);
+            let left: f64 = places.clone().map(|place| f64::from(relative[place as usize])).sum();
+            {
+                let open = self.texels.iter().filter(|t| !t.is_hidden()).count() as f64;
+                let sp: f64 = local.relative(&spread).iter().map(|&x| f64::from(x)).sum();
+                let bi: f64 = local.relative(&bias).iter().map(|&x| f64::from(x)).sum();
+                let n: f64 = self.found.iter().map(|f| f64::from(f.samples)).sum::<f64>();
+                let mut sorted = relative.clone();
+                sorted.sort_by(f32::total_cmp);
+                let at = |q: f64| sorted[(q * (sorted.len() - 1) as f64) as usize].sqrt();
+                eprintln!("DBG shared {:.2}s: left {:.4} goal {:.4} spread {:.4} bias {:.4} samples/texel {:.1} p50 {:.4} p90 {:.4} p99 {:.4} p999 {:.4} max {:.3}", watch.seconds(), (left/open).sqrt(), (goal/open).sqrt(), (sp/open).sqrt(), (bi/open).sqrt(), 4.0*n/open, at(0.5), at(0.9), at(0.99), at(0.999), at(1.0));
+            }
+            if left <= goal || watch.clock().late() {
+                break (estimates, variances);
+            }
+            let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
+            let wanted: Vec<Allotment> = allot(places, &relative, &samples, self.most, ORDER, goal);
+            watch.pass(PASS);
+            let more = in_chunks_in_time(wanted.len(), watch, |index| {
+                let Allotment { index: place, samples } = wanted[index];
+                let mut own = self.found[place as usize];
+                self.add(place as usize, &mut own, samples);
+                own
+            })?;
+            if more.is_empty() {
+                break (estimates, variances);
+            }
+            for (allotted, own) in wanted.iter().zip(more) {
+                self.found[allotted.index as usize] = own;
+            }
+        };
+        let found = estimates.iter().zip(&variances).zip(&self.found);
+        for (direct, ((estimates, variance), own)) in direct.iter_mut().zip(found) {
+            if own.samples > 0 {
+                direct.baked += mean(estimates).max(Vec3::ZERO);
+                direct.mixed += own.mixed / (own.samples * SCRAMBLES as u32) as f32;
+                direct.variance += variance;
+                direct.rays += own.rays;
+                direct.sampled = true;
+            }
+        }
+        Ok(())
+    }
+}
