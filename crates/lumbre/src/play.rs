@@ -13,9 +13,6 @@ use crate::arguments::Play;
 use crate::loading::load;
 use crate::output::progress_bar;
 
-/// Frames of the tour, and their size.
-const TOUR: (u32, (u32, u32)) = (12, (960, 540));
-
 /// Runs the command.
 pub fn run(asked: &Play) -> anyhow::Result<()> {
     let level = match &asked.level {
@@ -23,8 +20,7 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
         None => demo_level()?,
     };
     if asked.headless || !demo::has_display() {
-        let (frames, size) = TOUR;
-        let paths = demo::tour(&level, &asked.frames_dir, frames, size)?;
+        let paths = demo::tour(&level, &asked.frames_dir, asked.frames, asked.size)?;
         let mut out = std::io::stdout().lock();
         for path in paths {
             writeln!(out, "{}", path.display())?;
