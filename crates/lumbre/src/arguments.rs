@@ -169,6 +169,9 @@ pub struct Bake {
     /// Prints the report as JSON.
     #[arg(long)]
     pub json: bool,
+    /// Says nothing of how far it is: no bar, and in a pipe no line every ten seconds.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

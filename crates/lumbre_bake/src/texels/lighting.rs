@@ -26,7 +26,7 @@ pub(crate) fn direct_light(
     let scene = sources.scene;
     let known = |index: u32| known.get(index as usize).copied().flatten();
     let [few, many, most] = options.quality.effort().direct;
-    let shafts = Shafts::new(scene, sources, texels, |index| known(index).is_none());
+    let shafts = watch.during(0.0, || Shafts::new(scene, sources, texels, |index| known(index).is_none()))?;
     let light = |place: usize, samples: u32| {
         let texel = &texels[place];
         if texel.is_hidden() {

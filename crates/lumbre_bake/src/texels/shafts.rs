@@ -51,11 +51,11 @@ impl<'a> Shafts<'a> {
         }
         let Tiles { members, tile_of } = Tiles::new(texels);
         shafts.tile_of = tile_of;
-        let tree = BoxTree::new(&scene.triangles);
+        let tree = BoxTree::new(&scene.triangles, &scene.stop);
         shafts.tiles = members
             .par_iter()
             .map(|members| {
-                if !members.iter().any(|&place| wanted(place)) {
+                if scene.stop.is_set() || !members.iter().any(|&place| wanted(place)) {
                     return OfTile::default();
                 }
                 let members = || members.iter().map(|&place| &texels[place as usize]);

@@ -52,7 +52,8 @@ impl<'a> Surroundings<'a> {
         let ground = places.iter().map(|&place| {
             texels.get(place as usize).map_or(NONE, |texel| surface_of[texel.triangle as usize])
         });
-        let grid = Grid::new(sizes, ground, surfaces);
+        let mut grid = Grid::new(sizes, ground, surfaces);
+        grid.stop = scene.stop.clone();
         let (mut first_rows, mut firsts) = (Vec::new(), Vec::new());
         for map in &layout.maps {
             first_rows.push(firsts.len());

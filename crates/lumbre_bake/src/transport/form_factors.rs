@@ -13,6 +13,7 @@ use super::{cosine_rays, global_lines};
 use crate::BakeError;
 use crate::progress::Watch;
 use crate::scene::BakeScene;
+use crate::stop::Stop;
 
 /// How form factors are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,6 +46,8 @@ pub(crate) struct FormFactors {
     pub exact: usize,
     /// Share of all exchange that was cut so that no row exceeds 1.
     pub energy_lost: f64,
+    /// Whether nobody waits for what is solved with it any more.
+    pub stop: Stop,
 }
 
 impl FormFactors {
@@ -65,18 +68,28 @@ impl FormFactors {
             FormFactorMethod::CosineRays => cosine_rays::cast(scene, patches, rays, seed, watch)?,
             FormFactorMethod::GlobalLines => global_lines::cast(scene, patches, rays, seed, watch)?,
         };
+        watch.during(1.0, || Self::of_counts(scene, patches, &cast, rays, seed))
+    }
+
+    fn of_counts(
+        scene: &BakeScene,
+        patches: &Patches,
+        cast: &[Cast],
+        rays: u64,
+        seed: u32,
+    ) -> (Self, [Self; 2]) {
         let [whole, even, odd] =
             [|cast: &Cast| cast.whole(), |cast: &Cast| cast.half(0), |cast: &Cast| cast.half(1)]
                 .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
         let areas = || patches.list.iter().map(|patch| patch.area).collect();
         let (counted, _) = pool(&whole, &NearPairs::default(), areas());
-        let near = near_pairs(scene, patches, &counted, &cast, seed);
-        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near);
+        let near = near_pairs(scene, patches, &counted, cast, seed);
+        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near, &scene.stop);
         let ((even, odd), mut whole) =
             rayon::join(|| rayon::join(|| pooled(&even), || pooled(&odd)), || pooled(&whole));
         let halves = [even, odd];
         (whole.rays, whole.exact) = (rays, near.count());
-        Ok((whole, halves))
+        (whole, halves)
     }
 
     /// Of patches that exchange nothing.
@@ -88,8 +101,9 @@ impl FormFactors {
     }
 
     /// The matrix of some of the rays.
-    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs) -> Self {
+    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs, stop: &Stop) -> Self {
         let (mut factors, exact) = pool(counts, near, areas);
+        factors.stop = stop.clone();
         factors.open = counts.iter().map(Counts::open).collect();
         let sky = |own: &Counts| own.missed as f32 / (own.count - own.inside).max(1) as f32;
         factors.sky = counts.iter().map(sky).collect();
@@ -134,6 +148,9 @@ impl FormFactors {
         let exact_sums = self.sums(|k| exact[k]);
         let mut scale = vec![1.0f64; self.len()];
         for _ in 0..ROUNDS {
+            if self.stop.is_set() {
+                break;
+            }
             let next: Vec<f64> = (0..self.len())
                 .into_par_iter()
                 .map(|i| {

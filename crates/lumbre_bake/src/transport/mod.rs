@@ -24,6 +24,7 @@ pub(crate) mod guide;
 #[cfg(test)]
 mod lambert_integral;
 pub(crate) mod lit_part;
+mod mean_of_points;
 pub(crate) mod method_study;
 mod near_pairs;
 #[cfg(test)]

@@ -43,7 +43,9 @@ impl<'a> EdgeGrid<'a> {
     }
 
     /// Edges that may touch an edge, each pair once: the longer ones, and of its own class those before it. Ascending.
-    pub fn near(&self, index: u32) -> Vec<u32> {
+    ///
+    /// With them comes whether there may be more.
+    pub fn near(&self, index: u32) -> (Vec<u32>, bool) {
         let edge = &self.edges[index as usize];
         let own = class(edge, self.reach);
         let mut found = Vec::new();
@@ -55,8 +57,9 @@ impl<'a> EdgeGrid<'a> {
         }
         found.sort_unstable();
         found.dedup();
+        let crowded = found.len() >= MOST_CANDIDATES;
         found.truncate(MOST_CANDIDATES);
-        found
+        (found, crowded)
     }
 }
 
@@ -104,7 +107,7 @@ mod tests {
         }
         let grid = EdgeGrid::new(&edges, 1e-6);
         let pairs: Vec<(u32, u32)> = (0..edges.len() as u32)
-            .flat_map(|index| grid.near(index).into_iter().map(move |other| (index, other)))
+            .flat_map(|index| grid.near(index).0.into_iter().map(move |other| (index, other)))
             .collect();
         for short in (1..edges.len() as u32).step_by(2) {
             let with_the_long = pairs.iter().filter(|&&(a, b)| (a, b) == (short, 0) || (a, b) == (0, short));
