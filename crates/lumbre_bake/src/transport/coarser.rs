@@ -72,6 +72,9 @@ fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors
         .map_init(
             || vec![0.0f64; areas.len()],
             |exchange, members| {
+                if factors.stop.is_set() {
+                    return Vec::new();
+                }
                 let mut touched = Vec::new();
                 for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
                     let large = within[other];

@@ -82,7 +82,7 @@ impl FormFactors {
             [|cast: &Cast| cast.whole(), |cast: &Cast| cast.half(0), |cast: &Cast| cast.half(1)]
                 .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
         let areas = || patches.list.iter().map(|patch| patch.area).collect();
-        let (counted, _) = pool(&whole, &NearPairs::default(), areas());
+        let (counted, _) = pool(&whole, &NearPairs::default(), areas(), &scene.stop);
         let near = near_pairs(scene, patches, &counted, cast, seed);
         let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near, &scene.stop);
         let ((even, odd), mut whole) =
@@ -102,8 +102,7 @@ impl FormFactors {
 
     /// The matrix of some of the rays.
     fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs, stop: &Stop) -> Self {
-        let (mut factors, exact) = pool(counts, near, areas);
-        factors.stop = stop.clone();
+        let (mut factors, exact) = pool(counts, near, areas, stop);
         factors.open = counts.iter().map(Counts::open).collect();
         let sky = |own: &Counts| own.missed as f32 / (own.count - own.inside).max(1) as f32;
         factors.sky = counts.iter().map(sky).collect();
@@ -197,7 +196,7 @@ impl FormFactors {
 
     /// By a factor of an entry's place, row and column.
     fn multiply(&mut self, factor: impl Fn(usize, usize, usize) -> f64) {
-        for i in 0..self.areas.len() {
+        for i in (0..self.areas.len()).take_while(|_| !self.stop.is_set()) {
             for k in self.starts[i]..self.starts[i + 1] {
                 self.exchange[k] =
                     (f64::from(self.exchange[k]) * factor(k, i, self.columns[k] as usize)) as f32;
@@ -295,11 +294,14 @@ pub(super) fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
 /// Both directions of a pair count the same flux: N_ij has mean R_i G/A_i, N_ji has mean R_j G/A_j. The best estimate of
 /// G from two Poisson counts is their sum over the sum of their rates. (A line counts in both directions, which weighs the same.) Pairs whose
 /// exchange is known have that instead; with the entries comes which of them do.
-fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>) -> (FormFactors, Vec<bool>) {
-    let incoming = Incoming::new(counts);
+fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>, stop: &Stop) -> (FormFactors, Vec<bool>) {
+    let incoming = Incoming::new(counts, stop);
     let rates: Vec<f64> =
         counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
     let row = |i: usize| -> Vec<(u32, f32, bool)> {
+        if stop.is_set() {
+            return Vec::new();
+        }
         let (out, into, known) = (&counts[i].met[..], incoming.row(i), near.row(i));
         let (mut x, mut y, mut z) = (0, 0, 0);
         let mut row = Vec::with_capacity(out.len() + into.len() + known.len());
@@ -326,7 +328,7 @@ fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>) -> (FormFactors, V
             }
         }
     };
-    let mut factors = FormFactors { starts: vec![0], ..FormFactors::default() };
+    let mut factors = FormFactors { starts: vec![0], stop: stop.clone(), ..FormFactors::default() };
     let mut exact = Vec::new();
     // Some rows at a time, so that they are not all there twice.
     for first in (0..counts.len()).step_by(ROWS) {
@@ -352,7 +354,7 @@ struct Incoming {
 }
 
 impl Incoming {
-    fn new(counts: &[Counts]) -> Self {
+    fn new(counts: &[Counts], stop: &Stop) -> Self {
         let mut starts = vec![0usize; counts.len() + 1];
         for &(met, _) in counts.iter().flat_map(|own| &own.met) {
             starts[met as usize + 1] += 1;
@@ -362,7 +364,7 @@ impl Incoming {
         }
         let mut next = starts.clone();
         let mut list = vec![(0, 0); starts.last().copied().unwrap_or(0)];
-        for (i, own) in counts.iter().enumerate() {
+        for (i, own) in counts.iter().enumerate().take_while(|_| !stop.is_set()) {
             for &(met, n) in &own.met {
                 list[next[met as usize]] = (i as u32, n);
                 next[met as usize] += 1;

@@ -113,7 +113,13 @@ mod tests {
             let with_the_long = pairs.iter().filter(|&&(a, b)| (a, b) == (short, 0) || (a, b) == (0, short));
             assert_eq!(with_the_long.count(), 1);
         }
+        assert!((0..edges.len() as u32).all(|index| !grid.near(index).1));
         // Neighbours only: far from all pairs.
         assert!(pairs.len() < 100 + 2 * 100 * 4, "{}", pairs.len());
+        // Too many in one place are told.
+        let stacked = vec![edges[0]; MOST_CANDIDATES + 2];
+        let grid = EdgeGrid::new(&stacked, 1e-6);
+        let (found, crowded) = grid.near(MOST_CANDIDATES as u32 + 1);
+        assert!(crowded && found.len() == MOST_CANDIDATES && !grid.near(5).1);
     }
 }
