@@ -314,6 +314,27 @@ mod tests {
     }
 
     #[test]
+    fn what_runs_apart_is_waited_for_or_left_to_itself() {
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let slow = || {
+            std::thread::sleep(3 * TICK);
+            7
+        };
+        assert_eq!(Watch::new(&mut carry_on, None).apart(0.0, slow), Ok(7));
+        let (mut no_more, begun) = (|_| ControlFlow::Break(()), Instant::now());
+        let ended = Watch::new(&mut no_more, None).apart(0.0, || std::thread::sleep(Duration::from_secs(60)));
+        assert_eq!(ended, Err(BakeError::Cancelled { stage: "layout" }));
+        assert!(begun.elapsed() < Duration::from_secs(30));
+    }
+
+    #[test]
+    #[should_panic(expected = "as it should")]
+    fn a_panic_apart_is_the_callers() {
+        let mut callback = |_| ControlFlow::Continue(());
+        let _ = Watch::new(&mut callback, None).apart(0.0, || panic!("as it should"));
+    }
+
+    #[test]
     #[should_panic(expected = "as it should")]
     fn a_panic_of_the_work_ends_the_asking() {
         let mut callback = |_| ControlFlow::Continue(());

@@ -1,5 +1,6 @@
 //! Hands the crate one number for all that a baked texel depends on: see `sources`.
 
+#[path = "build/sources.rs"]
 mod sources;
 
 use std::path::PathBuf;
@@ -7,6 +8,7 @@ use std::path::PathBuf;
 fn main() -> std::io::Result<()> {
     let own = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     let sources = sources::Sources::of(&own)?;
+    println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=build");
     for path in &sources.watched {
         println!("cargo::rerun-if-changed={}", path.display());
