@@ -21,6 +21,9 @@ pub(super) fn ways(sources: &Sources<'_>, area: &Area, texel_side: f32, tree: &B
     };
     let arriving = sources.brightest_lights(&point);
     let of_light = |(index, placed): (usize, &PlacedLight)| {
+        if sources.scene.stop.is_set() {
+            return None;
+        }
         let index = index as u32;
         let way = match arriving.binary_search(&index) {
             Ok(_) if is_even(sources.scene, placed, area, texel_side) => {

@@ -84,6 +84,9 @@ impl<'a> Shafts<'a> {
             let emitters = self.sources.emitters_of(part)?;
             let mut found = Vec::new();
             for emitter in emitters {
+                if self.scene.stop.is_set() {
+                    return None;
+                }
                 if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {
                     found.push((emitter, shaft.triangles(self.scene, tree, MOST_BLOCKERS)?));
                 }
