@@ -117,33 +117,6 @@ fn one_wgpu_one_winit_one_glam_are_built() {
     }
 }
 
-#[test]
-fn files_hold_one_concept_each() {
-    let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    let mut lengths = Vec::new();
-    let mut folders = vec![root.join("crates"), root.join("shaders"), root.join("tests")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs" || e == "wesl" || e == "wgsl") {
-                let lines = std::fs::read_to_string(&path).unwrap().lines().count();
-                lengths.push((lines, path));
-            }
-        }
-    }
-    lengths.sort();
-    let (median, _) = &lengths[lengths.len() / 2];
-    assert!(*median <= 200, "the median file has {median} lines");
-    // A list of cases may be longer than a concept.
-    let limit = |path: &std::path::Path| {
-        if path.components().any(|part| part.as_os_str() == "tests") { 600 } else { 400 }
-    };
-    let long: Vec<_> = lengths.iter().filter(|(lines, path)| *lines > limit(path)).collect();
-    assert!(long.is_empty(), "files that hold more than one concept: {long:?}");
-}
-
 /// Where the links of a Markdown page lead, each with the inline code that follows it up to the next link or the end of the line.
 fn links(page: &str) -> Vec<(String, Vec<String>)> {
     let mut found = Vec::new();

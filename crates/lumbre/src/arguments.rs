@@ -65,6 +65,12 @@ pub struct Play {
     /// Where the tour's frames go.
     #[arg(long, value_name = "DIR", default_value = "frames")]
     pub frames_dir: PathBuf,
+    /// How many frames the tour has.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Width and height of the tour's frames in pixels.
+    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
+    pub size: (u32, u32),
     /// Plays back recorded input (JSON) instead of the keyboard and mouse.
     #[arg(long, value_name = "FILE")]
     pub input: Option<PathBuf>,
@@ -163,6 +169,9 @@ pub struct Bake {
     /// Prints the report as JSON.
     #[arg(long)]
     pub json: bool,
+    /// Says nothing of how far it is: no bar, and in a pipe no line every ten seconds.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

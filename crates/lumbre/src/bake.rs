@@ -4,8 +4,6 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -18,9 +16,10 @@ use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
 use crate::bake_record::{Asked, BakeRecord, hash_of_files};
+use crate::interruption::Interruption;
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{extension, load_with_files};
-use crate::output::progress_bar;
+use crate::progress::Shown;
 
 /// Runs the command.
 pub fn run(asked: &Bake) -> anyhow::Result<()> {
@@ -47,7 +46,9 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
         ..Checkpoint::new(checkpoint_path(&asked.output), asked.resume)
     };
     let former = if asked.no_reuse { None } else { former_samples(&asked.output) };
-    let (report, samples) = interruptible(&mut world, &options, former.as_ref(), &checkpoint, &asked.output)?;
+    let interruption = Interruption::handle();
+    let (report, samples) =
+        interruptible(&interruption, &mut world, &options, former.as_ref(), &checkpoint, asked)?;
     let saved = save_with(&mut world, &asked.output, &files)
         .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
@@ -154,11 +155,12 @@ fn keep_samples(asked: &Bake, samples: Option<&Samples>) {
 
 /// Bakes, until the end or the first interruption.
 fn interruptible(
+    interruption: &Interruption,
     world: &mut World,
     options: &BakeOptions,
     former: Option<&Samples>,
     checkpoint: &Checkpoint,
-    output: &Path,
+    asked: &Bake,
 ) -> anyhow::Result<(BakeReport, Option<Samples>)> {
     if !checkpoint.resume && checkpoint.path.exists() {
         eprintln!(
@@ -166,30 +168,21 @@ fn interruptible(
             checkpoint.path.display()
         );
     }
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked_to = Arc::clone(&stop);
-    let handled = ctrlc::set_handler(move || {
-        // Whoever asks twice does not want to wait for the checkpoint.
-        if asked_to.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
-        }
+    interruption.say(format!("interrupted; {}", how_to_continue(&checkpoint.path)));
+    let mut shown = Shown::new(asked.quiet);
+    let baked = interruption.told(|is_asked| {
+        rebake(world, options, former, Some(checkpoint), &mut |progress| {
+            shown.update(progress);
+            if is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
     });
-    if let Err(error) = handled {
-        eprintln!("lumbre: warning: an interruption will end the bake at once: {error}");
-    }
-    let bar = progress_bar();
-    let baked = rebake(world, options, former, Some(checkpoint), &mut |progress| {
-        bar.set_message(progress.stage);
-        bar.set_position((progress.fraction * 1000.0) as u64);
-        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    bar.finish_and_clear();
+    shown.finish();
     match baked {
         Ok(done) => Ok(done),
         Err(BakeError::Cancelled { stage }) => {
             bail!(
                 "interrupted during {stage}; {} is as it was; {}",
-                output.display(),
+                asked.output.display(),
                 how_to_continue(&checkpoint.path)
             )
         }

@@ -4,10 +4,12 @@ mod arguments;
 mod bake;
 mod bake_record;
 mod explain;
+mod interruption;
 mod lightmap_report;
 mod loading;
 mod output;
 mod play;
+mod progress;
 mod render;
 
 use std::io::IsTerminal;

@@ -1,10 +1,8 @@
-//! Files and progress: nothing half-written under a final name, a bar on a terminal, silence in a pipe.
+//! Files: nothing half-written under a final name.
 
-use std::io::IsTerminal;
 use std::path::Path;
 
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
 
 /// Writes a file beside its final name and renames it.
 pub fn write_file(path: &Path, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
@@ -20,16 +18,4 @@ pub fn write_file(path: &Path, write: impl FnOnce(&Path) -> anyhow::Result<()>) 
         let _ = std::fs::remove_file(&beside);
     }
     written.with_context(|| format!("{} could not be written", path.display()))
-}
-
-/// A bar on standard error; hidden unless that is a terminal.
-pub fn progress_bar() -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new(1000);
-    if let Ok(style) = ProgressStyle::with_template("{msg:22} {wide_bar} {percent:>3} % {eta:>4} left") {
-        bar.set_style(style);
-    }
-    bar
 }

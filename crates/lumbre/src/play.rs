@@ -11,10 +11,7 @@ use lumbre::scene;
 
 use crate::arguments::Play;
 use crate::loading::load;
-use crate::output::progress_bar;
-
-/// Frames of the tour, and their size.
-const TOUR: (u32, (u32, u32)) = (12, (960, 540));
+use crate::progress::Shown;
 
 /// Runs the command.
 pub fn run(asked: &Play) -> anyhow::Result<()> {
@@ -23,8 +20,7 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
         None => demo_level()?,
     };
     if asked.headless || !demo::has_display() {
-        let (frames, size) = TOUR;
-        let paths = demo::tour(&level, &asked.frames_dir, frames, size)?;
+        let paths = demo::tour(&level, &asked.frames_dir, asked.frames, asked.size)?;
         let mut out = std::io::stdout().lock();
         for path in paths {
             writeln!(out, "{}", path.display())?;
@@ -52,15 +48,14 @@ fn demo_level() -> anyhow::Result<PathBuf> {
     }
     eprintln!("lumbre: baking {} (once)", source.display());
     let mut world = load(&source)?;
-    let bar = progress_bar();
+    let mut shown = Shown::new(false);
     // Frames do not read probes.
     let options = BakeOptions { error: 0.02, probes: Probes::Never, ..BakeOptions::default() };
     bake(&mut world, &options, &mut |progress| {
-        bar.set_message(progress.stage);
-        bar.set_position((progress.fraction * 1000.0) as u64);
+        shown.update(progress);
         ControlFlow::Continue(())
     })?;
-    bar.finish_and_clear();
+    shown.finish();
     scene::save(&mut world, &baked)?;
     Ok(baked)
 }

@@ -154,6 +154,45 @@ fn an_interruption_keeps_the_work_and_says_how_to_go_on() {
 }
 
 #[test]
+fn whenever_it_is_interrupted_it_ends_soon_and_goes_on_to_the_same_bytes() {
+    let (expected, place) = (expected(), place());
+    // From loading to saving, and beyond the end.
+    for (delay, signal) in
+        [(0, "-INT"), (10, "-TERM"), (40, "-INT"), (120, "-TERM"), (350, "-INT"), (900, "-INT")]
+    {
+        let mut child = place.bake(&["--resume", "--quiet"]).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(delay));
+        let told = Command::new("kill").args([signal.to_owned(), child.id().to_string()]).status().unwrap();
+        let begun = std::time::Instant::now();
+        // A tenth of that on an idle machine.
+        while child.try_wait().unwrap().is_none() && begun.elapsed() < Duration::from_secs(5) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let ended = child.try_wait().unwrap();
+        child.kill().ok();
+        assert!(ended.is_some(), "it still runs {:?} after {signal} at {delay} ms", begun.elapsed());
+        println!("{signal} at {delay} ms ({told}): {ended:?} after {:?}", begun.elapsed());
+    }
+    done(&mut place.bake(&["--resume"]));
+    assert!(place.files() == expected, "{:?}", place.files().keys());
+}
+
+#[test]
+fn in_a_pipe_it_says_how_far_it_is_in_lines_and_quietly_nothing() {
+    let said = |more: &[&str]| stderr(&done(&mut place().bake(more)));
+    let is_progress = |line: &&str| line.starts_with("lumbre: ") && line.contains(" % of the bake) after ");
+    let lines = said(&[]);
+    assert_eq!(
+        lines.lines().find(is_progress),
+        Some("lumbre: layout: 0 % (0 % of the bake) after 0 s"),
+        "{lines}"
+    );
+    assert!(!lines.contains('\r'), "a bar in a pipe: {lines}");
+    let quiet = said(&["--quiet"]);
+    assert_eq!(quiet.lines().find(is_progress), None, "{quiet}");
+}
+
+#[test]
 fn an_unchanged_level_is_left_as_it_is() {
     let place = place();
     let first = done(&mut place.bake(&["--json"]));

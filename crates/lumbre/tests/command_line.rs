@@ -210,7 +210,7 @@ fn playing_without_a_display_draws_a_tour() {
     let (folder, path) = level();
     let frames = folder.path().join("tour");
     let output = Command::new(env!("CARGO_BIN_EXE_lumbre"))
-        .args(["play", text(&path), "--frames-dir", text(&frames)])
+        .args(["play", text(&path), "--frames-dir", text(&frames), "--frames", "7", "--size", "192x108"])
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("WAYLAND_SOCKET")
@@ -218,7 +218,8 @@ fn playing_without_a_display_draws_a_tour() {
         .unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let paths: Vec<PathBuf> = stdout(&output).lines().map(PathBuf::from).collect();
-    assert!(paths.len() >= 6, "{paths:?}");
-    let pictures: Vec<_> = paths.iter().map(|path| image::open(path).unwrap().to_rgb8().into_raw()).collect();
+    assert_eq!(paths.len(), 7, "{paths:?}");
+    let pictures: Vec<_> = paths.iter().map(|path| image::open(path).unwrap().to_rgb8()).collect();
+    assert!(pictures.iter().all(|picture| picture.dimensions() == (192, 108)));
     assert!(pictures[0] != pictures[pictures.len() / 2], "the tour stands still");
 }

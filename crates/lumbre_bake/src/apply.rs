@@ -11,6 +11,7 @@ use lumbre_scene::{
     update_transforms,
 };
 
+use crate::UnwrappedFrom;
 use crate::pages::Pages;
 use crate::scene::{LightmapLayout, Object, reading_first};
 
@@ -62,13 +63,23 @@ pub(crate) fn apply(
         };
         for ((part, mesh), &moved) in object.parts.iter().zip(&map.meshes).zip(&map.moved) {
             let Ok(mut entity) = world.get_entity_mut(part.entity) else { continue };
-            if pages.places[index].is_some() {
-                entity.insert(Mesh(pages.on_page(layout, index, mesh)));
-            } else if !Arc::ptr_eq(&part.mesh, mesh) {
-                entity.insert(Mesh(Arc::clone(mesh)));
+            let made = match pages.places[index] {
+                Some(_) => pages.on_page(layout, index, mesh),
+                None => Arc::clone(mesh),
+            };
+            let textures =
+                part.textures.as_ref().map(|own| if moved { reading_first(own) } else { own.clone() });
+            if let Some(textures) = textures.as_ref().filter(|own| entity.get() != Some(*own)) {
+                entity.insert(textures.clone());
             }
-            if let Some(textures) = part.textures.as_ref().filter(|_| moved) {
-                entity.insert(reading_first(textures));
+            if Arc::ptr_eq(&part.mesh, &made) {
+                entity.remove::<UnwrappedFrom>();
+            } else {
+                let source = (Arc::clone(&part.mesh), part.textures.clone());
+                entity.insert(UnwrappedFrom::new(source, (Arc::clone(&made), textures)));
+            }
+            if !entity.get::<Mesh>().is_some_and(|own| Arc::ptr_eq(&own.0, &made)) {
+                entity.insert(Mesh(made));
             }
             entity.insert(lightmap.clone());
         }

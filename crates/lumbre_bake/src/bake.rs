@@ -1,6 +1,7 @@
 //! The bake from end to end: reads the World, runs the stages, writes the World. Not the stages themselves.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use bevy_ecs::world::World;
 use glam::Vec3;
@@ -14,7 +15,7 @@ use crate::probes::Wanted;
 use crate::progress::Watch;
 use crate::rebake::change::Change;
 use crate::rebake::{Changes, Found, Samples, Usable, rebake_report};
-use crate::scene::{BakeScene, Canonical, collect, density_of, lay_out_with, lights, sky, world_points};
+use crate::scene::{BakeScene, Canonical, collect, density_of, lights, sky, world_points};
 use crate::texels::charts::charts;
 use crate::texels::divided_light::DividedLight;
 use crate::texels::error_estimate::variances;
@@ -28,8 +29,9 @@ use crate::texels::seams::{Maps, close_seams};
 use crate::texels::straddling::{crossed, straddling};
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::Sources;
+use crate::transport::emitters::coarse_textures;
 use crate::transport::exchange::Exchange;
-use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, apply};
+use crate::{BakeError, BakeOptions, BakeReport, Checkpoint, Ended, ErrorAtTime, Progress, apply, preparing};
 
 /// Bakes the light of a world's static objects into lightmaps.
 ///
@@ -75,8 +77,8 @@ pub fn bake_with(
 /// The same world, options, seed and former samples give the same bits on any number of threads; those of [`bake_with`] where there is nothing
 /// to keep, unless [`BakeOptions::memory`] is short: samples take some of it.
 ///
-/// Objects are recognised by name, mesh, material and place as they were before the bake, which gives meshes new coordinates: to keep something, an
-/// editor gives back the meshes that it had, or loads the level anew.
+/// Objects are recognised by name, mesh, material and place as they were before a bake, which gives meshes new coordinates: [`UnwrappedFrom`](crate::UnwrappedFrom)
+/// remembers beside such a mesh what it was. A World can so be changed and baked again and again; a level that was saved and loaded again counts as new.
 ///
 /// # Errors
 /// As [`bake_with`].
@@ -126,10 +128,10 @@ fn run(
     let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
     let mut watch = Watch::new(progress, options.time);
     watch.stage("layout", &mut report)?;
-    let objects = collect(world)?;
+    let objects = Arc::new(watch.during(0.0, || collect(world))??);
     let (placed, sky) = (lights(world), sky(world));
     let wanted = Wanted::of(world, &objects);
-    let hashes = hashes_of(&objects, &placed, sky, &wanted, options);
+    let hashes = watch.during(0.0, || hashes_of(&objects, &placed, sky, &wanted, options))?;
     report.content_hash = hashes.content.to_string();
     let points =
         || objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
@@ -159,12 +161,12 @@ fn run(
         (space, density) = (usable.space, Some(usable.density));
     }
     let density = density.unwrap_or_else(|| density_of(&objects, space, options));
-    let layout = lay_out_with(&objects, space, density, options, &mut report.warnings)?;
+    let layout = preparing::layout(&objects, space, density, options, &mut watch, &mut report.warnings)?;
 
     watch.stage("hierarchy", &mut report)?;
-    let mut scene = BakeScene::new(&objects, &layout, space, &mut report.warnings)?;
-    scene.dark_outside = Sources::new(&scene, placed.clone(), sky).are_inside();
-    let sources = Sources::new(&scene, placed, sky);
+    let (mut scene, layout) = preparing::scene(&objects, layout, space, &mut watch, &mut report.warnings)?;
+    scene.dark_outside = watch.during(0.8, || Sources::new(&scene, placed.clone(), sky).are_inside())?;
+    let sources = watch.during(0.9, || Sources::new(&scene, placed, sky))?;
     report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
     if sources.is_empty() {
         report
@@ -176,6 +178,7 @@ fn run(
         return Ok((finish(report, &mut watch), None));
     }
     name_what_is_missing(&sources, &mut report);
+    report.warnings.extend(watch.during(1.0, || coarse_textures(&scene))?);
     let for_samples = match (former, &usable) {
         (Former::Forget, _) => 0,
         (Former::None | Former::Samples(_), None) => memory::SAMPLES,
@@ -184,23 +187,23 @@ fn run(
     memory::check_texels(&scene, &layout, for_samples, options)?;
 
     watch.stage("direct light", &mut report)?;
-    let mut texels = footprints(&scene, &layout);
-    watch.advance(0.0)?;
-    let charts = charts(&scene);
-    let crossed = crossed(&scene, &layout);
+    let (mut texels, charts, crossed) =
+        watch.during(0.0, || (footprints(&scene, &layout), charts(&scene), crossed(&scene, &layout)))?;
     let touched: Vec<usize> = straddling(&layout, &texels, &crossed)
         .iter()
         .map(|straddling| texels[straddling.texel as usize].index as usize)
         .collect();
-    let (hidden, rays) = remove_hidden(&scene, &layout, &mut texels, &touched);
+    let (hidden, rays) = watch.during(0.0, || remove_hidden(&scene, &layout, &mut texels, &touched))?;
     (report.hidden_texels, report.rays) = (hidden, rays);
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
     let side = texel_side(&scene, &texels);
-    let plan = Plan::new(&scene, &layout, &texels, side, for_samples, options, &mut report)?;
-    let changes = usable.map(|u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels));
-    let known =
-        changes.as_ref().map_or_else(Vec::new, |changes| changes.known_direct(&sources, &texels, &charts));
+    let plan = watch
+        .during(0.0, || Plan::new(&scene, &layout, &texels, side, for_samples, options, &mut report))??;
+    let find = |u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels);
+    let changes = watch.during(0.0, || usable.map(find))?;
+    let known = |changes: &Changes<'_>| changes.known_direct(&sources, &texels, &charts);
+    let known = watch.during(0.0, || changes.as_ref().map_or_else(Vec::new, known))?;
     let (direct, local) =
         lighting::direct_light(&sources, &layout, &texels, &charts, &known, options, &mut watch)?;
     let relit = |index: usize| known.get(index).is_none_or(Option::is_none);
@@ -208,8 +211,8 @@ fn run(
     report.rays += new.map(|(_, direct)| u64::from(direct.rays)).sum::<u64>();
     let baked: Vec<Vec3> = direct.iter().map(|direct| direct.baked).collect();
 
-    let change =
-        changes.as_ref().map(|changes| Change::new(&sources, &layout, changes, &texels, &charts, &direct));
+    let change = |changes| Change::new(&sources, &layout, changes, &texels, &charts, &direct);
+    let change = watch.during(1.0, || changes.as_ref().map(change))?;
     let exchange = Exchange::new(&scene, &sources, change.as_ref(), options, &plan, &mut watch, &mut report)?;
     let mut kept = None;
     let (indirect, volume, points) = match &exchange {
@@ -222,9 +225,10 @@ fn run(
             watch.stage("final gather", &mut report)?;
             let straddling = straddling(&layout, &texels, &crossed);
             let [_, samples, _] = options.effort().direct;
-            let (divided, rays) = DividedLight::new(&sources, &texels, &straddling, (samples, options.seed));
+            let (divided, rays) = watch
+                .during(0.0, || DividedLight::new(&sources, &texels, &straddling, (samples, options.seed)))?;
             report.rays += rays;
-            watch.advance(0.0)?;
+            report.warnings.extend(divided.warning());
             let mut total = vec![Vec3::NAN; layout.texels];
             for (texel, direct) in texels.iter().zip(&direct).filter(|(texel, _)| !texel.is_hidden()) {
                 total[texel.index as usize] = direct.total();
@@ -294,21 +298,22 @@ fn run(
                 neglected,
             };
             let exitance = exchange.as_ref().map(|e| e.exitance_of(&scene, layout.maps.len()));
-            Some(found.samples(identity, &hashes, &objects, &sources, &exitance.unwrap_or_default()))
+            let exitance = exitance.unwrap_or_default();
+            Some(watch.during(0.0, || found.samples(identity, &hashes, &objects, &sources, &exitance))?)
         }
     };
     let known = (values.as_slice(), variances.as_slice());
     let (mut filled, errors) =
-        fill(&layout, &texels, &charts, known, options.gap, &mut |done| watch.advance(done))?;
+        watch.during(0.2, || fill(&layout, &texels, &charts, known, options.gap, &scene.stop))?;
     watch.advance(1.0)?;
     watch.stage("seams", &mut report)?;
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
     let maps =
         Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
     note_seams(&maps, &mut filled, options, &mut watch, &mut report)?;
-    report.resolution = compare(&scene, &layout, &filled, &errors, &points);
+    report.resolution = watch.during(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
+    let pages = watch.during(1.0, || Pages::new(&layout, options.atlas_size, options.gap))?;
     watch.advance(1.0)?;
-    let pages = Pages::new(&layout, options.atlas_size, options.gap);
     apply::apply(world, &objects, &layout, &filled, &errors, &pages);
     report.rays +=
         change.as_ref().zip(exchange.as_ref()).map_or(0, |(change, exchange)| change.rays(exchange));
@@ -343,12 +348,14 @@ fn note_seams(
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
 ) -> Result<(), BakeError> {
-    let (closed, rays) = match options.seams {
-        true => close_seams(maps, filled, &mut |done| watch.advance(done))?,
-        false => (Err("switched off"), 0),
-    };
-    report.rays += rays;
-    match closed {
+    if !options.seams {
+        report.skipped.push("seams: switched off".into());
+        return Ok(());
+    }
+    let closed = watch.during(0.0, || close_seams(maps, filled))?;
+    report.rays += closed.rays;
+    report.warnings.extend(closed.warning);
+    match closed.report {
         Ok(closed) => report.seams = closed,
         Err(reason) => report.skipped.push(format!("seams: {reason}")),
     }

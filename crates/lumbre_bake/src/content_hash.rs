@@ -49,7 +49,8 @@ impl fmt::Display for ContentHash {
 
 /// The hash of everything that [`bake`](crate::bake) reads of a world and its options, and of the baker itself: static meshes in their
 /// places, what their materials reflect, emit and let through with the pixels of their textures, the lights that are baked and the sky, all in
-/// the order in which they are baked; and where probes are called for, the box around what moves and which faces shine in real time. Take it before the bake, which gives meshes new coordinates.
+/// the order in which they are baked; and where probes are called for, the box around what moves and which faces shine in real time. A bake does not
+/// change it: the coordinates that it gives to meshes do not count.
 ///
 /// Equal hashes mean equal bits, unless [`BakeOptions::time`] cuts a bake short: the hash leaves it out, like the number of threads.
 /// Only global transforms of the world are brought up to date.

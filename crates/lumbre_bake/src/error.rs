@@ -45,6 +45,19 @@ pub enum BakeError {
         /// What is wrong.
         source: lumbre_mesh::UnwrapError,
     },
+    /// A mesh falls into more charts than the largest map has room for.
+    #[error(
+        "{object}: it falls into {charts} charts, which a lightmap of {limit} x {limit} texels does not hold; weld its vertices, split it into \
+         several meshes, give it a TEXCOORD_1 of its own, or ask for a smaller gap"
+    )]
+    TooManyCharts {
+        /// The node's name.
+        object: String,
+        /// Pieces that an unwrap makes of it.
+        charts: usize,
+        /// Largest side of a map, in texels.
+        limit: u32,
+    },
     /// The maps together would be larger than a bake allocates.
     #[error(
         "the lightmaps would hold {texels} texels, the limit is {limit}; lower the density or the map size"

@@ -1,10 +1,12 @@
 //! How far a bake has come, the time it may take, and the way to end it. Not a drawing of a bar.
 
 use std::ops::ControlFlow;
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::checkpoint::tape::Place;
 use crate::checkpoint::{Record, Tape};
+use crate::stop::Stop;
 use crate::{BakeError, BakeReport, StageTime};
 
 /// How far a bake has come.
@@ -16,7 +18,15 @@ pub struct Progress {
     pub stage_fraction: f32,
     /// How much of the whole is done, in [0, 1], by the usual shares of the stages.
     pub fraction: f32,
+    /// Estimated relative RMSE of the lightmap as it is now, once one is known.
+    pub error: Option<f64>,
 }
+
+/// What is told of a bake that runs, and the answer whether it should go on.
+pub(crate) type Callback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
+
+/// How often the caller is asked while something takes long.
+const TICK: Duration = Duration::from_millis(50);
 
 /// The stages in their order, with their usual share of the time.
 const STAGES: [(&str, f32); 10] = [
@@ -55,18 +65,31 @@ impl Clock {
 
 /// Reports to the caller, notes the time of each stage, and keeps what was computed.
 pub(crate) struct Watch<'a> {
-    callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
+    callback: &'a mut Callback<'a>,
     clock: Clock,
     stage: Option<(&'static str, Instant)>,
     /// From where to where in the running stage the work that reports now leads.
     part: (f32, f32),
+    error: Option<f64>,
+    stop: Stop,
     pub tape: Tape,
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(callback: &'a mut dyn FnMut(Progress) -> ControlFlow<()>, limit: Option<Duration>) -> Self {
+    pub fn new(callback: &'a mut Callback<'a>, limit: Option<Duration>) -> Self {
         let clock = Clock { begun: Instant::now(), before: 0.0, limit };
-        Self { callback, clock, stage: None, part: (0.0, 1.0), tape: Tape::default() }
+        let (stop, tape) = (Stop::default(), Tape::default());
+        Self { callback, clock, stage: None, part: (0.0, 1.0), error: None, stop, tape }
+    }
+
+    /// What loops look at while [`Watch::during`] waits for them.
+    pub fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
+    /// The estimated error so far, for the caller.
+    pub fn note_error(&mut self, error: f64) {
+        self.error = Some(error);
     }
 
     /// The time as it is, to be asked from other threads.
@@ -105,18 +128,99 @@ impl<'a> Watch<'a> {
     /// # Errors
     /// [`BakeError::Cancelled`] if the caller wants no more.
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
+        let progress = self.progress(stage_fraction);
+        if (self.callback)(progress).is_break() {
+            self.stop.set();
+        }
+        self.unless_stopped()
+    }
+
+    /// Does something that may take long, from a fraction of the running stage or its pass on. Meanwhile the caller is asked again and again, from a thread of its own,
+    /// whether to go on; if not, the work finds [`Watch::stop`] set, and what it returns is forgotten. No value depends on the asking.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`] if the caller wants no more.
+    pub fn during<T>(&mut self, stage_fraction: f32, work: impl FnOnce() -> T) -> Result<T, BakeError> {
+        let progress = self.progress(stage_fraction);
+        let (callback, stop, done) = (&mut *self.callback, &self.stop, Done::default());
+        let result = std::thread::scope(|scope| {
+            let ask = || {
+                while !done.after(TICK) {
+                    if callback(progress).is_break() {
+                        stop.set();
+                        return;
+                    }
+                }
+            };
+            // Without such a thread nobody is asked before the work is done.
+            let _asked = std::thread::Builder::new().name("bake progress".into()).spawn_scoped(scope, ask);
+            // Also if the work panics: the scope waits for the thread.
+            let _finally = Finally(&done);
+            work()
+        });
+        self.unless_stopped()?;
+        Ok(result)
+    }
+
+    /// As [`Watch::during`], of work that cannot be asked to end: on a thread of its own, which goes on alone for a while where nobody wants its
+    /// result any more.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`] if the caller wants no more.
+    pub fn apart<T: Send + 'static>(
+        &mut self,
+        stage_fraction: f32,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, BakeError> {
+        let (sender, receiver) = std::sync::mpsc::sync_channel(1);
+        // Behind a lock, so that it is still there where no thread can be had.
+        let work = std::sync::Arc::new(Mutex::new(Some(work)));
+        let taken = std::sync::Arc::clone(&work);
+        let take = |from: &Mutex<Option<_>>| from.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let thread = std::thread::Builder::new().name("bake apart".into()).spawn(move || {
+            if let Some(work) = take(&taken) {
+                // Nobody may be there to take it.
+                let _ = sender.send(work());
+            }
+        });
+        let Ok(thread) = thread else {
+            return match take(&work) {
+                Some(work) => self.during(stage_fraction, work),
+                None => self.cancelled(),
+            };
+        };
+        loop {
+            match receiver.recv_timeout(TICK) {
+                Ok(result) => {
+                    self.unless_stopped()?;
+                    return Ok(result);
+                }
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => self.advance(stage_fraction)?,
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => match thread.join() {
+                    Err(panic) => std::panic::resume_unwind(panic),
+                    // It sends before it ends.
+                    Ok(()) => return self.cancelled(),
+                },
+            }
+        }
+    }
+
+    fn cancelled<T>(&mut self) -> Result<T, BakeError> {
+        self.tape.flush();
+        Err(BakeError::Cancelled { stage: self.running().1 })
+    }
+
+    fn progress(&self, stage_fraction: f32) -> Progress {
         let (index, stage) = self.running();
         let before: f32 = STAGES[..index].iter().map(|(_, share)| share).sum();
         let (from, to) = self.part;
         let stage_fraction = from + (to - from) * stage_fraction.clamp(0.0, 1.0);
-        let fraction = before + STAGES[index].1 * stage_fraction;
-        match (self.callback)(Progress { stage, stage_fraction, fraction: fraction.min(1.0) }) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => {
-                self.tape.flush();
-                Err(BakeError::Cancelled { stage })
-            }
-        }
+        let fraction = (before + STAGES[index].1 * stage_fraction).min(1.0);
+        Progress { stage, stage_fraction, fraction, error: self.error }
+    }
+
+    fn unless_stopped(&mut self) -> Result<(), BakeError> {
+        if self.stop.is_set() { self.cancelled() } else { Ok(()) }
     }
 
     /// The running stage and its place in the order.
@@ -140,5 +244,100 @@ impl<'a> Watch<'a> {
     pub fn keep<T: Record>(&mut self, start: usize, of: usize, values: &[T]) {
         let (place, seconds) = (self.place(start, of), self.seconds());
         self.tape.record(place, values, seconds);
+    }
+}
+
+/// Whether some work is done, for who waits for it.
+#[derive(Default)]
+struct Done {
+    done: Mutex<bool>,
+    told: Condvar,
+}
+
+impl Done {
+    /// Whether it is, after so long at most.
+    fn after(&self, time: Duration) -> bool {
+        let done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.told.wait_timeout_while(done, time, |done| !*done);
+        *waited.unwrap_or_else(PoisonError::into_inner).0
+    }
+}
+
+/// Says that it is, whatever happens.
+struct Finally<'a>(&'a Done);
+
+impl Drop for Finally<'_> {
+    fn drop(&mut self) {
+        *self.0.done.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.0.told.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_asks_for_the_end_while_something_runs_gets_it() {
+        let mut asked = 0;
+        let mut callback = |progress: Progress| {
+            asked += 1;
+            assert_eq!((progress.stage, progress.stage_fraction), ("layout", 0.25));
+            if asked < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        let mut watch = Watch::new(&mut callback, None);
+        let stop = watch.stop().clone();
+        let begun = Instant::now();
+        let ended = watch.during(0.25, || {
+            while !stop.is_set() && begun.elapsed() < Duration::from_secs(60) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        });
+        assert_eq!(ended, Err(BakeError::Cancelled { stage: "layout" }));
+        assert!(begun.elapsed() < Duration::from_secs(30));
+        assert_eq!(asked, 3);
+    }
+
+    #[test]
+    fn what_is_quick_asks_nobody_and_errors_are_told_on() {
+        let mut told = Vec::new();
+        let mut callback = |progress: Progress| {
+            told.push(progress.error);
+            ControlFlow::Continue(())
+        };
+        let mut watch = Watch::new(&mut callback, None);
+        assert_eq!(watch.during(0.0, || 7), Ok(7));
+        watch.advance(0.0).unwrap();
+        watch.note_error(0.25);
+        watch.advance(1.0).unwrap();
+        assert_eq!(told, [None, Some(0.25)]);
+    }
+
+    #[test]
+    fn what_runs_apart_is_waited_for_or_left_to_itself() {
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let slow = || {
+            std::thread::sleep(3 * TICK);
+            7
+        };
+        assert_eq!(Watch::new(&mut carry_on, None).apart(0.0, slow), Ok(7));
+        let (mut no_more, begun) = (|_| ControlFlow::Break(()), Instant::now());
+        let ended = Watch::new(&mut no_more, None).apart(0.0, || std::thread::sleep(Duration::from_secs(60)));
+        assert_eq!(ended, Err(BakeError::Cancelled { stage: "layout" }));
+        assert!(begun.elapsed() < Duration::from_secs(30));
+    }
+
+    #[test]
+    #[should_panic(expected = "as it should")]
+    fn a_panic_apart_is_the_callers() {
+        let mut callback = |_| ControlFlow::Continue(());
+        let _ = Watch::new(&mut callback, None).apart(0.0, || panic!("as it should"));
+    }
+
+    #[test]
+    #[should_panic(expected = "as it should")]
+    fn a_panic_of_the_work_ends_the_asking() {
+        let mut callback = |_| ControlFlow::Continue(());
+        let _ = Watch::new(&mut callback, None).during(0.0, || panic!("as it should"));
     }
 }

@@ -10,7 +10,9 @@ use glam::{DVec3, Vec2, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
-use lumbre_scene::{Image, MaterialTextures, Mesh, Sampler, StaticObject, TextureReference, Transform, Wrap};
+use lumbre_scene::{
+    Image, MaterialTextures, Mesh, Name, Sampler, StaticObject, TextureReference, Transform, Wrap,
+};
 
 mod common;
 
@@ -232,4 +234,50 @@ fn emission_that_varies_by_texture() {
     println!("{found}; stated {:.3} %", 100.0 * report.estimated_error);
     // Pieces of two texels of one radiance each, a fifth of the picture away, and far pieces in one term.
     assert!(found.missed == 0 && found.rmse < 0.006, "{found}");
+}
+
+/// A lamp of a metre whose texture has so many texels a side, all black but one.
+fn one_texel(side: u32) -> (World, BakeReport) {
+    let mut rgba = vec![0; 4 * (side * side) as usize];
+    let (x, y) = (side / 3 + 1, side / 5 + 1);
+    rgba[4 * (y * side + x) as usize..][..4].copy_from_slice(&[255; 4]);
+    let texture = TextureReference {
+        image: Arc::new(Image { name: "one".into(), width: side, height: side, rgba }),
+        sampler: Sampler::default(),
+        tex_coord: 0,
+        offset: Vec2::ZERO,
+        rotation: 0.0,
+        scale: Vec2::ONE,
+    };
+    let mut world = World::new();
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
+    // As bright as it is small.
+    let lamp = matt(0.0, (side * side) as f32);
+    let mesh = Mesh(Arc::new(square(Vec3::Y, 1.0, false)));
+    world.spawn((Name::new("screen"), mesh, lamp, textures, StaticObject));
+    let report = run(&mut world, 24);
+    (world, report)
+}
+
+#[test]
+fn a_bright_texel_is_not_missed_and_a_texture_that_is_read_more_coarsely_is_named() {
+    for (side, named) in [(32, false), (512, true), (2048, true)] {
+        let (mut world, report) = one_texel(side);
+        let words: Vec<_> =
+            report.warnings.iter().filter(|warning| warning.starts_with("screen: ")).collect();
+        assert_eq!(words.len(), usize::from(named), "{side}: {:?}", report.warnings);
+        assert!(
+            words.iter().all(|words| words.contains("48 pieces") && !words.contains("missed")),
+            "{words:?}"
+        );
+        // One square metre of radiance 1, put together in one place.
+        let (s, d) = (side as f64, f64::from(side / 5 + 1) + 0.5);
+        let (u, v) = ((f64::from(side / 3 + 1) + 0.5) / s, d / s);
+        let lamp = DVec3::new(u - 0.5, 1.0, v - 0.5);
+        let value = |p: DVec3| 1.0 / (lamp - p).length_squared().powi(2);
+        let found = common::compare(&mut world, &points(0.0, value));
+        println!("{side}: {found}");
+        assert!(found.bias.abs() < 0.02, "{side}: {found}");
+    }
 }

@@ -3,14 +3,18 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_ecs::world::World;
+use glam::Vec3;
 use lumbre_bake::{
     BakeError, BakeOptions, BakeReport, Density, Ended, LightmapError, Progress, Quality, bake,
 };
-use lumbre_scene::Lightmap;
+use lumbre_optics::{BakeMode, Light, Material};
+use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
+mod common;
 #[path = "common/corner.rs"]
 mod corner;
 
@@ -130,4 +134,80 @@ fn less_memory_means_fewer_patches_and_none_an_error_that_says_what_to_do() {
     // As many patches as there are: no limit is no loss of light, only of detail.
     let apart = (tight.mean_irradiance[1] / free.mean_irradiance[1] - 1.0).abs();
     assert!(apart < 3.0 * (tight.estimated_error + free.estimated_error), "{apart}");
+}
+
+/// So many triangles that have nothing to do with each other: as many charts.
+fn confetti(count: u32) -> lumbre_mesh::TriangleMesh {
+    let corners = (0..count).flat_map(|index| {
+        let at = Vec3::new((index % 100) as f32, (index / 100) as f32, 0.0) * 0.1;
+        [at, at + Vec3::X * 0.05, at + Vec3::Y * 0.05]
+    });
+    lumbre_mesh::TriangleMesh {
+        positions: corners.collect(),
+        indices: (0..3 * count).collect(),
+        ..lumbre_mesh::TriangleMesh::default()
+    }
+}
+
+fn baked_alone(
+    mesh: lumbre_mesh::TriangleMesh,
+    options: &BakeOptions,
+) -> (Result<BakeReport, BakeError>, Option<u32>) {
+    let mut world = World::new();
+    let own =
+        world.spawn((Name::new("confetti"), Mesh(Arc::new(mesh)), Material::default(), StaticObject)).id();
+    world.spawn((
+        Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) },
+        Transform::from_xyz(5.0, 1.0, 9.0),
+    ));
+    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()));
+    (report, world.get::<Lightmap>(own).map(|map| map.image.width))
+}
+
+#[test]
+fn charts_that_do_not_fit_a_map_get_a_larger_one_and_a_warning() {
+    let options =
+        BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() };
+    let (report, side) = baked_alone(confetti(500), &options);
+    let warnings = report.unwrap().warnings;
+    // 500 charts of 2 x 2 texels with 2 between them need 90 x 90.
+    assert_eq!(side, Some(128));
+    let warned = |warning: &&String| {
+        ["confetti", "500 charts", "16 x 16", "128 x 128"].iter().all(|word| warning.contains(word))
+    };
+    assert_eq!(warnings.iter().filter(warned).count(), 1, "{warnings:?}");
+    // Those that fit have the size that was asked for, and no warning.
+    let (report, side) = baked_alone(confetti(12), &options);
+    assert_eq!((side, report.unwrap().warnings), (Some(16), Vec::new()));
+}
+
+#[test]
+fn charts_that_no_map_holds_are_an_error_that_says_what_to_do() {
+    // With a gap of 64 the largest map holds 15,625 charts.
+    for density in [Density::MapSize(64), Density::TexelsPerMeter(1.0)] {
+        let options = BakeOptions { density, gap: 64, ..options() };
+        let (report, _) = baked_alone(confetti(16_000), &options);
+        let error = report.unwrap_err();
+        assert!(
+            matches!(&error, BakeError::TooManyCharts { object, charts: 16_000, limit: 8192 } if object == "confetti"),
+            "{error:?}"
+        );
+        let text = error.to_string();
+        assert!(text.contains("confetti") && text.contains("weld its vertices"), "{text}");
+    }
+}
+
+#[test]
+fn the_scanned_bunny_fits_a_larger_map() {
+    let Some(model) = common::shared("models/stanford-bunny.glb") else { return };
+    let mut world = World::new();
+    lumbre_scene::load(&mut world, &model).unwrap();
+    let options = BakeOptions { density: Density::MapSize(64), ..options() };
+    // Without a light in the file, only the layout is made.
+    let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert!(
+        report.warnings.iter().any(|warning| warning.contains("do not fit a map of 64 x 64")),
+        "{:?}",
+        report.warnings
+    );
 }

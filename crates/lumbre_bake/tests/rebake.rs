@@ -223,6 +223,39 @@ fn an_unchanged_scene_keeps_everything() {
 }
 
 #[test]
+fn a_world_is_baked_again_and_again_as_it_is() {
+    let options = options();
+    let before = lumbre_bake::content_hash(&mut rooms(LAMP, &[IN_THE_DARK]), &options).unwrap();
+    let (mut world, first, samples) = baked(rooms(LAMP, &[IN_THE_DARK]), None, &options);
+    assert_eq!(lumbre_bake::content_hash(&mut world, &options).unwrap(), before);
+    // Nothing has changed.
+    let (world, report, samples) = baked(world, Some(&samples), &options);
+    let rebake = report.rebake.as_ref().unwrap();
+    assert!(rebake.whole.is_empty() && rebake.changed.is_empty(), "{rebake}");
+    assert_eq!((rebake.relit, rebake.gathered), (0, 0), "{rebake}");
+    assert_eq!(report.mean_irradiance, first.mean_irradiance);
+    // A crate moves.
+    let named = |world: &mut World, name: &str| {
+        let mut names = world.query::<(bevy_ecs::entity::Entity, &Name)>();
+        names.iter(world).find(|(_, found)| found.as_str() == name).unwrap().0
+    };
+    let mut world = world;
+    let moved = named(&mut world, "crate 0");
+    world.get_mut::<Transform>(moved).unwrap().translation.x += 0.1;
+    let (mut world, report, samples) = baked(world, Some(&samples), &options);
+    let rebake = report.rebake.as_ref().unwrap();
+    assert_eq!(rebake.changed, ["crate 0 (changed)".to_owned()], "{rebake}");
+    assert!(rebake.gathered < rebake.texels, "{rebake}");
+    // Its mesh is exchanged for another; then the one that a bake has made is changed where it is.
+    world.get_mut::<Mesh>(moved).unwrap().0 = Arc::new(shapes::cuboid(Vec3::new(0.5, 0.7, 0.5), 1));
+    let (mut world, report, samples) = baked(world, Some(&samples), &options);
+    assert_eq!(report.rebake.unwrap().changed, ["crate 0 (changed)".to_owned()]);
+    Arc::make_mut(&mut world.get_mut::<Mesh>(moved).unwrap().0).positions[0].y += 0.01;
+    let (_, report, _) = baked(world, Some(&samples), &options);
+    assert_eq!(report.rebake.unwrap().changed, ["crate 0 (changed)".to_owned()]);
+}
+
+#[test]
 fn small_steps_add_up_to_no_more_than_is_stated() {
     let at = |step: i32| (IN_THE_DARK.0 + Vec3::new(0.1 * step as f32, 0.0, 0.0), RED);
     let (_, _, mut samples) = baked(rooms(LAMP, &[at(0)]), None, &options());

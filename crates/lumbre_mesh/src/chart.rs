@@ -62,21 +62,32 @@ pub(crate) struct Charting<'a> {
     pub least_cosine: f64,
 }
 
+/// Triangles between two questions whether to go on.
+const STEPS: usize = 1024;
+
 impl Charting<'_> {
     /// Every triangle with a normal lies in exactly one chart.
     ///
     /// A region first grows from the first free triangle, led by its own mean normal; then it is grown again
     /// in the fixed plane of that mean, taking only triangles that overlap none there. The rest stays free.
-    pub fn charts(&self) -> Vec<FlatChart> {
+    ///
+    /// None if `go_on`, which is asked now and then, says no.
+    pub fn charts(&self, go_on: &dyn Fn() -> bool) -> Option<Vec<FlatChart>> {
         let mut owner: Vec<u32> = vec![u32::MAX; self.corners.len()];
         // Number of the search that visited a triangle last, and whether as part of the region.
         let mut region_of = vec![0u32; self.corners.len()];
         let mut visited = vec![0u32; self.corners.len()];
         let mut round = 0;
         let mut charts: Vec<FlatChart> = Vec::new();
+        let (mut steps, mut stopped) = (0usize, false);
         for seed in 0..self.corners.len() as u32 {
             if owner[seed as usize] != u32::MAX || self.normals[seed as usize] == DVec3::ZERO {
                 continue;
+            }
+            steps += 1;
+            stopped |= steps.is_multiple_of(STEPS) && !go_on();
+            if stopped {
+                return None;
             }
             round += 1;
             let mut mean = DVec3::ZERO;
@@ -110,7 +121,10 @@ impl Charting<'_> {
             let mut taken = Vec::new();
             round += 1;
             self.grow(seed, round, &mut visited, |triangle, index| {
-                let accepted = region_of[index] == round - 1
+                steps += 1;
+                stopped |= steps.is_multiple_of(STEPS) && !go_on();
+                let accepted = !stopped
+                    && region_of[index] == round - 1
                     && self.normals[index].dot(normal) >= self.least_cosine
                     && grid.insert(project(triangle));
                 if accepted {
@@ -129,7 +143,7 @@ impl Charting<'_> {
             chart.triangles = taken;
             charts.push(chart);
         }
-        charts
+        (!stopped).then_some(charts)
     }
 
     /// Visits triangles outward from the seed, across edges with one neighbour that runs the same way round.

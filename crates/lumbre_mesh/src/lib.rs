@@ -38,5 +38,5 @@ mod weld;
 
 pub use adjacency::Adjacency;
 pub use triangle_mesh::{MeshError, TriangleMesh};
-pub use unwrap::{Chart, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
+pub use unwrap::{Chart, Charted, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
 pub use weld::weld_positions;

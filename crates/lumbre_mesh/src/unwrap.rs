@@ -82,6 +82,9 @@ pub enum UnwrapError {
         /// The angle given.
         degrees: f64,
     },
+    /// The caller wanted no more.
+    #[error("unwrapping was stopped")]
+    Stopped,
     /// A chart or all of them need more texels than allowed.
     #[error(
         "the charts need {width:.0} x {height:.0} texels, the limit is {max_size}; \
@@ -112,67 +115,115 @@ pub fn unwrap(
     texels_per_meter: f64,
     options: UnwrapOptions,
 ) -> Result<Unwrapped, UnwrapError> {
-    mesh.validate()?;
-    if metric_positions.len() != mesh.positions.len() {
-        let (found, vertices) = (metric_positions.len(), mesh.positions.len());
-        return Err(MeshError::AttributeLength { attribute: "metric positions", found, vertices }.into());
-    }
-    if !(texels_per_meter.is_finite() && texels_per_meter > 0.0) {
-        return Err(UnwrapError::Density { texels_per_meter });
-    }
-    if !(0.0..=80.0).contains(&options.chart_angle) {
-        return Err(UnwrapError::ChartAngle { degrees: options.chart_angle });
-    }
-    let surface = Surface::new(mesh, metric_positions);
-    let flat_charts = Charting {
-        corners: &surface.corners,
-        normals: &surface.normals,
-        areas: &surface.areas,
-        adjacency: &surface.adjacency,
-        // Rounding must not split a plane at an angle of 0.
-        least_cosine: options.chart_angle.to_radians().cos() - 1e-6,
-    }
-    .charts();
-    let mut layouts = Vec::with_capacity(flat_charts.len());
-    for chart in &flat_charts {
-        layouts.push(Layout::new(chart, &surface, texels_per_meter, options.max_size)?);
-    }
-    let without_area: Vec<u32> = (0..surface.corners.len() as u32)
-        .filter(|&triangle| surface.normals[triangle as usize] == DVec3::ZERO)
-        .collect();
-    let mut rectangles: Vec<(u32, u32)> = layouts.iter().map(|layout| layout.texels).collect();
-    if !without_area.is_empty() {
-        rectangles.push((1, 1));
-    }
-    let packed = place(&rectangles, options)?;
-    let (width, height) = packed.pages.first().copied().unwrap_or_default();
+    let chart_angle = options.chart_angle;
+    let charted = Charted::new(mesh, metric_positions, chart_angle, &|| true)?;
+    charted.unwrap(texels_per_meter, options.gap, options.max_size)
+}
 
-    let mut charts = Vec::with_capacity(rectangles.len());
-    let mut splitter = VertexSplitter::new(mesh);
-    let size = DVec2::new(f64::from(width), f64::from(height));
-    for (index, Placement { x, y, .. }) in packed.placements.into_iter().enumerate() {
-        let corner = DVec2::new(f64::from(x), f64::from(y));
-        let (rectangle_width, rectangle_height) = rectangles[index];
-        let (triangles, normal) = match (flat_charts.get(index), layouts.get(index)) {
-            (Some(chart), Some(layout)) => {
-                for &triangle in &chart.triangles {
-                    let positions = surface.corners[triangle as usize];
-                    let uv = positions.map(|p| (corner + layout.texel(chart, p)) / size);
-                    splitter.assign(index as u32, triangle, uv);
-                }
-                (chart.triangles.clone(), chart.normal.as_vec3())
-            }
-            _ => {
-                for &triangle in &without_area {
-                    splitter.assign(index as u32, triangle, [(corner + 0.5) / size; 3]);
-                }
-                (without_area.clone(), Vec3::ZERO)
-            }
+/// A mesh cut into charts, which do not depend on the density: to be unwrapped at several.
+pub struct Charted<'a> {
+    mesh: &'a TriangleMesh,
+    surface: Surface,
+    flat_charts: Vec<FlatChart>,
+    without_area: Vec<u32>,
+    go_on: &'a dyn Fn() -> bool,
+}
+
+impl<'a> Charted<'a> {
+    /// Cuts a mesh, as [`unwrap`] does. `go_on` is asked now and then whether to.
+    ///
+    /// # Errors
+    /// [`UnwrapError`]; [`UnwrapError::Stopped`] if `go_on` said no.
+    pub fn new(
+        mesh: &'a TriangleMesh,
+        metric_positions: &[Vec3],
+        chart_angle: f64,
+        go_on: &'a dyn Fn() -> bool,
+    ) -> Result<Self, UnwrapError> {
+        mesh.validate()?;
+        if metric_positions.len() != mesh.positions.len() {
+            let (found, vertices) = (metric_positions.len(), mesh.positions.len());
+            return Err(MeshError::AttributeLength { attribute: "metric positions", found, vertices }.into());
+        }
+        if !(0.0..=80.0).contains(&chart_angle) {
+            return Err(UnwrapError::ChartAngle { degrees: chart_angle });
+        }
+        let surface = Surface::new(mesh, metric_positions);
+        let charting = Charting {
+            corners: &surface.corners,
+            normals: &surface.normals,
+            areas: &surface.areas,
+            adjacency: &surface.adjacency,
+            // Rounding must not split a plane at an angle of 0.
+            least_cosine: chart_angle.to_radians().cos() - 1e-6,
         };
-        charts.push(Chart { triangles, normal, x, y, width: rectangle_width, height: rectangle_height });
+        let flat_charts = charting.charts(go_on).ok_or(UnwrapError::Stopped)?;
+        let without_area = (0..surface.corners.len() as u32)
+            .filter(|&triangle| surface.normals[triangle as usize] == DVec3::ZERO)
+            .collect();
+        Ok(Self { mesh, surface, flat_charts, without_area, go_on })
     }
-    let (mesh, vertex_sources) = splitter.finish();
-    Ok(Unwrapped { mesh, vertex_sources, width, height, charts })
+
+    /// How many charts there are, one for triangles without area among them.
+    pub fn len(&self) -> usize {
+        self.flat_charts.len() + usize::from(!self.without_area.is_empty())
+    }
+
+    /// Whether the mesh has no triangles.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Gives the mesh lightmap coordinates at a density, as [`unwrap`] does.
+    ///
+    /// # Errors
+    /// [`UnwrapError`].
+    pub fn unwrap(&self, texels_per_meter: f64, gap: u32, max_size: u32) -> Result<Unwrapped, UnwrapError> {
+        if !(texels_per_meter.is_finite() && texels_per_meter > 0.0) {
+            return Err(UnwrapError::Density { texels_per_meter });
+        }
+        let Self { mesh, surface, flat_charts, without_area, go_on } = self;
+        let mut layouts = Vec::with_capacity(flat_charts.len());
+        for chart in flat_charts {
+            if !go_on() {
+                return Err(UnwrapError::Stopped);
+            }
+            layouts.push(Layout::new(chart, surface, texels_per_meter, max_size)?);
+        }
+        let mut rectangles: Vec<(u32, u32)> = layouts.iter().map(|layout| layout.texels).collect();
+        if !without_area.is_empty() {
+            rectangles.push((1, 1));
+        }
+        let packed = place(&rectangles, gap, max_size)?;
+        let (width, height) = packed.pages.first().copied().unwrap_or_default();
+
+        let mut charts = Vec::with_capacity(rectangles.len());
+        let mut splitter = VertexSplitter::new(mesh);
+        let size = DVec2::new(f64::from(width), f64::from(height));
+        for (index, Placement { x, y, .. }) in packed.placements.into_iter().enumerate() {
+            let corner = DVec2::new(f64::from(x), f64::from(y));
+            let (rectangle_width, rectangle_height) = rectangles[index];
+            let (triangles, normal) = match (flat_charts.get(index), layouts.get(index)) {
+                (Some(chart), Some(layout)) => {
+                    for &triangle in &chart.triangles {
+                        let positions = surface.corners[triangle as usize];
+                        let uv = positions.map(|p| (corner + layout.texel(chart, p)) / size);
+                        splitter.assign(index as u32, triangle, uv);
+                    }
+                    (chart.triangles.clone(), chart.normal.as_vec3())
+                }
+                _ => {
+                    for &triangle in without_area {
+                        splitter.assign(index as u32, triangle, [(corner + 0.5) / size; 3]);
+                    }
+                    (without_area.clone(), Vec3::ZERO)
+                }
+            };
+            charts.push(Chart { triangles, normal, x, y, width: rectangle_width, height: rectangle_height });
+        }
+        let (mesh, vertex_sources) = splitter.finish();
+        Ok(Unwrapped { mesh, vertex_sources, width, height, charts })
+    }
 }
 
 /// The mesh in world metres, in f64.
@@ -253,19 +304,20 @@ impl Layout {
 }
 
 /// All rectangles on one page.
-fn place(rectangles: &[(u32, u32)], options: UnwrapOptions) -> Result<Atlas, UnwrapError> {
-    let UnwrapOptions { gap, max_size, .. } = options;
+fn place(rectangles: &[(u32, u32)], gap: u32, max_size: u32) -> Result<Atlas, UnwrapError> {
+    let padded = f64::from(gap);
+    let area = |&(w, h): &(u32, u32)| (f64::from(w) + padded) * (f64::from(h) + padded);
+    let side = rectangles.iter().map(area).sum::<f64>().sqrt();
+    let too_large = UnwrapError::TooLarge { width: side, height: side, max_size };
+    // Packing them would only tell the same.
+    if side > f64::from(max_size) + padded {
+        return Err(too_large);
+    }
     let packed = atlas::pack(rectangles, AtlasOptions { max_width: max_size, max_height: max_size, gap });
     let packed = packed.map_err(|AtlasError::TooLarge { width, height, .. }| UnwrapError::TooLarge {
         width: f64::from(width),
         height: f64::from(height),
         max_size,
     })?;
-    if packed.pages.len() > 1 {
-        let gap = f64::from(gap);
-        let area = |&(w, h): &(u32, u32)| (f64::from(w) + gap) * (f64::from(h) + gap);
-        let side = rectangles.iter().map(area).sum::<f64>().sqrt();
-        return Err(UnwrapError::TooLarge { width: side, height: side, max_size });
-    }
-    Ok(packed)
+    if packed.pages.len() > 1 { Err(too_large) } else { Ok(packed) }
 }

@@ -149,29 +149,24 @@ impl<'a> Change<'a> {
             self.seen(sequence, &|_, x, y| point(x, y), light).means().into()
         })?;
         let bound = |which: usize, patch: usize| if which == 0 { first[patch].0 } else { first[patch].1 };
-        let solved: Vec<Vec<f64>> = (0..6usize)
-            .into_par_iter()
-            .map(|job| {
-                let (which, channel) = (job / 3, job % 3);
-                // What changed objects themselves receive is not a change of theirs.
-                let of_patch = |patch: &Patch| f64::from(patch.reflectance[channel]);
-                let reflectance: Vec<f64> = patches
-                    .list
+        let job = |job: usize| {
+            let (which, channel) = (job / 3, job % 3);
+            // What changed objects themselves receive is not a change of theirs.
+            let of_patch = |patch: &Patch| f64::from(patch.reflectance[channel]);
+            let reflectance: Vec<f64> =
+                patches.list.iter().map(|patch| if is_new(patch) { 0.0 } else { of_patch(patch) }).collect();
+            // The solver knows light only: what is more and what is less, apart.
+            let [more, less] = [1.0f64, -1.0].map(|sign| {
+                let emission: Vec<f64> = reflectance
                     .iter()
-                    .map(|patch| if is_new(patch) { 0.0 } else { of_patch(patch) })
+                    .enumerate()
+                    .map(|(patch, rho)| rho * (sign * f64::from(bound(which, patch)[channel])).max(0.0))
                     .collect();
-                // The solver knows light only: what is more and what is less, apart.
-                let [more, less] = [1.0f64, -1.0].map(|sign| {
-                    let emission: Vec<f64> = reflectance
-                        .iter()
-                        .enumerate()
-                        .map(|(patch, rho)| rho * (sign * f64::from(bound(which, patch)[channel])).max(0.0))
-                        .collect();
-                    gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
-                });
-                more.iter().zip(&less).map(|(more, less)| more - less).collect()
-            })
-            .collect();
+                gather(factors, &solver.solve(factors, &reflectance, &emission, TOLERANCE).radiosity)
+            });
+            more.iter().zip(&less).map(|(more, less)| more - less).collect::<Vec<f64>>()
+        };
+        let solved: Vec<Vec<f64>> = watch.during(1.0, || (0..6usize).into_par_iter().map(job).collect())?;
         let of_patch = |which: usize, patch: usize| {
             let [red, green, blue] = [0, 1, 2].map(|channel| solved[3 * which + channel][patch]);
             bound(which, patch) + DVec3::new(red, green, blue).as_vec3()

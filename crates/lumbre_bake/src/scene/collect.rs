@@ -13,7 +13,7 @@ use lumbre_scene::{
     StaticObject, propagate_transforms,
 };
 
-use crate::BakeError;
+use crate::{BakeError, UnwrappedFrom};
 
 /// A mesh with its material: one entity.
 #[derive(Clone, Debug)]
@@ -67,16 +67,18 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
         Option<&GlobalTransform>,
         Option<&Primitive>,
         Option<&ChildOf>,
+        Option<&UnwrappedFrom>,
     ), (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>();
-    for (entity, mesh, material, textures, transform, primitive, parent) in query.iter(world) {
+    for (entity, mesh, material, textures, transform, primitive, parent, unwrapped) in query.iter(world) {
         if under_a_dynamic_object(world, parent) {
             continue;
         }
+        let (mesh, textures) = UnwrappedFrom::read(unwrapped, mesh, textures);
         let part = Part {
             entity,
-            mesh: Arc::clone(&mesh.0),
+            mesh,
             material: material.clone(),
-            textures: textures.cloned(),
+            textures,
             transform: transform.map_or(DAffine3::IDENTITY, |transform| transform.0),
         };
         let (owner, index) = match (primitive, parent) {

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use glam::{DAffine3, Vec2, Vec3};
 use lumbre_mesh::uv_validation::validate_uv1;
-use lumbre_mesh::{TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
+use lumbre_mesh::{Charted, TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped};
 
 use super::texture_coordinates::{free_second, sets_read};
 use super::{Canonical, Object, SceneTriangle};
+use crate::stop::Stop;
 use crate::{BakeError, BakeOptions, Density};
 
 /// The texels of one object.
@@ -74,7 +75,8 @@ pub(crate) fn lay_out(
     options: &BakeOptions,
     warnings: &mut Vec<String>,
 ) -> Result<LightmapLayout, BakeError> {
-    lay_out_with(objects, space, density_of(objects, space, options), options, warnings)
+    let density = density_of(objects, space, options);
+    lay_out_with(objects, space, density, options, &Stop::default(), warnings)
 }
 
 /// Lays out every object, with so many texels per canonical unit.
@@ -83,6 +85,7 @@ pub(crate) fn lay_out_with(
     space: Canonical,
     density: f64,
     options: &BakeOptions,
+    stop: &Stop,
     warnings: &mut Vec<String>,
 ) -> Result<LightmapLayout, BakeError> {
     let mut layout = LightmapLayout { density, ..LightmapLayout::default() };
@@ -93,7 +96,7 @@ pub(crate) fn lay_out_with(
         let made = match instances.get(&key) {
             Some(known) => known.clone(),
             None => {
-                let made = lay_out_object(object, space, density, options, warnings)?;
+                let made = lay_out_object(object, space, density, options, stop, warnings)?;
                 instances.insert(key, made.clone());
                 made
             }
@@ -187,6 +190,7 @@ fn lay_out_object(
     space: Canonical,
     density: f64,
     options: &BakeOptions,
+    stop: &Stop,
     warnings: &mut Vec<String>,
 ) -> Result<Made, BakeError> {
     let placed = Placed::new(object, space);
@@ -225,10 +229,24 @@ fn lay_out_object(
             object.name
         ));
     }
+    let go_on = || !stop.is_set();
+    let charted =
+        Charted::new(&placed.mesh, &placed.mesh.positions, UnwrapOptions::default().chart_angle, &go_on)
+            .map_err(|source| BakeError::Unwrap { object: object.name.clone(), source })?;
     let (unwrapped, width, height) = match options.density {
-        Density::MapSize(side) => (fit(&object, &placed, side, options.gap)?, side, side),
+        Density::MapSize(asked) => {
+            let (made, side) = fit(&object, &placed, &charted, asked, options.gap)?;
+            if side > asked {
+                warnings.push(format!(
+                    "{}: its {} charts do not fit a map of {asked} x {asked} texels; it got one of {side} x {side}",
+                    object.name,
+                    charted.len()
+                ));
+            }
+            (made, side, side)
+        }
         _ => {
-            let made = unwrap_at_most(&object, &placed, density, options.gap, warnings)?;
+            let made = unwrap_at_most(&object, &charted, density, options.gap, warnings)?;
             let (width, height) = (made.width.max(1), made.height.max(1));
             (made, width, height)
         }
@@ -238,44 +256,64 @@ fn lay_out_object(
     Ok(Made { meshes: split(&object, &unwrapped, shrink), moved, width, height })
 }
 
-/// The densest unwrap that fits a square of `side` texels.
-fn fit(object: &Object, placed: &Placed, side: u32, gap: u32) -> Result<Unwrapped, BakeError> {
-    let options = UnwrapOptions { gap, max_size: side, ..UnwrapOptions::default() };
-    let try_density = |density: f64| unwrap(&placed.mesh, &placed.mesh.positions, density, options);
-    // No packing exceeds one texel per texel; a density of nothing leaves two texels per chart.
-    let mut high = if placed.area > 0.0 { f64::from(side) / placed.area.sqrt() } else { 1.0 };
-    let mut low = high;
+/// The densest unwrap that fits a square of `side` texels, or the next larger one by a power of two in which its charts have room; and its side.
+fn fit(
+    object: &Object,
+    placed: &Placed,
+    charted: &Charted<'_>,
+    asked: u32,
+    gap: u32,
+) -> Result<(Unwrapped, u32), BakeError> {
+    let failed = |source| BakeError::Unwrap { object: object.name.clone(), source };
+    let mut side = asked;
     let mut best = loop {
-        match try_density(low) {
+        match charted.unwrap(SPARSEST, gap, side) {
             Ok(made) => break made,
-            Err(UnwrapError::TooLarge { .. }) if low > high * 1e-4 => {
-                high = low;
-                low *= 0.7;
+            Err(UnwrapError::TooLarge { .. }) if side < LARGEST_SIDE => side = (2 * side).min(LARGEST_SIDE),
+            Err(UnwrapError::TooLarge { .. }) => {
+                return Err(BakeError::TooManyCharts {
+                    object: object.name.clone(),
+                    charts: charted.len(),
+                    limit: LARGEST_SIDE,
+                });
             }
-            Err(source) => return Err(BakeError::Unwrap { object: object.name.clone(), source }),
+            Err(source) => return Err(failed(source)),
         }
     };
-    for _ in 0..6 {
-        let middle = 0.5 * (low + high);
-        match try_density(middle) {
-            Ok(made) => (best, low) = (made, middle),
-            Err(_) => high = middle,
+    // No packing exceeds one texel per texel.
+    let mut high = if placed.area > 0.0 { f64::from(side) / placed.area.sqrt() } else { 1.0 };
+    let mut low = high;
+    for _ in 0..MOST_DENSITIES {
+        match charted.unwrap(low, gap, side) {
+            Ok(made) => {
+                best = made;
+                break;
+            }
+            Err(UnwrapError::TooLarge { .. }) => (high, low) = (low, 0.7 * low),
+            Err(source) => return Err(failed(source)),
         }
     }
-    Ok(best)
+    for _ in 0..6 {
+        let middle = 0.5 * (low + high);
+        match charted.unwrap(middle, gap, side) {
+            Ok(made) => (best, low) = (made, middle),
+            Err(UnwrapError::TooLarge { .. }) => high = middle,
+            Err(source) => return Err(failed(source)),
+        }
+    }
+    Ok((best, side))
 }
 
 fn unwrap_at_most(
     object: &Object,
-    placed: &Placed,
+    charted: &Charted<'_>,
     density: f64,
     gap: u32,
     warnings: &mut Vec<String>,
 ) -> Result<Unwrapped, BakeError> {
-    let options = UnwrapOptions { gap, max_size: LARGEST_SIDE, ..UnwrapOptions::default() };
     let mut tried = density;
-    loop {
-        match unwrap(&placed.mesh, &placed.mesh.positions, tried, options) {
+    for _ in 0..MOST_DENSITIES {
+        match charted.unwrap(tried, gap, LARGEST_SIDE) {
             Ok(made) => {
                 if tried < density {
                     let share = 100.0 * tried / density;
@@ -286,11 +324,18 @@ fn unwrap_at_most(
                 }
                 return Ok(made);
             }
-            Err(UnwrapError::TooLarge { .. }) if tried > density * 1e-6 => tried *= 0.7,
+            Err(UnwrapError::TooLarge { .. }) => tried *= 0.7,
             Err(source) => return Err(BakeError::Unwrap { object: object.name.clone(), source }),
         }
     }
+    let (object, charts) = (object.name.clone(), charted.len());
+    Err(BakeError::TooManyCharts { object, charts, limit: LARGEST_SIDE })
 }
+
+/// Texels per canonical unit at which every chart has the fewest texels.
+const SPARSEST: f64 = 1e-9;
+/// Densities that are tried, each 0.7 of the one before: down to a millionth.
+const MOST_DENSITIES: u32 = 40;
 
 /// Gives the parts their shares of the unwrapped whole.
 fn split(object: &Object, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {

@@ -40,15 +40,28 @@ impl SurfaceMaterial {
 
     /// Texels of the emissive texture along the longest edge of a triangle; 0 without one.
     pub fn emission_texels(&self, vertices: [u32; 3]) -> f32 {
-        let Some(texture) = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref()) else {
-            return 0.0;
-        };
+        let texture = self.textures.as_ref().and_then(|textures| textures.emissive.as_ref());
+        texture.map_or(0.0, |texture| self.texels(texture, vertices, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
+    }
+
+    /// Texels of the textures that the reflectance is read from along the longest edge of a part of a triangle, which is given by weights of
+    /// the second and third vertex; 0 without any.
+    pub fn reflectance_texels(&self, vertices: [u32; 3], part: [(f32, f32); 3]) -> f32 {
+        let Some(textures) = &self.textures else { return 0.0 };
+        let metallic = textures.metallic_roughness.as_ref().map(|metallic| &metallic.texture);
+        let read = [textures.base_color.as_ref(), metallic].into_iter().flatten();
+        read.map(|texture| self.texels(texture, vertices, part)).fold(0.0, f32::max)
+    }
+
+    /// Texels of a texture along the longest edge of a part of a triangle.
+    fn texels(&self, texture: &TextureReference, vertices: [u32; 3], part: [(f32, f32); 3]) -> f32 {
         let coordinates = if texture.tex_coord == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         let size = Vec2::new(texture.image.width as f32, texture.image.height as f32);
         let at = |vertex: u32| {
             coordinates.get(vertex as usize).copied().unwrap_or_default() * texture.scale * size
         };
         let [a, b, c] = vertices.map(at);
+        let [a, b, c] = part.map(|(u, v)| a + (b - a) * u + (c - a) * v);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         if longest.is_finite() { longest } else { 0.0 }
     }

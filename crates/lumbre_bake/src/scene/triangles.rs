@@ -12,6 +12,7 @@ use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, Object, SurfaceMaterial};
 use crate::BakeError;
+use crate::stop::Stop;
 
 /// The space in which everything is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,12 +125,16 @@ impl SceneTriangle {
 pub(crate) struct BakeScene {
     pub space: Canonical,
     pub triangles: Vec<SceneTriangle>,
+    /// Of the objects, for people.
+    pub names: Vec<String>,
     pub surfaces: Vec<SurfaceMaterial>,
     pub bvh: Bvh,
     /// Whether some surface lets light through in places.
     pub masked: bool,
     /// Rays that ended where none should.
     pub leaks: Leaks,
+    /// Whether nobody waits for what is computed of it any more.
+    pub stop: Stop,
     /// The closed pieces that look inward.
     pub rooms: Vec<Room>,
     /// All that shines is inside of rooms: nothing leaves them.
@@ -145,6 +150,7 @@ impl BakeScene {
         objects: &[Object],
         layout: &LightmapLayout,
         space: Canonical,
+        stop: &Stop,
         warnings: &mut Vec<String>,
     ) -> Result<Self, BakeError> {
         let count = objects.iter().flat_map(|o| &o.parts).map(|part| part.mesh.triangle_count()).sum();
@@ -158,7 +164,7 @@ impl BakeScene {
             extract(object, index as u32, layout, space, &mut triangles, &mut surfaces, warnings);
             mark_closed(&mut triangles, first, &mut rooms, &mut solids);
         }
-        without_hollow(&mut triangles, &rooms, &solids);
+        without_hollow(&mut triangles, &rooms, &solids, warnings);
         mark_superseded(&mut triangles, &surfaces, warnings);
         let solid: Vec<[Vec3; 3]> = triangles
             .iter()
@@ -172,9 +178,11 @@ impl BakeScene {
             space,
             bvh: Bvh::build(&solid),
             triangles,
+            names: objects.iter().map(|object| object.name.clone()).collect(),
             surfaces,
             masked,
             leaks,
+            stop: stop.clone(),
             rooms,
             dark_outside: false,
         })
@@ -306,8 +314,20 @@ fn mark_closed(
 const MOST_PAIRS: usize = 1 << 24;
 
 /// What has a room inside of it, as a house's outside has, is no solid.
-fn without_hollow(triangles: &mut [SceneTriangle], rooms: &[Room], solids: &[Solid]) {
+fn without_hollow(
+    triangles: &mut [SceneTriangle],
+    rooms: &[Room],
+    solids: &[Solid],
+    warnings: &mut Vec<String>,
+) {
     let all = rooms.len().saturating_mul(solids.len()) > MOST_PAIRS;
+    if all {
+        warnings.push(format!(
+            "{} rooms and {} closed pieces are too many to tell which are in which; what a piece stands on may be lit inside of it",
+            rooms.len(),
+            solids.len()
+        ));
+    }
     let is_hollow = |(_, low, high): &&Solid| all || rooms.iter().any(|room| room.is_within(*low, *high));
     // Ascending, as objects and their corners are.
     let hollow: Vec<u32> = solids.iter().filter(is_hollow).map(|(number, ..)| *number).collect();

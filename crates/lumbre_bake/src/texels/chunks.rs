@@ -1,5 +1,6 @@
 //! Lists that take long, in chunks: between them the caller may cancel, the clock is looked at, and what is done is kept in the
-//! checkpoint. Not what is computed: a value depends on its index alone, so the chunks' borders show nowhere.
+//! checkpoint. Not what is computed: a value depends on its index alone, so the chunks' borders show nowhere. A chunk that takes longer
+//! than those before it made expect is given up within a moment if the caller cancels.
 
 use std::time::Instant;
 
@@ -52,10 +53,27 @@ pub(crate) fn in_chunks_anew<T: Send>(
     let mut values = Vec::with_capacity(count);
     while values.len() < count {
         let end = (values.len() + LEAST).min(count);
-        values.par_extend((values.len()..end).into_par_iter().map(&compute));
+        values.extend(chunk(values.len(), end, count, watch, &compute)?);
         watch.advance(values.len() as f32 / count as f32)?;
     }
     Ok(values)
+}
+
+/// The values from `start` to `end`, of `count`.
+fn chunk<T: Send>(
+    start: usize,
+    end: usize,
+    count: usize,
+    watch: &mut Watch<'_>,
+    compute: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, BakeError> {
+    let stop = watch.stop().clone();
+    let one = |index: usize| (!stop.is_set()).then(|| compute(index));
+    let done =
+        watch.during(start as f32 / count as f32, || (start..end).into_par_iter().map(one).collect())?;
+    // None only if it was stopped, which has ended here already.
+    let done: Option<Vec<T>> = done;
+    Ok(done.unwrap_or_default())
 }
 
 fn chunks<T: Send + Record>(
@@ -79,7 +97,7 @@ fn chunks<T: Send + Record>(
         } else {
             let begun = Instant::now();
             let end = (start + size).min(count);
-            values.par_extend((start..end).into_par_iter().map(&compute));
+            values.extend(chunk(start, end, count, watch, &compute)?);
             watch.keep(start, count, &values[start..]);
             let wanted = size as f64 * PACE / begun.elapsed().as_secs_f64().max(1e-6);
             size = (wanted as usize).min(4 * size).clamp(LEAST, MOST);

@@ -11,8 +11,8 @@ use super::straddling::Straddling;
 use crate::sampling::Sequence;
 use crate::transport::direct::Sources;
 
-/// Lines through one texel that count: what more there are lie mostly along these.
-const MOST_LINES: usize = 8;
+/// Lines through one texel that count: as many as a part's sides have bits.
+const MOST_LINES: usize = 32;
 /// Lines whose ends are this near to another's, in texels, divide nothing that it does not.
 const SAME_LINE: f32 = 1.0 / 16.0;
 
@@ -34,6 +34,8 @@ struct Part {
 #[derive(Clone, Debug)]
 struct Divided {
     lines: Vec<[Vec2; 2]>,
+    /// There were more.
+    full: bool,
     parts: Vec<Part>,
 }
 
@@ -42,6 +44,8 @@ struct Divided {
 pub(crate) struct DividedLight {
     /// By place in the row of all maps.
     texels: HashMap<u32, Divided>,
+    /// Texels with more lines than count.
+    full: usize,
 }
 
 impl DividedLight {
@@ -55,13 +59,29 @@ impl DividedLight {
         let divided: Vec<(u32, Divided, u64)> = straddling
             .par_iter()
             .filter_map(|straddling| {
+                if sources.scene.stop.is_set() {
+                    return None;
+                }
                 let texel = &texels[straddling.texel as usize];
                 let (divided, rays) = divide(sources, texel, &straddling.lines, samples, seed)?;
                 Some((texel.index, divided, rays))
             })
             .collect();
         let rays = divided.iter().map(|(.., rays)| rays).sum();
-        (Self { texels: divided.into_iter().map(|(index, divided, _)| (index, divided)).collect() }, rays)
+        let full = divided.iter().filter(|(_, divided, _)| divided.full).count();
+        let texels = divided.into_iter().map(|(index, divided, _)| (index, divided)).collect();
+        (Self { texels, full }, rays)
+    }
+
+    /// What does not count although it should, in words.
+    pub fn warning(&self) -> Option<String> {
+        let full = self.full;
+        (full > 0).then(|| {
+            format!(
+                "{full} texels are divided by more than {MOST_LINES} surfaces that stand on them; light that bounces off there mixes between \
+                 some of the parts"
+            )
+        })
     }
 
     /// Places, in the row of all maps, of the texels.
@@ -88,15 +108,19 @@ fn divide(
     samples: u32,
     seed: u32,
 ) -> Option<(Divided, u64)> {
-    let mut kept: Vec<[Vec2; 2]> = Vec::new();
+    let (mut kept, mut full): (Vec<[Vec2; 2]>, bool) = (Vec::new(), false);
     for line in lines {
         let [a, b] = line.map(|end| end.as_vec2());
         let same = |&[p, q]: &[Vec2; 2]| {
             let normal = (q - p).normalize_or_zero().perp();
             [a, b].into_iter().all(|end| normal.dot(end - p).abs() < SAME_LINE)
         };
-        if kept.len() < MOST_LINES && a != b && !kept.iter().any(same) {
-            kept.push([a, b]);
+        if a != b && !kept.iter().any(same) {
+            if kept.len() < MOST_LINES {
+                kept.push([a, b]);
+            } else {
+                full = true;
+            }
         }
     }
     let points = match &texel.footprint {
@@ -124,7 +148,7 @@ fn divide(
         Part { sides: own[0].0, middle, light: direct.total() }
     });
     let parts: Vec<Part> = parts.collect();
-    Some((Divided { lines: kept, parts }, rays))
+    Some((Divided { lines: kept, full, parts }, rays))
 }
 
 /// A bit for each line that has a point on its left.
@@ -145,7 +169,8 @@ mod tests {
             |at: Vec2, light: f32| Part { sides: sides(&lines, at), middle: at, light: Vec3::splat(light) };
         let parts = vec![part(Vec2::new(0.25, 0.5), 1.0), part(Vec2::new(0.75, 0.5), 8.0)];
         assert_ne!(parts[0].sides, parts[1].sides);
-        let divided = DividedLight { texels: HashMap::from([(7, Divided { lines, parts })]) };
+        let divided = Divided { lines, full: false, parts };
+        let divided = DividedLight { texels: HashMap::from([(7, divided)]), full: 0 };
         for (x, y, expected) in [(0.49, 0.99, 1.0), (0.01, 0.0, 1.0), (0.51, 0.01, 8.0), (0.99, 0.98, 8.0)] {
             assert_eq!(divided.at(7, Vec2::new(x, y)), Some(Vec3::splat(expected)), "{x} {y}");
         }

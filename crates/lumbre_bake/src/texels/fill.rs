@@ -6,8 +6,8 @@ use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::footprint::{Footprint, Texel};
-use crate::BakeError;
 use crate::scene::LightmapLayout;
+use crate::stop::Stop;
 
 /// Square texels of spread below which a slope counts as unknown.
 const RIDGE: f64 = 0.002;
@@ -29,17 +29,17 @@ pub(crate) struct Known {
 /// One map's texels from those known; `None` where nothing is within reach. `rings` is how far values are carried out of
 /// the charts; into texels that other geometry hides they go only where a point in the open reads them.
 fn fill_map(
-    width: u32,
-    height: u32,
+    (width, height): (u32, u32),
     known: &[Option<Known>],
     hidden: &[Hidden],
     rings: u32,
+    stop: &Stop,
 ) -> Vec<Option<Known>> {
     // The charts' own texels first, moved to their centres.
     let mut current: Vec<Option<Known>> = (0..known.len())
         .into_par_iter()
         .map(|index| {
-            let own = known[index]?;
+            let own = known[index].filter(|_| !stop.is_set())?;
             let offset = Vec2::splat(0.5) - own.middle;
             // A tenth of a texel is below what a slope can be told from.
             if offset.abs().max_element() < 0.1 {
@@ -60,7 +60,7 @@ fn fill_map(
                     Hidden::ReadFromTheOpen => true,
                     Hidden::Deep => false,
                 };
-                if current[index].is_some() || !wanted {
+                if current[index].is_some() || !wanted || stop.is_set() {
                     return current[index];
                 }
                 let (x, y) = (index as u32 % width, index as u32 / width);
@@ -179,15 +179,14 @@ fn around(width: u32, height: u32, x: u32, y: u32, radius: u32) -> impl Iterator
 }
 
 /// Fills all maps from values and squared errors per covered texel; NaN where nothing is known, and errors also where no surface is shown.
-/// `advance` is told the fraction done, and may end it.
 pub(crate) fn fill(
     layout: &LightmapLayout,
     texels: &[Texel],
     charts: &[u32],
     (values, variances): (&[Vec3], &[f32]),
     rings: u32,
-    advance: &mut dyn FnMut(f32) -> Result<(), BakeError>,
-) -> Result<(Vec<Vec3>, Vec<f32>), BakeError> {
+    stop: &Stop,
+) -> (Vec<Vec3>, Vec<f32>) {
     let mut known: Vec<Option<Known>> = vec![None; layout.texels];
     for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
         if !texel.is_hidden() {
@@ -200,15 +199,14 @@ pub(crate) fn fill(
     let mut errors = Vec::with_capacity(layout.texels);
     for map in &layout.maps {
         let own = map.first..map.first + (map.width * map.height) as usize;
-        let all = fill_map(map.width, map.height, &known[own.clone()], &hidden[own.clone()], rings);
+        let all = fill_map((map.width, map.height), &known[own.clone()], &hidden[own.clone()], rings, stop);
         filled.extend(all.iter().map(|known| known.map_or(Vec3::NAN, |known| known.value)));
         let shown = all.iter().zip(&known[own]);
         errors.extend(
             shown.map(|(all, own)| all.filter(|_| own.is_some()).map_or(f32::NAN, |all| all.variance)),
         );
-        advance(filled.len() as f32 / layout.texels.max(1) as f32)?;
     }
-    Ok((filled, errors))
+    (filled, errors)
 }
 
 /// `reach`: how far in texels filtering reads.
@@ -255,7 +253,7 @@ mod tests {
                 known[(y * 8 + x) as usize] = Some(Known { value, variance: 0.01, middle, chart: 0 });
             }
         }
-        let filled = fill_map(8, 8, &known, &[Hidden::No; 64], 1);
+        let filled = fill_map((8, 8), &known, &[Hidden::No; 64], 1, &Stop::default());
         for y in 2..6u32 {
             for x in 1..7u32 {
                 let Known { value: found, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
@@ -285,7 +283,7 @@ mod tests {
                 Some(Known { value: Vec3::splat(value), variance: 0.0, middle: Vec2::splat(0.5), chart })
             })
             .collect();
-        let filled = fill_map(4, 4, &known, &[Hidden::No; 16], 2);
+        let filled = fill_map((4, 4), &known, &[Hidden::No; 16], 2, &Stop::default());
         for row in filled.chunks(4) {
             assert_eq!(row.iter().map(|v| v.unwrap().value.x).collect::<Vec<_>>(), [1.0, 1.0, 9.0, 9.0]);
         }

@@ -60,6 +60,9 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
             let map = &layout.maps[object];
             let mut covers: Vec<(u32, u32)> = Vec::new();
             for &index in triangles {
+                if scene.stop.is_set() {
+                    return Vec::new();
+                }
                 covered_texels(&scene.triangles[index as usize], map.width, map.height, |x, y| {
                     covers.push((y * map.width + x, index));
                 });
@@ -68,6 +71,9 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
             covers
                 .par_chunk_by(|a, b| a.0 == b.0)
                 .filter_map(|chunk| {
+                    if scene.stop.is_set() {
+                        return None;
+                    }
                     let cell = chunk[0].0;
                     let (x, y) = (cell % map.width, cell / map.width);
                     let triangles = || chunk.iter().map(|&(_, triangle)| triangle);

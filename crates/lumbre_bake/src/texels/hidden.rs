@@ -46,7 +46,7 @@ pub(crate) fn remove_hidden(
     }
     let (hidden, judged) = texels
         .par_iter_mut()
-        .filter(|texel| near[texel.index as usize])
+        .filter(|texel| near[texel.index as usize] && !scene.stop.is_set())
         .map(|texel| judge(scene, texel))
         .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     rays += judged;
@@ -64,11 +64,14 @@ fn pressed(scene: &BakeScene, texel: &Texel) -> f32 {
 /// some rays of the whole tile tell.
 fn odd(scene: &BakeScene, texels: &[Texel]) -> (Vec<bool>, u64) {
     let tiles = Tiles::new(texels);
-    let tree = BoxTree::new(&scene.triangles);
+    let tree = BoxTree::new(&scene.triangles, &scene.stop);
     let suspect: Vec<bool> = tiles
         .members
         .par_iter()
         .map(|members| {
+            if scene.stop.is_set() {
+                return false;
+            }
             let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();
             let mut positions = Vec::new();
             members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
@@ -84,7 +87,7 @@ fn odd(scene: &BakeScene, texels: &[Texel]) -> (Vec<bool>, u64) {
     let odd: Vec<bool> = texels
         .par_iter()
         .enumerate()
-        .map(|(place, texel)| suspects(place) && looks_odd(scene, texel))
+        .map(|(place, texel)| suspects(place) && !scene.stop.is_set() && looks_odd(scene, texel))
         .collect();
     let asked = (0..texels.len()).filter(|&place| suspects(place)).count();
     let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + asked as u64 * u64::from(PROBES);

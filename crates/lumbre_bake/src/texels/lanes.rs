@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::neighbours::Block;
 use super::surroundings::{NONE, Surface};
+use crate::stop::Stop;
 
 /// Texels side by side.
 pub(crate) const LANES: usize = 8;
@@ -30,6 +31,8 @@ pub(crate) struct Grid {
     cells: usize,
     /// The instructions that this machine has; every level computes the same bits.
     pub level: Level,
+    /// Whether nobody waits for what is computed any more.
+    pub stop: Stop,
 }
 
 /// A row of a map.
@@ -81,7 +84,8 @@ impl Grid {
         }
         let count = cells.len();
         cells.resize(count + MARGIN, NONE);
-        Self { rows, blocks, ground: cells, surfaces, cells: count, level: Level::new() }
+        let (level, stop) = (Level::new(), Stop::default());
+        Self { rows, blocks, ground: cells, surfaces, cells: count, level, stop }
     }
 
     /// Numbers of each covered texel, which is told by its row (of all maps) and column.
@@ -162,7 +166,8 @@ impl Grid {
             rows.push(own);
             rest = after;
         }
-        rows.into_par_iter().enumerate().for_each(|(index, row)| write(index, row));
+        let rows = rows.into_par_iter().enumerate().filter(|_| !self.stop.is_set());
+        rows.for_each(|(index, row)| write(index, row));
     }
 
     /// What the strips hold of a texel.

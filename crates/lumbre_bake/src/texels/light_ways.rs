@@ -19,6 +19,9 @@ pub(super) fn ways(
     tree: &BoxTree,
 ) -> Vec<(u32, Way)> {
     let of_light = |&index: &u32| {
+        if sources.scene.stop.is_set() {
+            return None;
+        }
         let placed = &sources.lights[index as usize];
         let way = match is_out_of_range(sources.scene, placed, area) {
             true => Way::Dark,

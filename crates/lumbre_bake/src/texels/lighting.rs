@@ -32,13 +32,12 @@ pub(crate) fn direct_light(
     let scene = sources.scene;
     let known = |index: u32| known.get(index as usize).copied().flatten();
     let [few, many, most] = options.effort().direct;
-    eprintln!("DBG begin {:.2}", watch.seconds());
-    let cuts = LightCuts::new(sources, texels, charts);
-    watch.advance(0.0)?;
-    eprintln!("DBG cuts {:.2}", watch.seconds());
-    let shafts = Shafts::new(scene, sources, texels, &cuts, |index| known(index).is_none());
-    watch.advance(0.0)?;
-    eprintln!("DBG shafts {:.2}", watch.seconds());
+    let mut cuts = watch.during(0.0, || LightCuts::new(sources, texels, charts))?;
+    let wanted = |index: u32| known(index).is_none();
+    let shafts = watch.during(0.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
+    // Where rays would have to tell, one to any of the sources tells as much as one to each.
+    cuts.share(sources, &shafts.unresolved(&cuts));
+    let cuts = cuts;
     let light = |place: usize, samples: u32| {
         let texel = &texels[place];
         if texel.is_hidden() {

@@ -25,8 +25,8 @@ const BOUNCES: u32 = 6;
 /// Things in view that a walk looks at, none of them nearer to the one before than so many texels.
 const VIEW: usize = 2;
 const NEAREST: f32 = 8.0;
-/// Least local light, in shares of the whole level's mean: ten stops darker no exposure shows both.
-pub(crate) const FLOOR: f64 = 1.0 / 1024.0;
+/// Least local light, in shares of the whole level's mean: six stops, which is about as far as an automatic exposure follows.
+pub(crate) const FLOOR: f64 = 1.0 / 64.0;
 /// Sequences of the walks.
 const PURPOSE: u32 = 80;
 
@@ -153,7 +153,7 @@ impl Level<'_> {
                     walk.indirect += weight * grey(self.sources.sky);
                     return walk;
                 }
-                SurfaceHit::Back | SurfaceHit::Inside => return walk,
+                SurfaceHit::Back | SurfaceHit::Inside => break,
             };
             let surface = &scene.triangles[triangle as usize];
             let material = &scene.surfaces[surface.surface as usize];

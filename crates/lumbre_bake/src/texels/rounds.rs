@@ -69,7 +69,8 @@ pub(crate) fn gather(
     let open = open_texels.clone().count().max(1) as f64;
     let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
     let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
-    let surroundings = Surroundings::new(outgoing.scene, outgoing.layout, texels, charts, &[]);
+    let surroundings =
+        watch.during(0.0, || Surroundings::new(outgoing.scene, outgoing.layout, texels, charts, &[]))?;
     let mut wanted: Vec<Allotment> = open_texels
         .clone()
         .filter(|&index| gathered[index as usize].samples == 0)
@@ -94,17 +95,17 @@ pub(crate) fn gather(
         }
         round += 1;
         let raw: Vec<Estimates> = gathered.par_iter().map(Gathered::estimates).collect();
-        let (estimates, smoothing_bias) = match options.denoise {
+        let (estimates, smoothing_bias) = watch.during(1.0, || match options.denoise {
             true => {
                 let near: Vec<f32> = gathered.par_iter().map(Gathered::inverse_distance).collect();
                 smooth(&surroundings, &raw, &near)
             }
             false => (raw.clone(), vec![0.0; texels.len()]),
-        };
-        watch.advance(1.0)?;
-        let patch_bias =
-            patch_bias(&surroundings, texels, &gathered, &raw, outgoing.patches.mean_reflectance());
-        let spread = spread(&surroundings, &estimates);
+        })?;
+        let patch_bias = watch.during(1.0, || {
+            patch_bias(&surroundings, texels, &gathered, &raw, outgoing.patches.mean_reflectance())
+        })?;
+        let spread = watch.during(1.0, || spread(&surroundings, &estimates))?;
         let errors = GatherErrors {
             gathered: &gathered,
             estimates: &estimates,
@@ -154,6 +155,7 @@ pub(crate) fn gather(
         }
         report.error_reached = report.estimated_error <= options.error;
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
+        watch.note_error(report.estimated_error);
         watch.advance(1.0)?;
         let late = !in_time || watch.clock().late();
         // Of the error, the part that more rays make smaller: what the patches leave stays.

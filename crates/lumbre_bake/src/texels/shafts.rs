@@ -22,6 +22,8 @@ struct OfTile {
     parts: Vec<OfPart>,
     /// By the lights' numbers.
     lights: Vec<(u32, Way)>,
+    /// A texel of it, by its place, that shows something: none if nobody wants to know.
+    asked: Option<u32>,
 }
 
 /// What may stand between a tile and a part of the emissive surfaces, by numbers.
@@ -54,16 +56,18 @@ impl<'a> Shafts<'a> {
         }
         let Tiles { members, tile_of } = Tiles::new(texels);
         shafts.tile_of = tile_of;
-        let tree = BoxTree::new(&scene.triangles);
+        let tree = BoxTree::new(&scene.triangles, &scene.stop);
         shafts.tiles = members
             .par_iter()
             .map(|members| {
-                if !members.iter().any(|&place| wanted(place)) {
+                if scene.stop.is_set() || !members.iter().any(|&place| wanted(place)) {
                     return OfTile::default();
                 }
                 let cut = cuts.of(members[0] as usize);
+                let asked = members.iter().copied().find(|&place| !texels[place as usize].is_hidden());
                 let members = || members.iter().map(|&place| &texels[place as usize]);
-                shafts.of_tile(&tree, cut, members).unwrap_or_default()
+                let found = shafts.of_tile(&tree, cut, members).unwrap_or_default();
+                OfTile { asked, ..found }
             })
             .collect();
         shafts
@@ -87,6 +91,9 @@ impl<'a> Shafts<'a> {
         let lamp = |&part: &u32| {
             let mut found = Vec::new();
             for &emitter in self.sources.emitters_of(part) {
+                if self.scene.stop.is_set() {
+                    return None;
+                }
                 if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {
                     found.push((emitter, shaft.triangles(self.scene, tree, MOST_BLOCKERS)?));
                 }
@@ -95,7 +102,17 @@ impl<'a> Shafts<'a> {
         };
         let parts = cut.lamps.iter().filter_map(lamp).collect();
         let lights = ways(self.sources, &cut.lights, &area, first.side(self.scene), tree);
-        Some(OfTile { parts, lights })
+        Some(OfTile { parts, lights, asked: None })
+    }
+
+    /// Lamps that have samples of their own where it is not known what may stand before them: a texel, by its place, and the lamp.
+    pub fn unresolved(&self, cuts: &LightCuts) -> Vec<(u32, u32)> {
+        let of_tile = |tile: &OfTile| {
+            let lamps = tile.asked.map_or(&[][..], |asked| &cuts.of(asked as usize).lamps);
+            let open = lamps.iter().filter(|&&lamp| tile.parts.iter().all(|part| part.part != lamp));
+            open.filter_map(|&lamp| Some((tile.asked?, lamp))).collect::<Vec<_>>()
+        };
+        self.tiles.iter().flat_map(of_tile).collect()
     }
 
     /// What may stand between a texel, by its number, and those of the sources for which that is known.

@@ -40,6 +40,10 @@ pub(crate) struct Shared {
 const PURPOSE: u32 = 96;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
+/// A round that leaves more than this of the squared error was the last, and one that leaves so many times what was asked: to smooth
+/// everything once more takes longer than what is left is worth.
+const STALLED: f64 = 0.9;
+const ENOUGH: f64 = 1.15;
 /// A round's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.6;
 
@@ -141,17 +145,17 @@ impl<'a> SharedLight<'a> {
         goal: f64,
         watch: &mut Watch<'_>,
     ) -> Result<(), BakeError> {
+        let mut before = f64::INFINITY;
         let (estimates, variances) = loop {
             let raw: Vec<Estimates> = self.found.par_iter().map(Shared::estimates).collect();
-            let (estimates, bias) = match self.options.denoise {
+            let (estimates, bias) = watch.during(1.0, || match self.options.denoise {
                 true => {
                     let near: Vec<f32> = self.found.par_iter().map(Shared::inverse_distance).collect();
                     smooth(&self.surroundings, &raw, &near)
                 }
                 false => (raw, vec![0.0; self.found.len()]),
-            };
-            watch.advance(1.0)?;
-            let spread = spread(&self.surroundings, &estimates);
+            })?;
+            let spread = watch.during(1.0, || spread(&self.surroundings, &estimates))?;
             let variances: Vec<f32> = spread.iter().zip(&bias).map(|(spread, bias)| spread + bias).collect();
             let relative = local.relative(&variances);
             let asked = |place: &u32| self.found[*place as usize].samples > 0;
@@ -167,9 +171,11 @@ impl<'a> SharedLight<'a> {
                 let at = |q: f64| sorted[(q * (sorted.len() - 1) as f64) as usize].sqrt();
                 eprintln!("DBG shared {:.2}s: left {:.4} goal {:.4} spread {:.4} bias {:.4} samples/texel {:.1} p50 {:.4} p90 {:.4} p99 {:.4} p999 {:.4} max {:.3}", watch.seconds(), (left/open).sqrt(), (goal/open).sqrt(), (sp/open).sqrt(), (bi/open).sqrt(), 4.0*n/open, at(0.5), at(0.9), at(0.99), at(0.999), at(1.0));
             }
-            if left <= goal || watch.clock().late() {
+            let stalled = left > STALLED * before;
+            if left <= goal * ENOUGH || stalled || watch.clock().late() {
                 break (estimates, variances);
             }
+            before = left;
             let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
             let wanted: Vec<Allotment> = allot(places, &relative, &samples, self.most, ORDER, goal);
             watch.pass(PASS);

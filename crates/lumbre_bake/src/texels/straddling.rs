@@ -22,7 +22,7 @@ pub(crate) struct Straddling {
 
 /// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
 pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(usize, [DVec2; 2])> {
-    let tree = BoxTree::new(&scene.triangles);
+    let tree = BoxTree::new(&scene.triangles, &scene.stop);
     let mut lines: Vec<(usize, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
         .flat_map_iter(|index| divisions(scene, layout, &tree, index))
@@ -65,7 +65,7 @@ fn divisions(
     let map = &layout.maps[triangle.object as usize];
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
     let texels = (b - a).perp_dot(c - a).abs();
-    if triangle.superseded || !(texels.is_finite() && texels > 2.0) {
+    if triangle.superseded || scene.stop.is_set() || !(texels.is_finite() && texels > 2.0) {
         return Vec::new();
     }
     let side = (2.0 * f64::from(triangle.area) / texels).sqrt();

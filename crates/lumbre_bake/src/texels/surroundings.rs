@@ -59,8 +59,8 @@ impl<'a> Surroundings<'a> {
             ground[texel.index as usize] = surface;
         }
         let sizes = layout.maps.iter().map(|map| (map.width, map.height));
-        let ground = ground.into_iter();
-        let grid = Grid::new(sizes, ground, surfaces);
+        let mut grid = Grid::new(sizes, ground.into_iter(), surfaces);
+        grid.stop = scene.stop.clone();
         let (mut first_rows, mut firsts) = (Vec::new(), Vec::new());
         for map in &layout.maps {
             first_rows.push(firsts.len());

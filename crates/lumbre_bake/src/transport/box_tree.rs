@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::scene::SceneTriangle;
+use crate::stop::Stop;
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
@@ -24,13 +25,13 @@ pub(crate) struct BoxTree {
 
 impl BoxTree {
     /// Of the triangles that light meets.
-    pub fn new(triangles: &[SceneTriangle]) -> Self {
+    pub fn new(triangles: &[SceneTriangle], stop: &Stop) -> Self {
         let mut items: Vec<u32> =
             (0..triangles.len() as u32).filter(|&index| !triangles[index as usize].superseded).collect();
         let mut nodes = Vec::with_capacity(2 * items.len() / LEAF + 1);
         if !items.is_empty() {
             let end = items.len();
-            build(triangles, &mut items, 0, end, &mut nodes);
+            build((triangles, stop), &mut items, 0, end, &mut nodes);
         }
         Self { nodes, items }
     }
@@ -68,14 +69,21 @@ impl BoxTree {
 }
 
 /// Halves by the median along the longest axis.
-fn build(triangles: &[SceneTriangle], items: &mut [u32], first: usize, end: usize, nodes: &mut Vec<Node>) {
+fn build(
+    (triangles, stop): (&[SceneTriangle], &Stop),
+    items: &mut [u32],
+    first: usize,
+    end: usize,
+    nodes: &mut Vec<Node>,
+) {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for corner in items[first..end].iter().flat_map(|&index| triangles[index as usize].corners) {
         (low, high) = (low.min(corner), high.max(corner));
     }
     let (index, count) = (nodes.len(), end - first);
-    nodes.push(Node { low, high, first: first as u32, count: if count <= LEAF { count as u32 } else { 0 } });
-    if count <= LEAF {
+    let is_leaf = count <= LEAF || stop.is_set();
+    nodes.push(Node { low, high, first: first as u32, count: if is_leaf { count as u32 } else { 0 } });
+    if is_leaf {
         return;
     }
     let axis = (high - low).max_position();
@@ -83,7 +91,7 @@ fn build(triangles: &[SceneTriangle], items: &mut [u32], first: usize, end: usiz
         |&index: &u32| triangles[index as usize].corners.iter().map(|corner| corner[axis]).sum::<f32>();
     items[first..end].sort_by(|a, b| middle(a).total_cmp(&middle(b)).then(a.cmp(b)));
     let half = first + count / 2;
-    build(triangles, items, first, half, nodes);
+    build((triangles, stop), items, first, half, nodes);
     nodes[index].first = nodes.len() as u32;
-    build(triangles, items, half, end, nodes);
+    build((triangles, stop), items, half, end, nodes);
 }

@@ -25,7 +25,10 @@ pub(super) fn size_error(
     (reflectance, first): (&[f64], &[f64]),
     (solver, tolerance): (Solver, f64),
 ) -> Vec<f32> {
-    let larger = Patches::new(scene, COARSER * side);
+    let larger = Patches::outlines(scene, COARSER * side);
+    if scene.stop.is_set() {
+        return vec![0.0; patches.list.len()];
+    }
     let count = larger.list.len();
     let within: Vec<usize> = patches
         .list
@@ -69,6 +72,9 @@ fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors
         .map_init(
             || vec![0.0f64; areas.len()],
             |exchange, members| {
+                if factors.stop.is_set() {
+                    return Vec::new();
+                }
                 let mut touched = Vec::new();
                 for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
                     let large = within[other];
@@ -83,7 +89,7 @@ fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors
             },
         )
         .collect();
-    let mut coarse = FormFactors { starts: vec![0], ..FormFactors::default() };
+    let mut coarse = FormFactors { starts: vec![0], stop: factors.stop.clone(), ..FormFactors::default() };
     for row in rows {
         for (large, g) in row {
             coarse.columns.push(large);

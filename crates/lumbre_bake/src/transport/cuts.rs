@@ -27,6 +27,8 @@ pub(crate) struct Cuts {
     nodes: Vec<Node>,
     /// The pieces, cell by cell.
     pub pieces: Vec<Corners>,
+    /// Cells that more lines cross than cut them.
+    pub full: usize,
 }
 
 /// A cell that was cut.
@@ -62,6 +64,8 @@ struct Cell<'a> {
     /// Square canonical units.
     smallest: f64,
     left: u32,
+    /// A line was left over.
+    full: bool,
 }
 
 impl Cuts {
@@ -76,9 +80,12 @@ impl Cuts {
     ) -> Option<CutCell> {
         let smallest = SMALLEST * area(&corners);
         let (root, first) = (self.nodes.len() as u32, self.pieces.len() as u32);
-        let mut cell = Cell { cuts: self, weights, first, slots: (own, free), smallest, left: MOST_LINES };
+        let (slots, left) = ((own, free), MOST_LINES);
+        let mut cell = Cell { cuts: self, weights, first, slots, smallest, left, full: false };
         let line = cell.best_line(&corners, segments)?;
         cell.divide(&corners, segments, Some(line));
+        let full = cell.full;
+        self.full += usize::from(full);
         Some(CutCell { root, first, count: self.pieces.len() as u32 - first })
     }
 
@@ -169,8 +176,9 @@ impl Cell<'_> {
     }
 
     /// The line along which most contacts lie, if they are long enough and leave a piece on each side.
-    fn best_line(&self, polygon: &[DVec2], segments: &[[DVec2; 2]]) -> Option<Line> {
-        if self.left == 0 || segments.is_empty() {
+    fn best_line(&mut self, polygon: &[DVec2], segments: &[[DVec2; 2]]) -> Option<Line> {
+        // Of a cell that is full already, nothing more is to be known.
+        if segments.is_empty() || self.full {
             return None;
         }
         let size = area(polygon).sqrt();
@@ -195,7 +203,8 @@ impl Cell<'_> {
                 best = Some((support, line));
             }
         }
-        best.map(|(_, line)| line)
+        self.full = best.is_some() && self.left == 0;
+        best.filter(|_| self.left > 0).map(|(_, line)| line)
     }
 }
 
@@ -317,6 +326,24 @@ mod tests {
                     assert!(!crossed, "{piece:?} across {p} {q}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_cell_that_more_lines_cross_than_cut_it_is_counted() {
+        let lines = |count: u32| -> Vec<[DVec2; 2]> {
+            (1..=count)
+                .map(|i| 1.2 * f64::from(i) / f64::from(count + 1))
+                .map(|x| segment([x, -1.0], [x, 3.0]))
+                .collect()
+        };
+        for (count, full) in [(MOST_LINES, 0), (MOST_LINES + 1, 1)] {
+            let (cuts, cell) = cut(&lines(count));
+            assert!(
+                cell.is_some_and(|cell| cell.count > MOST_LINES) && cuts.full == full,
+                "{count}: {}",
+                cuts.full
+            );
         }
     }
 

@@ -178,7 +178,7 @@ impl<'a> Sources<'a> {
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
         let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
         let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
-        let cut = self.cut(&anchor, reach);
+        let cut = self.cut(&anchor, reach, &[]);
         let mut direct = self.own(&cut, &Between::UNKNOWN, sequence, samples, point);
         self.rest(&cut.rest, sequence, SAMPLES_OF_REST * samples, point, &mut direct);
         direct

@@ -58,8 +58,9 @@ impl Exchange {
     ) -> Result<Option<Self>, BakeError> {
         let side = plan.patch_side;
         watch.stage("form factors", report)?;
-        let patches = Patches::new(scene, side);
+        let patches = watch.during(0.0, || Patches::new(scene, side))?;
         report.patches = patches.list.len();
+        report.warnings.extend(patches.warnings.iter().cloned());
         if patches.list.iter().all(|patch| patch.reflectance == Vec3::ZERO) {
             let skipped = match sources.has_sky() {
                 true => {
@@ -68,7 +69,8 @@ impl Exchange {
                 false => "form factors, radiosity and final gather: no surface reflects (rho = 0)",
             };
             report.skipped.push(skipped.into());
-            return Ok(sources.has_sky().then(|| Self::black(scene, patches, side)));
+            let black = || sources.has_sky().then(|| Self::black(scene, patches, side));
+            return watch.during(0.5, black);
         }
         let (method, rays) = (options.form_factors, plan.form_factor_rays);
         let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, watch)?;
@@ -102,18 +104,23 @@ impl Exchange {
         };
         let sky_halves = halves.each_ref().map(&sky);
         let sky = sky(&factors);
-        let indirect = solve(options.solver, &factors, &patches.list, &direct, &sky, report);
-        let noise = solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list);
+        let indirect =
+            watch.during(0.5, || solve(options.solver, &factors, &patches.list, &direct, &sky, report))?;
+        let noise = watch.during(0.6, || {
+            solution_error(options.solver, &halves, &direct_halves, &sky_halves, &patches.list)
+        })?;
         let grey = |color: Vec3| f64::from(color.element_sum()) / 3.0;
         let reflectance: Vec<f64> = patches.list.iter().map(|patch| grey(patch.reflectance)).collect();
         let first: Vec<f64> = direct.iter().zip(&sky).map(|(direct, sky)| grey(*direct + *sky)).collect();
         let light = (reflectance.as_slice(), first.as_slice());
-        let of_size = size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE));
+        let of_size = watch.during(0.7, || {
+            size_error(scene, &patches, side, &factors, light, (options.solver, TOLERANCE))
+        })?;
         let indirect_error = noise.iter().zip(of_size).map(|(&noise, size)| Vec2::new(noise, size)).collect();
         let leaves = |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
         let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(leaves).collect();
         let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
-        let guide = Guide::new(scene, &patches, side, &factors, &radiosity, &sky);
+        let guide = watch.during(0.8, || Guide::new(scene, &patches, side, &factors, &radiosity, &sky))?;
         let change = match change {
             Some(change) => {
                 change.of_patches(&patches, &exitance, &factors, options.solver, options, watch)?
@@ -254,6 +261,13 @@ fn solve(
         report.residual = report.residual.max(*residual);
     }
     report.residual_bound = report.residual / (1.0 - largest);
+    if report.residual > 2.0 * TOLERANCE {
+        report.warnings.push(format!(
+            "the radiosity system was solved to a residual of {:.1e} only, after {} iterations; {TOLERANCE:.0e} was wanted",
+            report.residual,
+            report.iterations.into_iter().max().unwrap_or_default()
+        ));
+    }
     let [red, green, blue] = [0, 1, 2].map(|channel| &channels[channel].0);
     (0..patches.len()).map(|i| sky[i] + DVec3::new(red[i], green[i], blue[i]).as_vec3()).collect()
 }

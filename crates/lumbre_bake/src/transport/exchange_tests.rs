@@ -14,6 +14,7 @@ use super::solver::Solver;
 use crate::memory::Plan;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::stop::Stop;
 use crate::{BakeOptions, BakeReport, Density, Quality};
 
 const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
@@ -43,7 +44,7 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
         objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
     let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
-    let scene = BakeScene::new(&objects, &layout, space, &mut Vec::new()).unwrap();
+    let scene = BakeScene::new(&objects, &layout, space, &Stop::default(), &mut Vec::new()).unwrap();
     let sources = Sources::new(&scene, lights(world), sky(world));
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut watch = Watch::new(&mut carry_on, None);

@@ -12,6 +12,7 @@ use super::form_factors::{FormFactorMethod, FormFactors};
 use super::patches::Patches;
 use crate::progress::{Progress, Watch};
 use crate::scene::{BakeScene, Canonical, Object, Part, lay_out};
+use crate::stop::Stop;
 use crate::{BakeOptions, Density};
 
 fn carry_on(_: Progress) -> ControlFlow<()> {
@@ -49,7 +50,7 @@ pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
     let space = Canonical::of(points);
     let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
     let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
-    BakeScene::new(&objects, &layout, space, &mut Vec::new()).unwrap()
+    BakeScene::new(&objects, &layout, space, &Stop::default(), &mut Vec::new()).unwrap()
 }
 
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];

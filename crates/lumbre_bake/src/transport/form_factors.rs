@@ -13,6 +13,7 @@ use super::{cosine_rays, global_lines};
 use crate::BakeError;
 use crate::progress::Watch;
 use crate::scene::BakeScene;
+use crate::stop::Stop;
 
 /// How form factors are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,6 +46,8 @@ pub(crate) struct FormFactors {
     pub exact: usize,
     /// Share of all exchange that was cut so that no row exceeds 1.
     pub energy_lost: f64,
+    /// Whether nobody waits for what is solved with it any more.
+    pub stop: Stop,
 }
 
 impl FormFactors {
@@ -65,18 +68,28 @@ impl FormFactors {
             FormFactorMethod::CosineRays => cosine_rays::cast(scene, patches, rays, seed, watch)?,
             FormFactorMethod::GlobalLines => global_lines::cast(scene, patches, rays, seed, watch)?,
         };
+        watch.during(1.0, || Self::of_counts(scene, patches, &cast, rays, seed))
+    }
+
+    fn of_counts(
+        scene: &BakeScene,
+        patches: &Patches,
+        cast: &[Cast],
+        rays: u64,
+        seed: u32,
+    ) -> (Self, [Self; 2]) {
         let [whole, even, odd] =
             [|cast: &Cast| cast.whole(), |cast: &Cast| cast.half(0), |cast: &Cast| cast.half(1)]
                 .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
         let areas = || patches.list.iter().map(|patch| patch.area).collect();
-        let (counted, _) = pool(&whole, &NearPairs::default(), areas());
-        let near = near_pairs(scene, patches, &counted, &cast, seed);
-        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near);
+        let (counted, _) = pool(&whole, &NearPairs::default(), areas(), &scene.stop);
+        let near = near_pairs(scene, patches, &counted, cast, seed);
+        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near, &scene.stop);
         let ((even, odd), mut whole) =
             rayon::join(|| rayon::join(|| pooled(&even), || pooled(&odd)), || pooled(&whole));
         let halves = [even, odd];
         (whole.rays, whole.exact) = (rays, near.count());
-        Ok((whole, halves))
+        (whole, halves)
     }
 
     /// Of patches that exchange nothing.
@@ -88,8 +101,8 @@ impl FormFactors {
     }
 
     /// The matrix of some of the rays.
-    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs) -> Self {
-        let (mut factors, exact) = pool(counts, near, areas);
+    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs, stop: &Stop) -> Self {
+        let (mut factors, exact) = pool(counts, near, areas, stop);
         factors.open = counts.iter().map(Counts::open).collect();
         let sky = |own: &Counts| own.missed as f32 / (own.count - own.inside).max(1) as f32;
         factors.sky = counts.iter().map(sky).collect();
@@ -134,6 +147,9 @@ impl FormFactors {
         let exact_sums = self.sums(|k| exact[k]);
         let mut scale = vec![1.0f64; self.len()];
         for _ in 0..ROUNDS {
+            if self.stop.is_set() {
+                break;
+            }
             let next: Vec<f64> = (0..self.len())
                 .into_par_iter()
                 .map(|i| {
@@ -180,7 +196,7 @@ impl FormFactors {
 
     /// By a factor of an entry's place, row and column.
     fn multiply(&mut self, factor: impl Fn(usize, usize, usize) -> f64) {
-        for i in 0..self.areas.len() {
+        for i in (0..self.areas.len()).take_while(|_| !self.stop.is_set()) {
             for k in self.starts[i]..self.starts[i + 1] {
                 self.exchange[k] =
                     (f64::from(self.exchange[k]) * factor(k, i, self.columns[k] as usize)) as f32;
@@ -278,11 +294,14 @@ pub(super) fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
 /// Both directions of a pair count the same flux: N_ij has mean R_i G/A_i, N_ji has mean R_j G/A_j. The best estimate of
 /// G from two Poisson counts is their sum over the sum of their rates. (A line counts in both directions, which weighs the same.) Pairs whose
 /// exchange is known have that instead; with the entries comes which of them do.
-fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>) -> (FormFactors, Vec<bool>) {
-    let incoming = Incoming::new(counts);
+fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>, stop: &Stop) -> (FormFactors, Vec<bool>) {
+    let incoming = Incoming::new(counts, stop);
     let rates: Vec<f64> =
         counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
     let row = |i: usize| -> Vec<(u32, f32, bool)> {
+        if stop.is_set() {
+            return Vec::new();
+        }
         let (out, into, known) = (&counts[i].met[..], incoming.row(i), near.row(i));
         let (mut x, mut y, mut z) = (0, 0, 0);
         let mut row = Vec::with_capacity(out.len() + into.len() + known.len());
@@ -309,7 +328,7 @@ fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>) -> (FormFactors, V
             }
         }
     };
-    let mut factors = FormFactors { starts: vec![0], ..FormFactors::default() };
+    let mut factors = FormFactors { starts: vec![0], stop: stop.clone(), ..FormFactors::default() };
     let mut exact = Vec::new();
     // Some rows at a time, so that they are not all there twice.
     for first in (0..counts.len()).step_by(ROWS) {
@@ -335,7 +354,7 @@ struct Incoming {
 }
 
 impl Incoming {
-    fn new(counts: &[Counts]) -> Self {
+    fn new(counts: &[Counts], stop: &Stop) -> Self {
         let mut starts = vec![0usize; counts.len() + 1];
         for &(met, _) in counts.iter().flat_map(|own| &own.met) {
             starts[met as usize + 1] += 1;
@@ -345,7 +364,7 @@ impl Incoming {
         }
         let mut next = starts.clone();
         let mut list = vec![(0, 0); starts.last().copied().unwrap_or(0)];
-        for (i, own) in counts.iter().enumerate() {
+        for (i, own) in counts.iter().enumerate().take_while(|_| !stop.is_set()) {
             for &(met, n) in &own.met {
                 list[next[met as usize]] = (i as u32, n);
                 next[met as usize] += 1;

@@ -34,7 +34,10 @@ impl Guide {
         radiosity: &[f32],
         sky: &[Vec3],
     ) -> Self {
-        let regions = Patches::new(scene, REGION * side);
+        let regions = Patches::outlines(scene, REGION * side);
+        if scene.stop.is_set() {
+            return Self { regions, rows: Rows::new(0) };
+        }
         let region_of: Vec<u32> = patches
             .list
             .iter()
@@ -53,6 +56,9 @@ impl Guide {
         let mut rows = Rows::new(regions.list.len());
         let mut exchange = vec![0.0f64; regions.list.len()];
         for members in members {
+            if scene.stop.is_set() {
+                break;
+            }
             let mut touched: Vec<u32> = Vec::new();
             for (other, g) in members.iter().flat_map(|&member| factors.row(member as usize)) {
                 let region = region_of[other] as usize;

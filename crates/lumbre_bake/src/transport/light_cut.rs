@@ -129,12 +129,17 @@ impl PartialOrd for Weighted {
 }
 
 impl Sources<'_> {
-    /// The cut at receivers within `reach` of one, canonical units.
-    pub fn cut(&self, receiver: &Receiver, reach: f32) -> LightCut {
+    /// The cut at receivers within `reach` of one, canonical units. The lamps named in `shared` share samples, however bright they are.
+    pub fn cut(&self, receiver: &Receiver, reach: f32, shared: &[u32]) -> LightCut {
         let mut cut = LightCut { lights: self.lights_apart.clone(), ..LightCut::default() };
         let mut roots = Vec::new();
         match self.few_lamps(receiver) {
-            Some(lamps) => cut.lamps = lamps,
+            Some(lamps) => {
+                let (together, apart) = lamps.into_iter().partition(|lamp| shared.contains(lamp));
+                cut.lamps = apart;
+                let together: Vec<u32> = together;
+                roots.extend(together.into_iter().map(Branch::Emitters));
+            }
             None => roots.extend(self.emitter_tree.root().map(Branch::Emitters)),
         }
         roots.extend(self.light_tree.root().map(Branch::Lights));
@@ -161,7 +166,10 @@ impl Sources<'_> {
         closed.sort_unstable_by(|a, b| b.cmp(a));
         let mut own = 0;
         closed.retain(|part| {
-            let is_own = own < MOST_OWN && part.weight >= OWN_SHARE * total && self.is_single(part.branch);
+            let is_own = own < MOST_OWN
+                && part.weight >= OWN_SHARE * total
+                && self.is_single(part.branch)
+                && !matches!(part.branch, Branch::Emitters(lamp) if shared.contains(&lamp));
             if is_own {
                 own += 1;
                 match part.branch {

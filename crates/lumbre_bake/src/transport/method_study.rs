@@ -14,6 +14,7 @@ use super::solver::{Solver, gather};
 use crate::progress::Watch;
 use crate::sampling::Sequence;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::stop::Stop;
 use crate::{BakeError, BakeOptions};
 
 /// The two methods.
@@ -52,7 +53,7 @@ pub fn form_factor_errors(
     let space = Canonical::of(points);
     let mut warnings = Vec::new();
     let layout = lay_out(&objects, space, options, &mut warnings)?;
-    let scene = BakeScene::new(&objects, &layout, space, &mut warnings)?;
+    let scene = BakeScene::new(&objects, &layout, space, &Stop::default(), &mut warnings)?;
     let sources = Sources::new(&scene, lights(world), sky(world));
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());

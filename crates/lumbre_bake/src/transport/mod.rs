@@ -26,6 +26,7 @@ mod lambert_integral;
 pub(crate) mod light_cut;
 mod light_tree;
 pub(crate) mod lit_part;
+mod mean_of_points;
 pub(crate) mod method_study;
 mod near_pairs;
 #[cfg(test)]

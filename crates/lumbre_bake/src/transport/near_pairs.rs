@@ -83,6 +83,9 @@ pub(crate) fn near_pairs(
     let exact: Vec<(u32, u32, f32)> = candidates
         .into_par_iter()
         .filter_map(|(_, i, j, found)| {
+            if scene.stop.is_set() {
+                return None;
+            }
             let (one, two) = (&shapes[i as usize], &shapes[j as usize]);
             let exchange = exchange_area(&one.corners, &two.corners);
             let expected = exchange * (one.rate + two.rate);

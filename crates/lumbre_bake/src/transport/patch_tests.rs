@@ -1,10 +1,16 @@
 //! Patches of a floor that a wall stands on, and that something lies on.
 
-use glam::Vec3;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::Material;
+use lumbre_scene::{Image, MaterialTextures, Sampler, TextureReference};
 
 use super::form_factor_tests::{scene, square};
 use super::patches::Patches;
 use crate::sampling::{Sequence, triangle_point};
+use crate::scene::BakeScene;
 use crate::scene::material::Side;
 
 /// The floor's patches as they are, and as points find them.
@@ -57,4 +63,54 @@ fn no_patch_lies_half_under_a_thing() {
     let sheet = square([0.35, 0.01, 0.45], Vec3::X, Vec3::Z);
     let under = |p: Vec3| p.y < 0.005 && (0.35..1.35).contains(&p.x) && (0.45..1.45).contains(&p.z);
     check(&[&floor, &sheet], 0.4, |p| u32::from(under(p)));
+}
+
+/// A square of two triangles whose texture of 64 x 64 texels is white where `is_white` says, and black elsewhere.
+fn textured(is_white: impl Fn(u32, u32) -> bool) -> BakeScene {
+    let mut scene = scene(&[&square([0.0; 3], Vec3::Z * 2.0, Vec3::X * 2.0)]);
+    let rgba = (0..64 * 64).flat_map(|at| [if is_white(at % 64, at / 64) { 255 } else { 0 }; 4]).collect();
+    let texture = TextureReference {
+        image: Arc::new(Image { name: "texture".into(), width: 64, height: 64, rgba }),
+        sampler: Sampler::default(),
+        tex_coord: 0,
+        offset: Vec2::ZERO,
+        rotation: 0.0,
+        scale: Vec2::ONE,
+    };
+    let surface = &mut scene.surfaces[0];
+    surface.material = Material::matt(Vec3::splat(0.8));
+    surface.textures = Some(MaterialTextures { base_color: Some(texture), ..MaterialTextures::default() });
+    let place = |corner: &Vec3| Vec2::new(corner.x, corner.z) / 2.0;
+    let uv0 = surface.mesh.positions.iter().map(place).collect();
+    surface.mesh = Arc::new(TriangleMesh { uv0, ..(*surface.mesh).clone() });
+    scene
+}
+
+#[test]
+fn a_patch_reflects_what_its_texels_do_on_average() {
+    // One patch a triangle, then some. The four points at which textures used to be read lie at 1/6, 1/3 and 2/3 of the patches.
+    let spots = |x: u32, y: u32| (28..32).contains(&x) && (3..7).contains(&y);
+    let stripes = |x: u32, _: u32| x.is_multiple_of(8);
+    let checker = |x: u32, y: u32| (x + y).is_multiple_of(2);
+    let check = |is_white: &dyn Fn(u32, u32) -> bool, side: f32| {
+        let scene = textured(is_white);
+        let patches = Patches::new(&scene, side * scene.space.scale as f32);
+        let white = (0..64 * 64).filter(|at| is_white(at % 64, at / 64)).count() as f64 / (64.0 * 64.0);
+        let found = patches.mean_reflectance();
+        assert!(
+            (found / (0.8 * white) - 1.0).abs() < 0.02,
+            "{} patches: {found} {white}",
+            patches.list.len()
+        );
+        patches
+    };
+    for side in [9.0, 0.5, 0.1] {
+        for is_white in [&spots as &dyn Fn(u32, u32) -> bool, &stripes, &checker] {
+            let patches = check(is_white, side);
+            // 91 texels along a whole triangle's diagonal are more than it has points.
+            let named =
+                patches.warnings.iter().filter(|warning| warning.contains("texels of its textures")).count();
+            assert_eq!(named, usize::from(side > 1.0), "{:?}", patches.warnings);
+        }
+    }
 }

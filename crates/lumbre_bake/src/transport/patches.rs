@@ -2,11 +2,15 @@
 //! ray's hit finds its own by arithmetic; cells that other surfaces stand on or pass through are cut further along those.
 //! Not their light: that is `form_factors` and `solver`.
 
+use std::collections::BTreeMap;
+
 use glam::{DMat2, DVec2, Vec3};
+use rayon::prelude::*;
 
 use super::box_tree::BoxTree;
 use super::contacts::{PlaneFrame, contacts};
 use super::cuts::{Corners, CutCell, Cuts};
+use super::mean_of_points::mean_of_points;
 
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, SceneTriangle};
@@ -53,11 +57,12 @@ pub(crate) struct Patches {
     /// Of each cell of each triangle that has some cut: its tree, or [`UNCUT`].
     roots: Vec<u32>,
     lines: Cuts,
+    /// What is coarser than it should be, in words.
+    pub warnings: Vec<String>,
 }
 
-/// Points of a patch at which textures are averaged.
-const TEXTURE_POINTS: [(f32, f32); 4] =
-    [(1.0 / 3.0, 1.0 / 3.0), (2.0 / 3.0, 1.0 / 6.0), (1.0 / 6.0, 2.0 / 3.0), (1.0 / 6.0, 1.0 / 6.0)];
+/// Points along a patch's edge at which textures are averaged: two for each texel, so that none is left out, but not more than so many.
+const TEXTURE_POINTS: u32 = 64;
 
 impl Patches {
     /// By area, mean of the channels, at most .999.
@@ -71,8 +76,9 @@ impl Patches {
 
     /// How many [`Patches::new`] would make.
     pub fn count(scene: &BakeScene, side: f32) -> u64 {
-        let (tree, mut lines) = (BoxTree::new(&scene.triangles), Cuts::default());
+        let (tree, mut lines) = (BoxTree::new(&scene.triangles, &scene.stop), Cuts::default());
         let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.superseded);
+        let met = met.take_while(|_| !scene.stop.is_set());
         met.map(|(index, triangle)| {
             let divisions = divisions(triangle, side);
             let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
@@ -84,11 +90,47 @@ impl Patches {
 
     /// Cuts every triangle into patches of about `side` canonical units.
     pub fn new(scene: &BakeScene, side: f32) -> Self {
-        let (tree, mut lines) = (BoxTree::new(&scene.triangles), Cuts::default());
+        let mut patches = Self::outlines(scene, side);
+        let of_patch = |patch: &Patch| {
+            if scene.stop.is_set() {
+                return (Vec3::ZERO, 0.0);
+            }
+            let corners = CORNERS.map(|at| patches.point(patch, at));
+            mean_reflectance(scene, patch.triangle as usize, patch.side, &corners)
+        };
+        let found: Vec<(Vec3, f32)> = patches.list.par_iter().map(of_patch).collect();
+        // Of each object, the most texels along a patch's edge.
+        let mut texels: BTreeMap<u32, f32> = BTreeMap::new();
+        for (patch, (reflectance, along)) in patches.list.iter_mut().zip(found) {
+            patch.reflectance = reflectance;
+            if along > TEXTURE_POINTS as f32 {
+                let most = texels.entry(scene.triangles[patch.triangle as usize].object).or_default();
+                *most = most.max(along);
+            }
+        }
+        for cut in patches.cuts.iter_mut().filter(|cut| cut.divisions > 0) {
+            let first = |patch: u32| patches.list[patch as usize].reflectance;
+            cut.reflectance = [first(cut.front), cut.back.map_or(Vec3::ZERO, first)];
+        }
+        let coarse = texels.into_iter().map(|(object, most)| {
+            format!(
+                "{}: a patch of it shows up to {most:.0} texels of its textures along an edge; what bounces off it is the mean of \
+                 {TEXTURE_POINTS} points along there, which may miss what is smaller",
+                scene.names[object as usize]
+            )
+        });
+        patches.warnings.extend(coarse);
+        patches
+    }
+
+    /// The same, of which nobody asks what they reflect.
+    pub fn outlines(scene: &BakeScene, side: f32) -> Self {
+        let (tree, mut lines) = (BoxTree::new(&scene.triangles, &scene.stop), Cuts::default());
         let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
         let mut roots = Vec::new();
+        let mut full: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
-            if triangle.superseded {
+            if triangle.superseded || scene.stop.is_set() {
                 cuts.push(Cut {
                     divisions: 0,
                     front: 0,
@@ -101,7 +143,11 @@ impl Patches {
             }
             let divisions = divisions(triangle, side);
             let cells = divisions * divisions;
+            let before = lines.full;
             let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
+            if lines.full > before {
+                *full.entry(triangle.object).or_default() += lines.full - before;
+            }
             let own_roots = if cut.is_empty() { UNCUT } else { roots.len() as u32 };
             if !cut.is_empty() {
                 roots.resize(roots.len() + cells as usize, UNCUT);
@@ -117,8 +163,8 @@ impl Patches {
                         0 => triangle.area / cells as f32,
                         _ => triangle.area * share(&corners),
                     };
-                    let reflectance = mean_reflectance(scene, index, side, &corners);
-                    Patch { triangle: index as u32, side, cell: packed(divisions, cell), area, reflectance }
+                    let (cell, reflectance) = (packed(divisions, cell), Vec3::ZERO);
+                    Patch { triangle: index as u32, side, cell, area, reflectance }
                 };
                 list.extend((0..cells).map(patch));
                 for (cell, cut) in &cut {
@@ -132,12 +178,19 @@ impl Patches {
             };
             let front = add(Side::Front);
             let back = triangle.two_sided.then(|| add(Side::Back));
-            let first = |patch: u32| list[patch as usize].reflectance;
-            let reflectance = [first(front), back.map_or(Vec3::ZERO, first)];
+            let reflectance = [Vec3::ZERO; 2];
             let varies = scene.surfaces[triangle.surface as usize].varies();
             cuts.push(Cut { divisions, front, back, reflectance, varies, roots: own_roots });
         }
-        Self { list, cuts, roots, lines }
+        let crossed = full.into_iter().map(|(object, count)| {
+            format!(
+                "{}: more surfaces stand on {count} of its cells than patches are cut along; light that bounces off there mixes between \
+                 what they divide",
+                scene.names[object as usize]
+            )
+        });
+        let warnings = crossed.collect();
+        Self { list, cuts, roots, lines, warnings }
     }
 
     /// The patch at a point of a triangle's side; none where light does not arrive.
@@ -289,18 +342,17 @@ fn point_between([a, b, c]: &Corners, u: f32, v: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * u + (c.0 - a.0) * v, a.1 + (b.1 - a.1) * u + (c.1 - a.1) * v)
 }
 
-fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> Vec3 {
+/// Of a part of a triangle; and how many texels it shows along its longest edge.
+fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, corners: &Corners) -> (Vec3, f32) {
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
-    let points = if surface.varies() { &TEXTURE_POINTS[..] } else { &TEXTURE_POINTS[..1] };
-    let sum: Vec3 = points
-        .iter()
-        .map(|&(u, v)| {
-            let (u, v) = point_between(corners, u, v);
-            surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
-        })
-        .sum();
-    sum / points.len() as f32
+    let texels = surface.reflectance_texels(triangle.vertices, *corners);
+    let points = if surface.varies() { ((2.0 * texels).ceil() as u32).clamp(2, TEXTURE_POINTS) } else { 1 };
+    let mean = mean_of_points(points, |(u, v)| {
+        let (u, v) = point_between(corners, u, v);
+        surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
+    });
+    (mean, texels)
 }
 
 /// Row `a` holds 2(n - a) - 1 cells, so the rows before it hold a(2n - a).

@@ -43,7 +43,9 @@ impl<'a> EdgeGrid<'a> {
     }
 
     /// Edges that may touch an edge, each pair once: the longer ones, and of its own class those before it. Ascending.
-    pub fn near(&self, index: u32) -> Vec<u32> {
+    ///
+    /// With them comes whether there may be more.
+    pub fn near(&self, index: u32) -> (Vec<u32>, bool) {
         let edge = &self.edges[index as usize];
         let own = class(edge, self.reach);
         let mut found = Vec::new();
@@ -55,8 +57,9 @@ impl<'a> EdgeGrid<'a> {
         }
         found.sort_unstable();
         found.dedup();
+        let crowded = found.len() >= MOST_CANDIDATES;
         found.truncate(MOST_CANDIDATES);
-        found
+        (found, crowded)
     }
 }
 
@@ -104,13 +107,19 @@ mod tests {
         }
         let grid = EdgeGrid::new(&edges, 1e-6);
         let pairs: Vec<(u32, u32)> = (0..edges.len() as u32)
-            .flat_map(|index| grid.near(index).into_iter().map(move |other| (index, other)))
+            .flat_map(|index| grid.near(index).0.into_iter().map(move |other| (index, other)))
             .collect();
         for short in (1..edges.len() as u32).step_by(2) {
             let with_the_long = pairs.iter().filter(|&&(a, b)| (a, b) == (short, 0) || (a, b) == (0, short));
             assert_eq!(with_the_long.count(), 1);
         }
+        assert!((0..edges.len() as u32).all(|index| !grid.near(index).1));
         // Neighbours only: far from all pairs.
         assert!(pairs.len() < 100 + 2 * 100 * 4, "{}", pairs.len());
+        // Too many in one place are told.
+        let stacked = vec![edges[0]; MOST_CANDIDATES + 2];
+        let grid = EdgeGrid::new(&stacked, 1e-6);
+        let (found, crowded) = grid.near(MOST_CANDIDATES as u32 + 1);
+        assert!(crowded && found.len() == MOST_CANDIDATES && !grid.near(5).1);
     }
 }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::samples::{Reading, Sample};
 use super::{Maps, NO_CHART, SeamReport};
+use crate::stop::Stop;
 
 /// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.
 const STIFFNESS: f64 = 0.02;
@@ -60,7 +61,7 @@ impl Unknowns {
     }
 
     /// Moves the texels; edges are left for the caller to say.
-    pub fn solve(&self, samples: &[Sample], filled: &mut [Vec3], mean: f64) -> SeamReport {
+    pub fn solve(&self, samples: &[Sample], filled: &mut [Vec3], mean: f64, stop: &Stop) -> SeamReport {
         let equations: Vec<Equation> = samples.iter().map(|sample| self.equation(sample)).collect();
         let channels: Vec<(Vec<f64>, [f64; 2])> = (0..3usize)
             .into_par_iter()
@@ -68,7 +69,7 @@ impl Unknowns {
                 let values: Vec<f64> =
                     self.texels.iter().map(|&texel| f64::from(filled[texel as usize][channel])).collect();
                 let variances: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
-                let changes = Channel::new(&equations, &values, &variances, mean).solve();
+                let changes = Channel::new(&equations, &values, &variances, mean, stop).solve();
                 let moved: Vec<f64> = values
                     .iter()
                     .zip(&changes)
@@ -181,10 +182,11 @@ struct Channel<'a> {
     stiffness: Vec<f64>,
     /// Of the system's diagonal, 1 over it.
     preconditioner: Vec<f64>,
+    stop: &'a Stop,
 }
 
 impl<'a> Channel<'a> {
-    fn new(equations: &'a [Equation], values: &[f64], variances: &[f64], mean: f64) -> Self {
+    fn new(equations: &'a [Equation], values: &[f64], variances: &[f64], mean: f64, stop: &'a Stop) -> Self {
         let floor = (FLOOR * mean).powi(2);
         let stiffness: Vec<f64> = variances.iter().map(|variance| 1.0 / (variance + floor)).collect();
         let mut diagonal = stiffness.clone();
@@ -214,6 +216,7 @@ impl<'a> Channel<'a> {
             bounds: values.iter().zip(variances).map(bound).collect(),
             stiffness,
             preconditioner: diagonal.into_iter().map(|d| 1.0 / d).collect(),
+            stop,
         }
     }
 
@@ -263,7 +266,7 @@ impl<'a> Channel<'a> {
         let mut energy = dot(&residual, &scaled);
         let enough = energy * RESIDUAL * RESIDUAL;
         for _ in 0..MOST_STEPS {
-            if energy <= enough || !energy.is_finite() {
+            if energy <= enough || !energy.is_finite() || self.stop.is_set() {
                 break;
             }
             let mut product = multiply(&direction, None);

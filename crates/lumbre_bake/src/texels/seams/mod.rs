@@ -19,7 +19,6 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::footprint::Texel;
-use crate::BakeError;
 use crate::scene::{BakeScene, LightmapLayout};
 use least_squares::Unknowns;
 
@@ -53,32 +52,35 @@ pub(crate) struct Maps<'a> {
 /// Chart of a texel that no surface covers in the open.
 const NO_CHART: u32 = u32::MAX;
 
-/// What closing came to, or why there was nothing to do; and the rays cast.
-type Closed = (Result<SeamReport, &'static str>, u64);
+/// What closing came to.
+pub(crate) struct Closed {
+    /// What was done, or why there was nothing to do.
+    pub report: Result<SeamReport, &'static str>,
+    pub rays: u64,
+    /// What was left out, in words.
+    pub warning: Option<String>,
+}
 
-/// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known). Returns what was done, and the rays cast;
-/// a reason in place of a report where there is nothing to do. `advance` is told the fraction done, and may end it.
-pub(crate) fn close_seams(
-    maps: &Maps<'_>,
-    filled: &mut [Vec3],
-    advance: &mut dyn FnMut(f32) -> Result<(), BakeError>,
-) -> Result<Closed, BakeError> {
+/// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known).
+pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3]) -> Closed {
     if maps.mean.is_nan() || maps.mean <= 0.0 {
-        return Ok((Err("the maps are black"), 0));
+        return Closed { report: Err("the maps are black"), rays: 0, warning: None };
     }
     let edges = edges::borders(maps.scene);
     let mut charts = vec![NO_CHART; maps.layout.texels];
     for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
         charts[texel.index as usize] = maps.charts[texel.triangle as usize];
     }
-    let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }
-        .all(&mut |done| advance(0.5 * done))?;
+    let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }.all();
+    let (rays, crowded) = (found.rays, found.crowded);
+    let warning = (crowded > 0).then(|| {
+        format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
+    });
     if found.samples.is_empty() {
-        return Ok((Err("no two borders of charts join smoothly in one place"), found.rays));
+        return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
     }
     let unknowns = Unknowns::new(maps, &charts, filled, &found.samples);
-    advance(0.5)?;
-    let mut report = unknowns.solve(&found.samples, filled, maps.mean);
+    let mut report = unknowns.solve(&found.samples, filled, maps.mean, &maps.scene.stop);
     report.edges = found.pairs;
-    Ok((Ok(report), found.rays))
+    Closed { report: Ok(report), rays, warning }
 }

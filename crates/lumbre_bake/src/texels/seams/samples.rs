@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use super::edge_grid::EdgeGrid;
 use super::edges::Edge;
 use super::{Maps, NO_CHART};
-use crate::BakeError;
 
 /// Edges nearer than this are in one place, canonical units: 64 roundings of the largest coordinate, which is below 2.
 const SAME_PLACE: f64 = 64.0 / (1 << 23) as f64;
@@ -48,6 +47,8 @@ pub(crate) struct Found {
     /// Pairs of edges with at least one sample.
     pub pairs: usize,
     pub rays: u64,
+    /// Edges that were not compared with all that lie in their place.
+    pub crowded: usize,
 }
 
 /// The search.
@@ -59,34 +60,29 @@ pub(crate) struct Sampling<'a> {
     pub edges: &'a [Edge],
 }
 
-/// Edges between two chances to end it.
-const AT_ONCE: usize = 1024;
-
 impl Sampling<'_> {
-    pub fn all(&self, advance: &mut dyn FnMut(f32) -> Result<(), BakeError>) -> Result<Found, BakeError> {
+    pub fn all(&self) -> Found {
         let grid = EdgeGrid::new(self.edges, SAME_PLACE);
         let of_edge = |index: u32| {
-            let mut own = Found { samples: Vec::new(), pairs: 0, rays: 0 };
-            for other in grid.near(index) {
+            let mut own = Found { samples: Vec::new(), pairs: 0, rays: 0, crowded: 0 };
+            let (near, crowded) = grid.near(index);
+            own.crowded = usize::from(crowded);
+            for other in near.into_iter().take_while(|_| !self.maps.scene.stop.is_set()) {
                 let before = own.samples.len();
                 own.rays += self.between(index, other, &mut own.samples);
                 own.pairs += usize::from(own.samples.len() > before);
             }
             own
         };
-        let mut all = Found { samples: Vec::new(), pairs: 0, rays: 0 };
-        let count = self.edges.len() as u32;
-        for start in (0..count).step_by(AT_ONCE) {
-            let end = (start + AT_ONCE as u32).min(count);
-            let found: Vec<Found> = (start..end).into_par_iter().map(of_edge).collect();
-            for own in found {
-                all.samples.extend(own.samples);
-                all.pairs += own.pairs;
-                all.rays += own.rays;
-            }
-            advance(end as f32 / count as f32)?;
+        let mut all = Found { samples: Vec::new(), pairs: 0, rays: 0, crowded: 0 };
+        let found: Vec<Found> = (0..self.edges.len() as u32).into_par_iter().map(of_edge).collect();
+        for own in found {
+            all.samples.extend(own.samples);
+            all.pairs += own.pairs;
+            all.rays += own.rays;
+            all.crowded += own.crowded;
         }
-        Ok(all)
+        all
     }
 
     /// Adds the samples of what two edges share; returns the rays cast.

@@ -1,0 +1,123 @@
+//! What counts as the baker's source: every crate whose change may change a baked bit changes the content hash.
+
+#[path = "../build/sources.rs"]
+mod sources;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sources::Sources;
+
+/// A workspace of two crates of ours, of which the second is below the first, and of some that come from elsewhere.
+fn workspace() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("there is room for a few files");
+    let own = folder.path().join("crates/lumbre_bake");
+    for (path, text) in [
+        ("crates/lumbre_bake/src/lib.rs", "mod deep;\n"),
+        ("crates/lumbre_bake/src/deep/mod.rs", "// 1\n"),
+        ("crates/lumbre_bake/Cargo.toml", "[package]\n"),
+        ("crates/lumbre_rays/src/lib.rs", "// rays\n"),
+        ("crates/lumbre_demo/src/lib.rs", "// demo\n"),
+        ("Cargo.lock", LOCK),
+    ] {
+        let path = folder.path().join(path);
+        fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder can be made");
+        fs::write(path, text).expect("a file can be written");
+    }
+    (folder, own)
+}
+
+const LOCK: &str = r#"version = 4
+
+[[package]]
+name = "glam"
+version = "0.34.2"
+source = "registry"
+checksum = "aaaa"
+
+[[package]]
+name = "lumbre_bake"
+version = "0.1.0"
+dependencies = [
+ "lumbre_rays",
+]
+
+[[package]]
+name = "lumbre_demo"
+version = "0.1.0"
+dependencies = [
+ "winit",
+]
+
+[[package]]
+name = "lumbre_rays"
+version = "0.1.0"
+dependencies = [
+ "glam 0.34.2",
+]
+
+[[package]]
+name = "winit"
+version = "0.30.0"
+checksum = "bbbb"
+"#;
+
+fn hash(own: &Path) -> u64 {
+    Sources::of(own).expect("the sources can be read").hash
+}
+
+#[test]
+fn what_may_change_a_bit_changes_the_hash_and_nothing_else_does() {
+    let (folder, own) = workspace();
+    let before = hash(&own);
+    assert_eq!(hash(&own), before);
+    let with = |path: &str, from: &str, to: &str| {
+        let path = folder.path().join(path);
+        let text = fs::read_to_string(&path).expect("it was written");
+        assert!(text.contains(from), "{text}");
+        fs::write(&path, text.replace(from, to)).expect("a file can be written");
+        let changed = hash(&own);
+        fs::write(&path, text).expect("a file can be written");
+        changed
+    };
+    for (path, from, to) in [
+        ("crates/lumbre_bake/src/deep/mod.rs", "1", "2"),
+        ("crates/lumbre_bake/Cargo.toml", "package", "package]\n["),
+        ("crates/lumbre_rays/src/lib.rs", "rays", "other rays"),
+        ("Cargo.lock", "0.34.2\"\nsource", "0.34.3\"\nsource"),
+        ("Cargo.lock", "aaaa", "aaab"),
+    ] {
+        assert_ne!(with(path, from, to), before, "{path}: {from} became {to}");
+    }
+    for (path, from, to) in [
+        ("crates/lumbre_demo/src/lib.rs", "demo", "game"),
+        ("crates/lumbre_rays/src/lib.rs", "\n", "\r\n"),
+        ("Cargo.lock", "bbbb", "cccc"),
+    ] {
+        assert_eq!(with(path, from, to), before, "{path}: {from} became {to}");
+    }
+    assert_eq!(hash(&own), before);
+}
+
+#[test]
+fn a_package_of_its_own_has_a_hash_of_its_own() {
+    let (folder, own) = workspace();
+    fs::remove_file(folder.path().join("Cargo.lock")).expect("it was there");
+    fs::remove_dir_all(folder.path().join("crates/lumbre_rays")).expect("it was there");
+    let before = hash(&own);
+    fs::write(own.join("Cargo.toml"), "[package]\n[dependencies]\nlumbre_rays = \"0.2\"\n")
+        .expect("it can be");
+    assert_ne!(hash(&own), before);
+}
+
+#[test]
+fn all_of_ours_below_the_baker_count() {
+    let sources = Sources::of(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("the sources can be read");
+    let counts = |name: &str| sources.watched.iter().any(|path| path.ends_with(format!("{name}/src")));
+    for name in ["lumbre_bake", "lumbre_mesh", "lumbre_optics", "lumbre_rays", "lumbre_scene"] {
+        assert!(counts(name), "{name} is not among {:?}", sources.watched);
+    }
+    assert!(!counts("lumbre_render"), "{:?}", sources.watched);
+    // Cargo runs the build script again when one of them changes.
+    assert!(sources.watched.iter().all(|path| path.exists()), "{:?}", sources.watched);
+}
