@@ -1,5 +1,7 @@
 //! Reads a material's texture at a point, bilinearly, as glTF wraps and transforms it. No mip levels: patches average.
 
+use std::sync::LazyLock;
+
 use glam::{Vec2, Vec4};
 use lumbre_scene::{TextureReference, Wrap};
 
@@ -34,10 +36,12 @@ pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
 fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
     let size_f = size.max(1) as f32;
     let last = size.max(1) as usize - 1;
+    // What is left of the division, without the slow exact one: far away rounding may be off by a texel, and is limited below.
+    let within = |period: f32| index - period * (index / period).floor();
     let wrapped = match wrap {
-        Wrap::Repeat => index.rem_euclid(size_f),
+        Wrap::Repeat => within(size_f),
         Wrap::MirroredRepeat => {
-            let period = index.rem_euclid(2.0 * size_f);
+            let period = within(2.0 * size_f);
             if period < size_f { period } else { 2.0 * size_f - 1.0 - period }
         }
         Wrap::ClampToEdge => index.max(0.0),
@@ -47,9 +51,16 @@ fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
 
 /// IEC 61966-2-1.
 fn linear(value: u8) -> f32 {
-    let v = f32::from(value) / 255.0;
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    LINEAR[usize::from(value)]
 }
+
+/// Of every value: the power takes longer than the rest of a sample.
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|value| {
+        let v = value as f32 / 255.0;
+        if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    })
+});
 
 #[cfg(test)]
 mod tests {

@@ -60,7 +60,6 @@ pub(crate) fn direct_light(
     for (&index, found) in unknown.iter().zip(found) {
         direct[index as usize] = found;
     }
-    eprintln!("DBG first own {:.2}", watch.seconds());
     let shared = match cuts.share_samples() {
         true => {
             let surroundings = Surroundings::new(scene, layout, texels, charts, &cuts.keys());
@@ -71,11 +70,9 @@ pub(crate) fn direct_light(
         false => None,
     };
     watch.pass(PASS_OF_LOCAL_LIGHT);
-    eprintln!("DBG first shared {:.2}", watch.seconds());
     let so_far = shared.as_ref().map(|shared| shared.with(&direct));
     let local = so_far.as_ref().unwrap_or(&direct);
     let local = LocalLight::new(sources, layout, texels, charts, local, watch)?;
-    eprintln!("DBG local {:.2}", watch.seconds());
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let goal = OWN_SHARE * open * options.error.powi(2);
     let own_goal = if shared.is_some() { 0.5 * goal } else { goal };
@@ -89,7 +86,6 @@ pub(crate) fn direct_light(
     let mut samples = vec![many; texels.len()];
     loop {
         let relative = relative(&direct, &local);
-        eprintln!("DBG own {:.2}s: {:.4} goal {:.4} in doubt {}", watch.seconds(), (sum(&relative)/open).sqrt(), (own_goal/open).sqrt(), again.len());
         if sum(&relative) <= own_goal {
             break;
         }

@@ -25,8 +25,8 @@ const BOUNCES: u32 = 6;
 /// Things in view that a walk looks at, none of them nearer to the one before than so many texels.
 const VIEW: usize = 2;
 const NEAREST: f32 = 8.0;
-/// Least local light, in shares of the whole level's mean: six stops, which is about as far as an automatic exposure follows.
-pub(crate) const FLOOR: f64 = 1.0 / 64.0;
+/// Least local light, in shares of the whole level's mean: five stops, about as far as an automatic exposure follows.
+const FLOOR: f64 = 1.0 / 32.0;
 /// Sequences of the walks.
 const PURPOSE: u32 = 80;
 
@@ -120,11 +120,6 @@ impl LocalLight {
 }
 
 impl LocalLight {
-    /// Of a covered texel, W/m².
-    pub fn at(&self, place: usize) -> f32 {
-        self.of[place]
-    }
-
     /// Squared, what numbers of irradiance are of the light around their texels.
     pub fn relative(&self, squares: &[f32]) -> Vec<f32> {
         squares.par_iter().zip(&self.of).map(|(square, light)| square / light / light).collect()

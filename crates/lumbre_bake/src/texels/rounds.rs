@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::allocation::{Allotment, allot};
 use super::chunks::in_chunks_in_time;
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
-use super::footprint::{Texel, receiver};
+use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
 use super::late::from_patches;
 use super::local_light::LocalLight;
@@ -126,33 +126,6 @@ pub(crate) fn gather(
         let sum = open_sum(texels, &local.relative(&variances)) - by_chance;
         report.estimated_error = (sum / open).max(0.0).sqrt();
         report.error_of_mean = relative_to(total, open_sum(texels, &variances) / open);
-        {
-            let rms = |numbers: Vec<f32>| (open_sum(texels, &local.relative(&numbers)) / open).sqrt();
-            let unsolved = (report.residual_bound as f32).powi(2);
-            eprintln!("DBG gather {:.2}s: all {:.4} direct {:.4} spread {:.4} bias {:.4} patch_error {:.4} rest {:.4} unsolved {:.4} samples {:.1}", watch.seconds(), report.estimated_error,
-                rms(direct.iter().map(|d| d.variance).collect()), rms(spread.clone()), rms(smoothing_bias.clone()),
-                rms(gathered.iter().map(|g| g.patch_error().powi(2)).collect()), rms(patch_bias.iter().map(|b| b.rest).collect()),
-                rms(estimates.iter().map(|e| unsolved * (mean(e).element_sum()/3.0).powi(2)).collect()),
-                4.0 * gathered.iter().map(|g| f64::from(g.samples)).sum::<f64>() / open);
-        }
-        if std::env::var_os("DBG").is_some() {
-            let rel = local.relative(&variances);
-            let mut order: Vec<usize> = (0..texels.len()).filter(|&i| !texels[i].is_hidden()).collect();
-            order.sort_by(|a, b| rel[*b].total_cmp(&rel[*a]));
-            let all: f64 = order.iter().map(|&i| f64::from(rel[i])).sum();
-            let mut by_object = std::collections::BTreeMap::<u32, (f64, usize)>::new();
-            for &i in &order { let e = by_object.entry(texels[i].object).or_default(); e.0 += f64::from(rel[i]); e.1 += 1; }
-            let mut objects: Vec<_> = by_object.into_iter().collect();
-            objects.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
-            for (o, (sum, n)) in objects.iter().take(6) { eprintln!("  DBG object {o}: {:.1} % of the squared error, {n} texels, rms {:.3}", 100.0 * sum / all, (sum / *n as f64).sqrt()); }
-            for q in [0.5, 0.9, 0.99, 0.999] { let i = order[((1.0 - q) * order.len() as f64) as usize]; eprintln!("  DBG q{q}: {:.4}", rel[i].sqrt()); }
-            for &i in order.iter().step_by(97).take(12) {
-                let t = &texels[i];
-                let p = t.point(outgoing.scene, 0.5, 0.5).map(|p| outgoing.scene.space.world(receiver(outgoing.scene, &p).position));
-                eprintln!("  DBG worst object {} at {:?} L {:.5} direct {:.5} indirect {:.5} sigma {:.5} spread {:.5} rest {:.5} samples {}", t.object, p, local.at(i), direct[i].baked.x, mean(&estimates[i]).x, variances[i].sqrt(), spread[i].sqrt(), patch_bias[i].rest.sqrt(), gathered[i].samples);
-            }
-            eprintln!("  DBG mean {total}");
-        }
         report.error_reached = report.estimated_error <= options.error;
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
         watch.note_error(report.estimated_error);

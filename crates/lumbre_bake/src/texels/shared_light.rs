@@ -40,6 +40,8 @@ pub(crate) struct Shared {
 const PURPOSE: u32 = 96;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
+/// The most by which a round lowers what is left: the first estimates are rough, and a goal out of reach would take all that can be had.
+const MOST_OF_A_ROUND: f64 = 8.0;
 /// A round that leaves more than this of the squared error was the last, and one that leaves so many times what was asked: to smooth
 /// everything once more takes longer than what is left is worth.
 const STALLED: f64 = 0.9;
@@ -161,23 +163,14 @@ impl<'a> SharedLight<'a> {
             let asked = |place: &u32| self.found[*place as usize].samples > 0;
             let places = (0..self.texels.len() as u32).filter(asked);
             let left: f64 = places.clone().map(|place| f64::from(relative[place as usize])).sum();
-            {
-                let open = self.texels.iter().filter(|t| !t.is_hidden()).count() as f64;
-                let sp: f64 = local.relative(&spread).iter().map(|&x| f64::from(x)).sum();
-                let bi: f64 = local.relative(&bias).iter().map(|&x| f64::from(x)).sum();
-                let n: f64 = self.found.iter().map(|f| f64::from(f.samples)).sum::<f64>();
-                let mut sorted = relative.clone();
-                sorted.sort_by(f32::total_cmp);
-                let at = |q: f64| sorted[(q * (sorted.len() - 1) as f64) as usize].sqrt();
-                eprintln!("DBG shared {:.2}s: left {:.4} goal {:.4} spread {:.4} bias {:.4} samples/texel {:.1} p50 {:.4} p90 {:.4} p99 {:.4} p999 {:.4} max {:.3}", watch.seconds(), (left/open).sqrt(), (goal/open).sqrt(), (sp/open).sqrt(), (bi/open).sqrt(), 4.0*n/open, at(0.5), at(0.9), at(0.99), at(0.999), at(1.0));
-            }
             let stalled = left > STALLED * before;
             if left <= goal * ENOUGH || stalled || watch.clock().late() {
                 break (estimates, variances);
             }
             before = left;
             let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
-            let wanted: Vec<Allotment> = allot(places, &relative, &samples, self.most, ORDER, goal);
+            let wanted: Vec<Allotment> =
+                allot(places, &relative, &samples, self.most, ORDER, goal.max(left / MOST_OF_A_ROUND));
             watch.pass(PASS);
             let more = in_chunks_in_time(wanted.len(), watch, |index| {
                 let Allotment { index: place, samples } = wanted[index];
