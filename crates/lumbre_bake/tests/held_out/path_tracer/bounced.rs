@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::super::random::Random;
 use super::PathTracer;
-use super::pieces::{Piece, cut, place_of};
+use super::pieces::{Piece, cut, place_of, sides_of};
 
 pub struct Bounced {
     /// For each triangle its pieces along an edge and the number of its first.
@@ -20,13 +20,13 @@ pub struct Bounced {
 
 /// Independent sets.
 pub const SETS: usize = 6;
-/// Metres along a piece's edge, about, and most pieces along one.
+/// Metres along a piece's edge, about: in the region, and where there is none of it.
 const EDGE: f64 = 0.25;
-const MOST: f64 = 24.0;
+const OUTSIDE: f64 = 1.0;
 /// Rays of a piece in each round; rounds that only carry light on, and all.
-const RAYS: usize = 8;
-const FIRST_ROUNDS: usize = 12;
-const ROUNDS: usize = 44;
+const RAYS: usize = 12;
+const FIRST_ROUNDS: usize = 10;
+const ROUNDS: usize = 50;
 
 /// A mean that grows.
 #[derive(Clone, Copy, Default)]
@@ -50,7 +50,9 @@ impl Bounced {
     pub fn new(tracer: &PathTracer, seed: u64) -> Self {
         let (mut pieces, mut of_triangle) = (Vec::new(), Vec::new());
         for (index, triangle) in tracer.scene.triangles.iter().enumerate() {
-            let sides = (triangle.longest_edge() / EDGE).ceil().clamp(1.0, MOST) as u32;
+            let middle = triangle.point(4.0 / 9.0, 0.5);
+            let inside = tracer.region.as_ref().is_none_or(|region| region.holds(middle));
+            let sides = sides_of(triangle, if inside { EDGE } else { OUTSIDE });
             of_triangle.push((sides, pieces.len()));
             pieces.extend(cut(index, triangle, sides));
         }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::super::random::Random;
 use super::PathTracer;
 use super::choice::ChoiceGrid;
-use super::pieces::{Piece, cut, place_of};
+use super::pieces::{Piece, cut, place_of, sides_of};
 
 pub struct Bright {
     pieces: Vec<Piece>,
@@ -20,9 +20,8 @@ pub struct Bright {
     chosen: Vec<usize>,
 }
 
-/// Metres along an edge, about, and most pieces along one.
+/// Metres along a piece's edge, about.
 const EDGE: f64 = 0.25;
-const MOST: f64 = 24.0;
 /// The brightest pieces until they have that share of the light that is reflected, or of the area.
 const OF_LIGHT: f64 = 0.85;
 const OF_AREA: f64 = 0.2;
@@ -39,7 +38,7 @@ impl Bright {
         let (mut pieces, mut of_triangle) = (Vec::new(), Vec::new());
         let region = tracer.region.as_ref();
         for (index, triangle) in scene.triangles.iter().enumerate() {
-            let sides = (triangle.longest_edge() / EDGE).ceil().clamp(1.0, MOST) as u32;
+            let sides = sides_of(triangle, EDGE);
             of_triangle.push((sides, pieces.len()));
             pieces.extend(cut(index, triangle, sides));
         }

@@ -29,6 +29,11 @@ impl Piece {
     }
 }
 
+/// So many along every edge that a piece has the area of half a square of an edge.
+pub fn sides_of(triangle: &Triangle, edge: f64) -> u32 {
+    (2.0 * triangle.area / (edge * edge)).sqrt().ceil().clamp(1.0, 64.0) as u32
+}
+
 /// So many along every edge, without power.
 pub fn cut(index: usize, triangle: &Triangle, sides: u32) -> Vec<Piece> {
     let step = 1.0 / f64::from(sides);
