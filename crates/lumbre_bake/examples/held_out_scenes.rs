@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         if let Some(count) = points {
             let started = Instant::now();
-            let found =
-                PathTracer::new(&mut scene(layout, 1.0)).points(count, Effort::reference(), 7 + layout);
+            let tracer = PathTracer::new(&mut scene(layout, 1.0)).with_bounced(layout);
+            let found = tracer.points(count, Effort::reference(), 7 + layout);
             held_out::reference_points::write(&folder.join(format!("{name}.csv")), &found)?;
             eprintln!("{name}: {}, {:.0} s", described(&found), started.elapsed().as_secs_f64());
         }

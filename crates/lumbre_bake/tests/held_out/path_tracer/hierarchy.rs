@@ -61,6 +61,15 @@ impl Triangle {
         (v >= -1e-12 && u + v <= 1.0 + 1e-12).then(|| self.ac.dot(q) / determinant)
     }
 
+    /// The point of these shares of the second and third corner.
+    pub fn at(&self, shares: DVec2) -> DVec3 {
+        self.a + self.ab * shares.x + self.ac * shares.y
+    }
+
+    pub fn longest_edge(&self) -> f64 {
+        self.ab.length().max(self.ac.length()).max((self.ac - self.ab).length())
+    }
+
     /// Shares of the second and third corner at a point of its plane.
     pub fn shares(&self, point: DVec3) -> DVec2 {
         let d = point - self.a;

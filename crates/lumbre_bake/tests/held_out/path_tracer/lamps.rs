@@ -7,18 +7,8 @@ use lumbre_scene::Image;
 use super::super::random::Random;
 use super::choice::{Choice, ChoiceGrid};
 use super::hierarchy::{Hierarchy, Triangle};
-
-/// A part of an emissive triangle: a corner and two edges in shares of the triangle's second and third corner.
-struct Piece {
-    triangle: usize,
-    corner: DVec2,
-    edges: [DVec2; 2],
-    middle: DVec3,
-    /// The longest edge.
-    size: f64,
-    area: f64,
-    power: f64,
-}
+use super::pieces::{self, Piece};
+use super::spherical_triangle;
 
 pub struct Lamps {
     pieces: Vec<Piece>,
@@ -28,6 +18,8 @@ pub struct Lamps {
 /// Pieces along the edge of a triangle whose emission varies, and points along the edge of a piece that its power is taken from.
 const PIECES: u32 = 64;
 const POINTS: u32 = 8;
+/// Sizes of a piece up to which it is near.
+const NEAR: f64 = 4.0;
 /// Of each that sends a shadow ray, at most.
 const CANDIDATES: usize = 8;
 
@@ -122,9 +114,21 @@ impl Lamps {
         let (index, probability, u) = choice.pick(number)?;
         let piece = &self.pieces[index];
         let triangle = &scene.triangles[piece.triangle];
-        let root = u.sqrt();
-        let shares = piece.corner + piece.edges[0] * (root * (1.0 - v)) + piece.edges[1] * (root * v);
-        let target = triangle.a + triangle.ab * shares.x + triangle.ac * shares.y;
+        // Near pieces by what is seen of them, so that no point weighs much.
+        let near = origin.distance_squared(piece.middle) < NEAR * NEAR * piece.size * piece.size;
+        let seen =
+            if near { spherical_triangle::sample(origin, piece.corners(triangle), [u, v]) } else { None };
+        let (target, density) = match seen {
+            Some((direction, angle)) => {
+                let ahead = triangle.normal.dot(direction);
+                let distance = triangle.normal.dot(triangle.a - origin) / ahead;
+                if !(distance > 0.0 && distance.is_finite()) {
+                    return None;
+                }
+                (origin + direction * distance, -ahead / (distance * distance * angle))
+            }
+            None => (triangle.at(piece.shares([u, v])), 1.0 / piece.area),
+        };
         let towards = target - origin;
         let squared = towards.length_squared();
         let direction = towards / squared.sqrt();
@@ -132,7 +136,8 @@ impl Lamps {
         if cosines <= 0.0 {
             return None;
         }
-        let light = emission(triangle, shares) * (cosines / squared * piece.area / probability);
+        let radiance = emission(triangle, triangle.shares(target));
+        let light = radiance * (cosines / squared / (density * probability));
         let weight = light.element_sum();
         let target = target + triangle.normal * offset;
         (weight > 0.0).then_some(Candidate { target, light, weight })
@@ -141,36 +146,19 @@ impl Lamps {
 
 fn cut(index: usize, triangle: &Triangle) -> Vec<Piece> {
     let sides = if triangle.picture.is_some() { PIECES } else { 1 };
-    let step = 1.0 / f64::from(sides);
-    let mut pieces = Vec::new();
-    for i in 0..sides {
-        for j in 0..sides - i {
-            let corner = DVec2::new(f64::from(i), f64::from(j)) * step;
-            pieces.push((corner, [DVec2::X * step, DVec2::Y * step]));
-            if i + j + 1 < sides {
-                pieces.push((corner + step, [DVec2::NEG_X * step, DVec2::NEG_Y * step]));
-            }
+    let power = |piece: &Piece| {
+        if triangle.picture.is_none() {
+            return triangle.emission.element_sum() * piece.area;
         }
-    }
-    let area = triangle.area * step * step;
-    let size =
-        triangle.ab.length().max(triangle.ac.length()).max((triangle.ac - triangle.ab).length()) * step;
-    let piece = |(corner, edges): (DVec2, [DVec2; 2])| {
-        let middle = corner + (edges[0] + edges[1]) / 3.0;
-        let mut power = triangle.emission.element_sum();
-        if triangle.picture.is_some() {
-            let points = (0..POINTS * POINTS).map(|point| {
-                let [s, t] =
-                    [point % POINTS, point / POINTS].map(|i| (f64::from(i) + 0.5) / f64::from(POINTS));
-                let root = s.sqrt();
-                emission(triangle, corner + edges[0] * (root * (1.0 - t)) + edges[1] * (root * t))
-            });
-            power = points.sum::<DVec3>().element_sum() / f64::from(POINTS * POINTS);
-        }
-        let middle = triangle.a + triangle.ab * middle.x + triangle.ac * middle.y;
-        Piece { triangle: index, corner, edges, middle, size, area, power: power * area }
+        let points = (0..POINTS * POINTS).map(|point| {
+            let at = [point % POINTS, point / POINTS].map(|i| (f64::from(i) + 0.5) / f64::from(POINTS));
+            emission(triangle, piece.shares(at))
+        });
+        points.sum::<DVec3>().element_sum() / f64::from(POINTS * POINTS) * piece.area
     };
-    pieces.into_iter().map(piece).collect()
+    let mut pieces = pieces::cut(index, triangle, sides);
+    pieces.iter_mut().for_each(|piece| piece.power = power(piece));
+    pieces
 }
 
 /// Radiance at a point of a triangle.

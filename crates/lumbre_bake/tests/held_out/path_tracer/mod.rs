@@ -1,12 +1,16 @@
 //! Converged irradiance at points of a world's surfaces: f64, next-event estimation, Russian roulette, a bounding volume
 //! hierarchy of its own. Front sides are diffuse, emitters one-sided, back sides black; the sky is one colour. Shares no code with the baker.
 
+mod bounced;
+mod bright;
 mod choice;
 mod directions;
 pub mod hierarchy;
 mod lamps;
+mod pieces;
 mod points;
 mod punctual;
+mod spherical_triangle;
 
 use std::f64::consts::PI;
 
@@ -18,6 +22,8 @@ use rayon::prelude::*;
 
 use super::random::Random;
 use super::scenes::region::Region;
+use bounced::{Bounced, SETS};
+use bright::Bright;
 use directions::Directions;
 use hierarchy::{Hierarchy, Triangle};
 use lamps::Lamps;
@@ -31,6 +37,9 @@ pub struct PathTracer {
     sky: DVec3,
     directions: Directions,
     region: Option<Region>,
+    bright: Option<Bright>,
+    /// Where paths end at their first bounce.
+    bounced: Option<Bounced>,
     pub offset: f64,
 }
 
@@ -76,7 +85,7 @@ impl PathTracer {
             world.get_resource::<SceneSettings>().map_or(DVec3::ZERO, |settings| settings.sky.as_dvec3());
         let region = world.get_resource::<Region>().cloned();
         let [low, high] = scene.bounds();
-        Self {
+        let mut tracer = Self {
             lamps: Lamps::new(&scene),
             lights: PunctualLights::new(world, &scene),
             sky,
@@ -84,7 +93,19 @@ impl PathTracer {
             region,
             offset: 1e-9 * (high - low).length(),
             scene,
-        }
+            bright: None,
+            bounced: None,
+        };
+        tracer.bright = tracer.region.is_some().then(|| Bright::new(&tracer));
+        tracer
+    }
+
+    /// Ends paths at their first bounce by light that was gathered there before: far less noise in dark places, and light by two and more bounces
+    /// that is even over a quarter of a metre.
+    #[must_use]
+    pub fn with_bounced(mut self, seed: u64) -> Self {
+        self.bounced = Some(Bounced::new(&self, seed));
+        self
     }
 
     /// Irradiance at places with their normals.
@@ -108,39 +129,44 @@ impl PathTracer {
         effort: Effort,
         random: &mut Random,
     ) -> (DVec3, DVec3) {
-        let mut batches = |count: usize| {
+        let mut spread = |groups: usize, count: usize| {
             let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
-            for _ in 0..count {
-                let value = self.batch(position, normal, effort.side, random);
+            for group in 0..groups {
+                let batch = |_| self.batch(position, normal, effort.side, group % SETS, random);
+                let value = (0..count).map(batch).sum::<DVec3>() / count as f64;
                 sum += value;
                 squares += value * value;
             }
-            let n = count as f64;
+            let n = groups as f64;
             let value = sum / n;
             (value, (squares / n - value * value).max(DVec3::ZERO) / (n - 1.0))
         };
         let [fewest, most] = effort.batches;
         let mut count = most;
         if fewest < most {
-            let (value, variance) = batches(fewest);
+            let (value, variance) = spread(fewest, 1);
             let error = effort.error * value.element_sum() / 3.0;
             let wanted = fewest as f64 * variance.element_sum() / (3.0 * error * error);
             // What is lit by rare paths may have met none yet: more of them then.
             count = if error > 0.0 { (wanted.ceil() as usize).clamp(fewest, most) } else { 4 * fewest };
         }
-        let (value, variance) = batches(count);
+        // Batches of one set of bounced light are not independent: they make one group.
+        let groups = if self.bounced.is_some() { SETS } else { count };
+        let (value, variance) = spread(groups, count.div_ceil(groups));
         (value, DVec3::from_array(variance.to_array().map(f64::sqrt)))
     }
 
     /// An unbiased estimate by a jittered grid of first directions, and one of places on the lamps.
-    fn batch(&self, position: DVec3, normal: DVec3, side: usize, random: &mut Random) -> DVec3 {
+    fn batch(&self, position: DVec3, normal: DVec3, side: usize, set: usize, random: &mut Random) -> DVec3 {
         let origin = position + normal * self.offset;
         let mut bounced = DVec3::ZERO;
         for cell in 0..side * side {
             let mut jitter = |cell: usize| (cell as f64 + random.uniform()) / side as f64;
             let (u, v) = (jitter(cell % side), jitter(cell / side));
+            let number = (cell as f64 + random.uniform()) / (side * side) as f64;
+            bounced += self.reflected([origin, normal], number, random);
             if let Some((direction, weight)) = self.directions.choose(origin, normal, u, v) {
-                bounced += PI * weight * self.radiance(origin, direction, random);
+                bounced += PI * weight * self.radiance(origin, direction, set, random);
             }
         }
         self.direct_light([origin, normal], side, random) + bounced / (side * side) as f64
@@ -168,7 +194,7 @@ impl PathTracer {
     }
 
     /// Reflected (not emitted) radiance and that of the sky that comes from a direction.
-    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, random: &mut Random) -> DVec3 {
+    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, set: usize, random: &mut Random) -> DVec3 {
         let (mut sum, mut weight) = (DVec3::ZERO, DVec3::ONE);
         for bounce in 1.. {
             let Some(hit) = self.scene.closest(origin, direction) else {
@@ -181,8 +207,18 @@ impl PathTracer {
                 break;
             }
             weight *= triangle.reflectance;
-            origin = origin + direction * hit.distance + normal * self.offset;
-            sum += weight * self.one_direct([origin, normal], random) / PI;
+            origin += direction * hit.distance;
+            let sought =
+                self.bright.as_ref().is_some_and(|b| b.seeks(self, hit.triangle, origin, hit.distance));
+            origin += normal * self.offset;
+            if !sought {
+                sum += weight * self.one_direct([origin, normal], random) / PI;
+            }
+            if let Some(bounced) = &self.bounced {
+                sum += weight * bounced.at(self, set, hit.triangle, origin) / PI;
+                break;
+            }
+            sum += weight * self.reflected([origin, normal], random.uniform(), random) / PI;
             if bounce > 2 {
                 let survives = weight.max_element().min(0.95);
                 if random.uniform() >= survives {
@@ -196,6 +232,11 @@ impl PathTracer {
             direction = next;
         }
         sum
+    }
+
+    /// Light that comes by one bounce from what is brightly lit.
+    fn reflected(&self, at: [DVec3; 2], number: f64, random: &mut Random) -> DVec3 {
+        self.bright.as_ref().map_or(DVec3::ZERO, |bright| bright.irradiance(self, at, number, random))
     }
 
     /// Direct light by one shadow ray each to a lamp and a light.

@@ -11,6 +11,8 @@ use super::{Effort, Irradiance, PathTracer};
 const INSIDE: f64 = 0.85;
 /// Metres from a point to those that tell of an edge: a texel's size.
 const TEXEL: f64 = 0.025;
+/// Of the scene's size: faces so near to one another touch, though single precision leaves gaps.
+const TOUCHING: f64 = 1e-7;
 /// The change of direct light over that which makes an edge, of all the light at the point.
 const EDGE: f64 = 0.05;
 
@@ -18,10 +20,21 @@ impl PathTracer {
     /// Points uniform by area on what can be seen, and the irradiance there.
     pub fn points(&self, count: usize, effort: Effort, seed: u64) -> Vec<Irradiance> {
         let mut random = Random::new(seed);
-        let inside = if self.region.is_some() { (INSIDE * count as f64).round() as usize } else { 0 };
+        let inside = (self.share_inside() * count as f64).round() as usize;
         let mut places = self.places(inside, true, &mut random);
         places.extend(self.places(count - inside, false, &mut random));
         self.at(&places, effort, seed)
+    }
+
+    /// At least as many points as the region has of the area.
+    fn share_inside(&self) -> f64 {
+        let Some(region) = &self.region else { return 0.0 };
+        let (mut inside, mut all) = (0.0, 0.0);
+        for triangle in &self.scene.triangles {
+            all += triangle.area;
+            inside += if region.holds(triangle.point(4.0 / 9.0, 0.5)) { triangle.area } else { 0.0 };
+        }
+        INSIDE.max(inside / all)
     }
 
     fn places(&self, count: usize, inside: bool, random: &mut Random) -> Vec<(DVec3, DVec3)> {
@@ -43,7 +56,10 @@ impl PathTracer {
             if self.region.as_ref().is_some_and(|region| region.holds(position) != inside) {
                 continue;
             }
-            // In the open: most of what it sees are fronts or the sky (not the outside of the walls, nor what stands on something).
+            if self.touches(position, triangle.normal) {
+                continue;
+            }
+            // In the open: most of what it sees are fronts or the sky (not the outside of the walls).
             let seen = (0..64).filter(|_| {
                 let direction = cosine(triangle.normal, random.uniform(), random.uniform());
                 match self.scene.closest(position + triangle.normal * self.offset, direction) {
@@ -56,6 +72,21 @@ impl PathTracer {
             }
         }
         places
+    }
+
+    /// Whether another face looks at this one from where it is.
+    fn touches(&self, position: DVec3, normal: DVec3) -> bool {
+        let [low, high] = self.scene.bounds();
+        let gap = TOUCHING * (high - low).length();
+        let (mut origin, mut left) = (position - normal * gap, 2.0 * gap);
+        while let Some(hit) = self.scene.closest(origin, normal).filter(|hit| hit.distance < left) {
+            if self.scene.triangles[hit.triangle].normal.dot(normal) < -0.5 {
+                return true;
+            }
+            let step = hit.distance + 1e-6 * gap;
+            (origin, left) = (origin + normal * step, left - step);
+        }
+        false
     }
 
     /// Whether direct light changes within a texel of a place by more than a twentieth of all its light.

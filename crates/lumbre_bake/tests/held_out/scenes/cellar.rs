@@ -46,7 +46,7 @@ pub fn cellar(layout: u64, scale: f64) -> World {
         // Into the door, past the yard's edge.
         b.sun(DVec3::new(1.0, -1.0, random.between(-0.2, 0.2)), [23.0, 20.0, 16.0]);
     } else {
-        b.lamp("lamp", [-2.6, 2.62, 1.6], [-1.8, 2.68, 2.4], [40.0, 36.0, 28.0]);
+        b.lamp("lamp", [-2.6, 2.64, 1.6], [-1.8, 2.7, 2.4], [40.0, 36.0, 28.0]);
     }
     b.camera([5.6, 0.4, 3.7], [0.5, -0.3, door]);
     let way = [[0.0, 0.0, door], [0.0, 0.0, 0.95], [0.0, 2.05, 0.0]];

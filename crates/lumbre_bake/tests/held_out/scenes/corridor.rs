@@ -28,7 +28,7 @@ pub fn corridor(layout: u64, scale: f64) -> World {
     ];
     carve(&mut b, &voids, [WOOD, paint(&mut random), WHITE], None);
     if z_shape {
-        b.lamp("lamp", [0.5, height - 0.1, 0.5], [1.1, height - 0.04, 1.1], [20.0, 17.0, 12.0]);
+        b.lamp("lamp", [0.5, height - 0.06, 0.5], [1.1, height, 1.1], [20.0, 17.0, 12.0]);
     } else {
         let size = 0.09 * b.scale;
         let ball = |t: f64| {
@@ -43,7 +43,7 @@ pub fn corridor(layout: u64, scale: f64) -> World {
     let z = second - random.between(2.2, 2.6);
     b.block("chest", [first - 0.5, 0.0, z], [first, 0.7, z + 0.7], GREEN, 0.0);
     let [low, high] = last;
-    let far = if z_shape { high[0] - 0.9 } else { low[0] + 0.4 };
+    let far = if z_shape { low[0] + 1.0 } else { low[0] + third - 1.2 };
     b.block("far crate", [far, 0.0, second - 0.9], [far + 0.5, 0.45, second - 0.4], CLAY, turn / 2.0);
     b.block(
         "pillar",

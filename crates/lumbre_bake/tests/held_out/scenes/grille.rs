@@ -19,8 +19,8 @@ pub fn grille(layout: u64, scale: f64) -> World {
     if layout.is_multiple_of(2) {
         let shaft = [[x, height, z], [x + 0.8, height + 0.5, z + 0.6]];
         carve(&mut b, &[room, shaft], colors, None);
-        let lamp = [x + 0.2, height + 0.38, z + 0.15];
-        b.lamp("lamp", lamp, [x + 0.6, height + 0.46, z + 0.45], [70.0, 60.0, 45.0]);
+        let lamp = [x + 0.2, height + 0.42, z + 0.15];
+        b.lamp("lamp", lamp, [x + 0.6, height + 0.5, z + 0.45], [70.0, 60.0, 45.0]);
         let bars = 20;
         for bar in 1..bars {
             let at = x + 0.8 * f64::from(bar) / f64::from(bars) - 0.006;
@@ -32,7 +32,7 @@ pub fn grille(layout: u64, scale: f64) -> World {
         }
     } else {
         carve(&mut b, &[room], colors, None);
-        b.lamp("lamp", [x, 1.5, 0.02], [x + 0.7, 1.9, 0.08], [40.0, 35.0, 26.0]);
+        b.lamp("lamp", [x, 1.5, 0.0], [x + 0.7, 1.9, 0.06], [40.0, 35.0, 26.0]);
         let bars = 24;
         for bar in 0..=bars {
             let at = x - 0.1 + 0.9 * f64::from(bar) / f64::from(bars) - 0.005;

@@ -1,0 +1,83 @@
+//! The tests' FLIP against what its authors publish of it, and against what any difference of pictures has to be.
+
+use glam::DVec3;
+
+#[path = "held_out/flip.rs"]
+#[allow(dead_code, reason = "the mean is for programs")]
+mod flip;
+
+use flip::{PIXELS_PER_DEGREE, Picture, flip};
+
+fn picture(width: usize, height: usize, color: impl Fn(usize, usize) -> DVec3) -> Picture {
+    let pixels = (0..width * height).map(|i| color(i % width, i / width)).collect();
+    Picture { width, pixels }
+}
+
+fn mean(reference: &Picture, test: &Picture) -> f64 {
+    let map = flip(reference, test, PIXELS_PER_DEGREE);
+    assert!(map.iter().all(|value| (0.0..=1.0).contains(value)), "{map:?}");
+    map.iter().sum::<f64>() / map.len() as f64
+}
+
+fn noise(x: usize, y: usize) -> DVec3 {
+    let hash =
+        |salt: usize| ((x * 374_761_393 + y * 668_265_263 + salt * 982_451_653) % 1009) as f64 / 1009.0;
+    DVec3::new(hash(1), hash(2), hash(3))
+}
+
+#[test]
+fn a_monitor_of_the_paper_has_67_pixels_a_degree() {
+    assert!((PIXELS_PER_DEGREE - 67.0206).abs() < 1e-4, "{PIXELS_PER_DEGREE}");
+}
+
+#[test]
+fn what_is_the_same_differs_by_nothing() {
+    let one = picture(40, 30, noise);
+    assert_eq!(mean(&one, &one), 0.0);
+}
+
+#[test]
+fn even_pictures_by_hand() {
+    // No edges and no blur: HyAB to the power 0.7 of Hunt's CIELAB, mapped. Black to white is 100^0.7 = 25.119 of the 41.27 between green and
+    // blue: 0.95 + 0.05 (25.119 - 16.51)/(41.27 - 16.51) = 0.967. Green to blue is 1 by definition.
+    let even = |color: DVec3| picture(24, 24, |_, _| color);
+    let black_white = mean(&even(DVec3::ZERO), &even(DVec3::ONE));
+    assert!((black_white - 0.967).abs() < 1e-3, "{black_white}");
+    let green_blue = mean(&even(DVec3::Y), &even(DVec3::Z));
+    assert!((green_blue - 1.0).abs() < 1e-9, "{green_blue}");
+    // A grey of L* 50 is sRGB 0.4663: 50^0.7 = 15.462 lies below the knee: 0.95/16.51 of it.
+    let grey = mean(&even(DVec3::ZERO), &even(DVec3::splat(0.466_3)));
+    assert!((grey - 0.95 * 50f64.powf(0.7) / (0.4 * 41.27)).abs() < 1e-3, "{grey}");
+}
+
+#[test]
+fn either_picture_may_be_the_reference() {
+    let (a, b) = (picture(40, 30, noise), picture(40, 30, |x, y| noise(y, x)));
+    assert!((mean(&a, &b) - mean(&b, &a)).abs() < 1e-12);
+}
+
+#[test]
+fn more_noise_is_more_and_fine_noise_is_less_than_coarse() {
+    let grey = picture(96, 96, |_, _| DVec3::splat(0.5));
+    let noisy = |strength: f64, size: usize| {
+        picture(96, 96, |x, y| {
+            let sign = if (x / size + y / size).is_multiple_of(2) { 1.0 } else { -1.0 };
+            // Red against green of nearly one luminance: no feature, only colour.
+            DVec3::new(0.5 + strength * sign, 0.5 - 0.5 * strength * sign, 0.5)
+        })
+    };
+    let [weak, strong] = [0.05, 0.2].map(|strength| mean(&grey, &noisy(strength, 1)));
+    assert!(0.0 < weak && weak < strong, "{weak} {strong}");
+    let coarse = mean(&grey, &noisy(0.05, 24));
+    assert!(coarse > 2.0 * weak, "an eye does not resolve single pixels: {weak}, {coarse}");
+}
+
+#[test]
+fn an_edge_that_comes_and_goes_is_seen() {
+    // Ten pixels of a line one pixel wide: the feature raises what the blurred colour says.
+    let grey = picture(96, 96, |_, _| DVec3::splat(0.5));
+    let line = picture(96, 96, |x, _| DVec3::splat(if x == 48 { 0.8 } else { 0.5 }));
+    let map = flip(&grey, &line, PIXELS_PER_DEGREE);
+    let row = &map[48 * 96..49 * 96];
+    assert!(row[48] > 0.15 && row[10] < 1e-6, "{} {}", row[48], row[10]);
+}
