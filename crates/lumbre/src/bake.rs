@@ -243,7 +243,7 @@ fn check_output(path: &Path) -> anyhow::Result<()> {
 fn summary(report: &BakeReport) -> String {
     let mut text = format!(
         "{} maps, {} texels ({:.0} % covered), {} patches, {:.1} million rays at {:.2} Mrays/s\n\
-         estimated error {:.2} % ({}), {:.1} s on {} threads\n",
+         estimated error {:.2} % of the light around, {:.2} % of the level's mean ({}), {:.1} s on {} threads\n",
         report.maps,
         report.texels,
         100.0 * report.coverage,
@@ -251,6 +251,7 @@ fn summary(report: &BakeReport) -> String {
         report.rays as f64 * 1e-6,
         report.mega_rays_per_second,
         100.0 * report.estimated_error,
+        100.0 * report.error_of_mean,
         report.ended,
         report.seconds,
         report.threads,

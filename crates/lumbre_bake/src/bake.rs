@@ -252,8 +252,13 @@ fn run(
             if let Some(change) = &change {
                 kept = Some(change.keep(exchange, &texels, options, &mut watch)?);
             }
-            let receivers =
-                Receivers { texels: &texels, charts: &charts, direct: &direct, local: &local, kept: kept.as_ref() };
+            let receivers = Receivers {
+                texels: &texels,
+                charts: &charts,
+                direct: &direct,
+                local: &local,
+                kept: kept.as_ref(),
+            };
             let gathered = rounds::gather(&outgoing, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
             let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
@@ -279,7 +284,7 @@ fn run(
     }
     if exchange.is_none() {
         note_direct_error(&texels, variances, &local, options, &mut report);
-        report.ended = Ended::after(report.error_reached, watch.clock().late(), true);
+        report.ended = Ended::after(report.error_reached, watch.is_late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
     let samples = match former {

@@ -122,6 +122,9 @@ pub(crate) struct Effort {
     pub shared: [u32; 2],
     /// Gather rays of a texel: first round and most.
     pub gather: [u32; 2],
+    /// Most gather rays of a texel, and most samples of the sources that share them, on average: whatever error is asked for, this is the most
+    /// that a bake takes.
+    pub mean: u32,
 }
 
 /// The error from which on the first rays are half of the quality's: with fewer, smoothing has too little to tell edges from noise, and rounds
@@ -138,6 +141,7 @@ impl Quality {
                 direct: [4, 16, 16],
                 shared: [16, 64],
                 gather: [16, 16],
+                mean: 16,
             },
             Self::Final => Effort {
                 patches: 8_000,
@@ -146,6 +150,7 @@ impl Quality {
                 direct: [8, 64, 1024],
                 shared: [16, 1024],
                 gather: [16, 1024],
+                mean: 64,
             },
             Self::Reference => Effort {
                 patches: 40_000,
@@ -154,6 +159,7 @@ impl Quality {
                 direct: [64, 1024, 4096],
                 shared: [256, 8192],
                 gather: [256, 8192],
+                mean: 8192,
             },
         }
     }

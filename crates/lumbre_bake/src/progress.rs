@@ -28,18 +28,19 @@ pub(crate) type Callback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + '
 /// How often the caller is asked while something takes long.
 const TICK: Duration = Duration::from_millis(50);
 
-/// The stages in their order, with their usual share of the time.
-const STAGES: [(&str, f32); 10] = [
-    ("layout", 0.03),
-    ("hierarchy", 0.02),
-    ("direct light", 0.2),
-    ("form factors", 0.1),
-    ("radiosity", 0.05),
-    ("final gather", 0.48),
-    ("probes", 0.05),
-    ("resolution", 0.02),
-    ("texels", 0.03),
-    ("seams", 0.02),
+/// The stages in their order, with their usual share of the time, and the share of a time limit by which each takes no more samples: so that
+/// every stage has done something roughly before one does it well.
+const STAGES: [(&str, f32, f64); 10] = [
+    ("layout", 0.03, 1.0),
+    ("hierarchy", 0.02, 1.0),
+    ("direct light", 0.2, 0.4),
+    ("form factors", 0.1, 0.5),
+    ("radiosity", 0.05, 0.5),
+    ("final gather", 0.48, 0.85),
+    ("probes", 0.05, 0.9),
+    ("resolution", 0.02, 0.95),
+    ("texels", 0.03, 1.0),
+    ("seams", 0.02, 1.0),
 ];
 
 /// The time that a bake has taken and may take.
@@ -67,6 +68,7 @@ impl Clock {
 pub(crate) struct Watch<'a> {
     callback: &'a mut Callback<'a>,
     clock: Clock,
+    is_cut_short: bool,
     stage: Option<(&'static str, Instant)>,
     /// From where to where in the running stage the work that reports now leads.
     part: (f32, f32),
@@ -79,7 +81,7 @@ impl<'a> Watch<'a> {
     pub fn new(callback: &'a mut Callback<'a>, limit: Option<Duration>) -> Self {
         let clock = Clock { begun: Instant::now(), before: 0.0, limit };
         let (stop, tape) = (Stop::default(), Tape::default());
-        Self { callback, clock, stage: None, part: (0.0, 1.0), error: None, stop, tape }
+        Self { callback, clock, stage: None, part: (0.0, 1.0), error: None, is_cut_short: false, stop, tape }
     }
 
     /// What loops look at while [`Watch::during`] waits for them.
@@ -87,14 +89,25 @@ impl<'a> Watch<'a> {
         &self.stop
     }
 
+    /// Something was left out for want of time.
+    pub fn cut_short(&mut self) {
+        self.is_cut_short = true;
+    }
+
+    /// Whether anything was left out for want of time so far, or would be now.
+    pub fn is_late(&self) -> bool {
+        self.is_cut_short || self.clock().late()
+    }
+
     /// The estimated error so far, for the caller.
     pub fn note_error(&mut self, error: f64) {
         self.error = Some(error);
     }
 
-    /// The time as it is, to be asked from other threads.
+    /// The time as it is, to be asked from other threads: the running stage's share of it.
     pub fn clock(&self) -> Clock {
-        self.clock
+        let (index, _) = self.running();
+        Clock { limit: self.clock.limit.map(|limit| limit.mul_f64(STAGES[index].2)), ..self.clock }
     }
 
     /// Seconds since the bake began.
@@ -212,7 +225,7 @@ impl<'a> Watch<'a> {
 
     fn progress(&self, stage_fraction: f32) -> Progress {
         let (index, stage) = self.running();
-        let before: f32 = STAGES[..index].iter().map(|(_, share)| share).sum();
+        let before: f32 = STAGES[..index].iter().map(|(_, share, _)| share).sum();
         let (from, to) = self.part;
         let stage_fraction = from + (to - from) * stage_fraction.clamp(0.0, 1.0);
         let fraction = (before + STAGES[index].1 * stage_fraction).min(1.0);
@@ -226,7 +239,7 @@ impl<'a> Watch<'a> {
     /// The running stage and its place in the order.
     fn running(&self) -> (usize, &'static str) {
         let stage = self.stage.map_or("layout", |(stage, _)| stage);
-        (STAGES.iter().position(|(name, _)| *name == stage).unwrap_or(STAGES.len() - 1), stage)
+        (STAGES.iter().position(|(name, ..)| *name == stage).unwrap_or(STAGES.len() - 1), stage)
     }
 
     fn place(&self, start: usize, of: usize) -> Place {

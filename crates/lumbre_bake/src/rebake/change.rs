@@ -9,7 +9,6 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::texels::blocks::Blocks;
 use super::changes::{ChangedBox, Changes};
 use super::estimate::{Estimate, Range, cap, in_cap};
 use super::kept::Kept;
@@ -18,6 +17,7 @@ use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::texels::blocks::Blocks;
 use crate::texels::chunks::in_chunks;
 use crate::texels::footprint::{Texel, receiver};
 use crate::transport::direct::{Direct, Receiver, Sources};

@@ -7,9 +7,9 @@ use glam::Vec3;
 use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
-use crate::texels::blocks::Blocks;
 use super::changes::ChangedBox;
 use crate::scene::{Canonical, PlacedLight};
+use crate::texels::blocks::Blocks;
 use crate::texels::footprint::{Texel, receiver};
 use crate::texels::tiles::positions_of;
 use crate::transport::direct::Sources;

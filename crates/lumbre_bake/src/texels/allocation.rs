@@ -84,6 +84,33 @@ pub(crate) fn allot(
     texels.map(more).filter(|own| own.samples > samples[own.index as usize]).collect()
 }
 
+/// As [`allot`], of at most `budget` more samples: what is left over the goal is then as little as they can make it.
+pub(crate) fn allot_within(
+    budget: u64,
+    texels: impl Iterator<Item = u32> + Clone,
+    variances: &[f32],
+    samples: &[u32],
+    most: u32,
+    order: f64,
+    mut goal: f64,
+) -> Vec<Allotment> {
+    let left: f64 = texels.clone().map(|index| f64::from(variances[index as usize])).sum();
+    loop {
+        let wanted = allot(texels.clone(), variances, samples, most, order, goal);
+        let more = |own: &Allotment| u64::from(own.samples - samples[own.index as usize]);
+        if wanted.iter().map(more).sum::<u64>() <= budget {
+            return wanted;
+        }
+        if goal >= left {
+            return Vec::new();
+        }
+        goal = (goal * RELAXED).max(left * LEAST);
+    }
+}
+
+/// By how much a goal is raised that takes too many samples.
+const RELAXED: f64 = 1.2;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,6 +124,18 @@ mod tests {
         assert_eq!(allotted, [Allotment { index: 0, samples: 16 }]);
         let total: f32 = variances.iter().sum();
         assert!(allot(0..4, &variances, &samples, 1024, 1.0, f64::from(total) * 1.01).is_empty());
+    }
+
+    #[test]
+    fn a_budget_goes_where_samples_are_worth_most() {
+        let variances = [16.0f32, 1.0, 0.01, 0.0];
+        let samples = [4, 4, 4, 4];
+        // The goal alone would take far more than these.
+        let allotted = allot_within(12, 0..4, &variances, &samples, 1024, 1.0, 1e-3);
+        assert_eq!(allotted, [Allotment { index: 0, samples: 16 }]);
+        assert!(allot_within(3, 0..4, &variances, &samples, 1024, 1.0, 1e-3).is_empty());
+        let plenty = allot_within(1 << 20, 0..4, &variances, &samples, 1024, 1.0, 6.0);
+        assert_eq!(plenty, allot(0..4, &variances, &samples, 1024, 1.0, 6.0));
     }
 
     #[test]

@@ -88,11 +88,13 @@ fn chunks<T: Send + Record>(
         let start = values.len();
         if let Some(kept) = watch.recall(start, count) {
             if kept.is_empty() && may_end {
+                watch.cut_short();
                 break;
             }
             values.extend(kept);
         } else if may_end && watch.clock().late() {
             watch.keep::<T>(start, count, &[]);
+            watch.cut_short();
             break;
         } else {
             let begun = Instant::now();

@@ -68,6 +68,11 @@ impl LightCuts {
         &self.cuts[self.blocks.of[place] as usize]
     }
 
+    /// The number of a covered texel's block.
+    pub fn block(&self, place: usize) -> u32 {
+        self.blocks.of[place]
+    }
+
     /// Whether some texel has sources that share samples.
     pub fn share_samples(&self) -> bool {
         self.cuts.iter().any(|cut| !cut.rest.is_empty())

@@ -71,7 +71,8 @@ fn is_out_of_range(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> bool
     if placed.light.kind == LightKind::Directional || !(range > 0.0) {
         return false;
     }
-    let (middle, reach) = ((area.corners[0] + area.corners[2]) * 0.5, 0.5 * area.corners[0].distance(area.corners[2]));
+    let (middle, reach) =
+        ((area.corners[0] + area.corners[2]) * 0.5, 0.5 * area.corners[0].distance(area.corners[2]));
     scene.space.place(placed.position).distance(middle) > (range + reach) * (1.0 + f64::from(f32::EPSILON))
 }
 

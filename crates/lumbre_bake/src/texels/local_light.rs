@@ -1,6 +1,6 @@
 //! The light around each texel: what an eye in that room adapts to, so that an error is told as that eye sees it and not beside the noon
-//! outside. Half of it is the light of the texel's own block, half that of what can be seen from there in two steps (from a wall its room,
-//! and what lies beyond the door a little); of each the square of the mean square root, between the arithmetic mean, which one bright
+//! outside. A third of it is the light of the texel's own block, the rest that of what can be seen from there in two steps (from a wall its
+//! room, and what lies beyond the door a little); of all the square of the mean square root, between the arithmetic mean, which one bright
 //! window outshines, and the logarithmic one, which one closed cupboard pulls to nothing. Not an exact solution: a few walks through the
 //! scene, which read direct light where they hit. No eye fits into a gap of a few texels: what is nearer is not in view.
 
@@ -94,9 +94,10 @@ impl LocalLight {
                 direct + indirect / f64::from(WALKS)
             })
             .collect();
-        let (sum, count) = blocks.members.iter().zip(&own).fold((0.0, 0usize), |(sum, count), (members, own)| {
-            (sum + own * members.len() as f64, count + members.len())
-        });
+        let (sum, count) =
+            blocks.members.iter().zip(&own).fold((0.0, 0usize), |(sum, count), (members, own)| {
+                (sum + own * members.len() as f64, count + members.len())
+            });
         let mean = sum / count.max(1) as f64;
         let view = |block: usize| -> f64 {
             // Where a walk has left the scene, the eye sees no surface: what is here counts for it. Of a gap it sees nothing at all.
@@ -111,7 +112,7 @@ impl LocalLight {
         let of_blocks: Vec<f32> = (0..own.len())
             .into_par_iter()
             .map(|block| {
-                let root = 0.5 * (own[block].sqrt() + view(block));
+                let root = (own[block].sqrt() + VIEW as f64 * view(block)) / (1 + VIEW) as f64;
                 (root * root).max(FLOOR * mean).max(f64::from(f32::MIN_POSITIVE)) as f32
             })
             .collect();

@@ -204,11 +204,8 @@ pub(crate) mod tests {
 
     /// Maps in tiles of random surfaces, of which some go on and some do not, with holes; as these instructions compute them.
     pub(crate) fn random_grid(level: Level) -> Grid {
-        let surface = |chart, x: f32, y: f32| Surface {
-            chart,
-            normal: Vec3::new(x, y, 0.0).normalize(),
-            group: 0,
-        };
+        let surface =
+            |chart, x: f32, y: f32| Surface { chart, normal: Vec3::new(x, y, 0.0).normalize(), group: 0 };
         let surfaces =
             vec![surface(0, 1.0, 0.0), surface(0, 1.0, 0.2), surface(1, 1.0, 0.0), surface(1, 0.0, 1.0)];
         let mut state = 11;

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::allocation::{Allotment, allot};
+use super::allocation::{Allotment, allot_within};
 use super::chunks::in_chunks_in_time;
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
 use super::footprint::Texel;
@@ -23,7 +23,7 @@ const WORTH_RAYS: f64 = 0.1;
 /// A round's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.7;
 /// Of the squared error asked for, what a round aims at.
-const AIM: f64 = 0.95;
+const AIM: f64 = 0.85;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
 /// The most by which a round lowers the part that rays leave: the first estimates are rough.
@@ -62,7 +62,8 @@ pub(crate) fn gather(
     report: &mut BakeReport,
 ) -> Result<Bounced, BakeError> {
     let Receivers { texels, charts, direct, local, kept } = receivers;
-    let [first, most] = options.effort().gather.map(|samples| samples / SCRAMBLES as u32);
+    let effort = options.effort();
+    let [first, most] = effort.gather.map(|samples| samples / SCRAMBLES as u32);
     let nothing = || vec![Gathered::default(); texels.len()];
     let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
     let open_texels = (0..texels.len() as u32).filter(|&index| !texels[index as usize].is_hidden());
@@ -141,8 +142,10 @@ pub(crate) fn gather(
         let asked = open * options.error.powi(2);
         let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
-        wanted = allot(open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
-        report.ended = Ended::after(report.error_reached, late, wanted.is_empty());
+        let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
+        let budget = (open as u64 * u64::from(effort.mean / SCRAMBLES as u32)).saturating_sub(cast);
+        wanted = allot_within(budget, open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
+        report.ended = Ended::after(report.error_reached, late || watch.is_late(), wanted.is_empty());
         if report.error_reached || late || helpless || wanted.is_empty() {
             break (corrected(&estimates, &patch_bias), variances);
         }

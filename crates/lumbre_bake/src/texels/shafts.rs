@@ -1,6 +1,8 @@
 //! What may stand between texels and what shines on them: found for tiles of texels, and narrowed down for each. Where it is little, direct
 //! light needs no shadow ray. Not the light: that is `direct`.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -89,8 +91,12 @@ impl<'a> Shafts<'a> {
             return None;
         }
         let lamp = |&part: &u32| {
+            let emitters = self.sources.emitters_of(part);
+            if emitters.len() > MOST_EMITTERS {
+                return None;
+            }
             let mut found = Vec::new();
-            for &emitter in self.sources.emitters_of(part) {
+            for &emitter in emitters {
                 if self.scene.stop.is_set() {
                     return None;
                 }
@@ -98,21 +104,34 @@ impl<'a> Shafts<'a> {
                     found.push((emitter, shaft.triangles(self.scene, tree, MOST_BLOCKERS)?));
                 }
             }
-            (found.len() <= MOST_EMITTERS).then_some(OfPart { part, emitters: found })
+            Some(OfPart { part, emitters: found })
         };
         let parts = cut.lamps.iter().filter_map(lamp).collect();
         let lights = ways(self.sources, &cut.lights, &area, first.side(self.scene), tree);
         Some(OfTile { parts, lights, asked: None })
     }
 
-    /// Lamps that have samples of their own where it is not known what may stand before them: a texel, by its place, and the lamp.
+    /// Lamps that have samples of their own in blocks in most of whose tiles it is not known what may stand before them: a texel of the block,
+    /// by its place, and the lamp.
     pub fn unresolved(&self, cuts: &LightCuts) -> Vec<(u32, u32)> {
-        let of_tile = |tile: &OfTile| {
-            let lamps = tile.asked.map_or(&[][..], |asked| &cuts.of(asked as usize).lamps);
-            let open = lamps.iter().filter(|&&lamp| tile.parts.iter().all(|part| part.part != lamp));
-            open.filter_map(|&lamp| Some((tile.asked?, lamp))).collect::<Vec<_>>()
+        // Of each block its tiles, and of each lamp there those that leave it open.
+        let mut tiles: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut open: BTreeMap<(u32, u32), (u32, u32)> = BTreeMap::new();
+        for (tile, asked) in self.tiles.iter().filter_map(|tile| Some((tile, tile.asked?))) {
+            let block = cuts.block(asked as usize);
+            *tiles.entry(block).or_default() += 1;
+            // Where all lamps have samples of their own the sum over them is exact, and only what is hidden of it is left to rays.
+            let cut = cuts.of(asked as usize);
+            for &lamp in cut.lamps.iter().filter(|_| !cut.all_apart) {
+                if tile.parts.iter().all(|part| part.part != lamp) {
+                    open.entry((block, lamp)).or_insert((asked, 0)).1 += 1;
+                }
+            }
+        }
+        let most = |((block, lamp), (asked, count)): ((u32, u32), (u32, u32))| {
+            (2 * count > tiles[&block]).then_some((asked, lamp))
         };
-        self.tiles.iter().flat_map(of_tile).collect()
+        open.into_iter().filter_map(most).collect()
     }
 
     /// What may stand between a texel, by its number, and those of the sources for which that is known.
@@ -159,6 +178,6 @@ fn shown(scene: &BakeScene, texel: &Texel) -> Shown {
     }
 }
 
-/// Most triangles that may stand before an emitter, and most emitters of a lamp that shine on a tile: beyond, rays are quicker.
+/// Most triangles that may stand before an emitter, and most emitters of a lamp: beyond, rays are quicker.
 const MOST_BLOCKERS: usize = 32;
 const MOST_EMITTERS: usize = 8;

@@ -5,7 +5,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::allocation::{Allotment, allot};
+use super::allocation::{Allotment, allot_within};
 use super::chunks::{in_chunks, in_chunks_in_time};
 use super::error_estimate::spread;
 use super::footprint::{Texel, receiver};
@@ -106,12 +106,13 @@ impl<'a> SharedLight<'a> {
     ) -> Result<Self, BakeError> {
         let texels = surroundings.texels;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(SCRAMBLES as u32));
-        let mut light =
-            Self { sources, texels, cuts, surroundings, options, first, most, found: Vec::new() };
+        let mut light = Self { sources, texels, cuts, surroundings, options, first, most, found: Vec::new() };
+        // A complete map first, whatever time it takes.
+        let clock = watch.clock();
         light.found = in_chunks(texels.len(), watch, |place| {
             let mut own = Shared::default();
             if wanted(place) {
-                light.add(place, &mut own, first);
+                light.add(place, &mut own, if clock.late() { 1 } else { first });
             }
             own
         })?;
@@ -169,8 +170,12 @@ impl<'a> SharedLight<'a> {
             }
             before = left;
             let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
+            let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
+            let mean = u64::from(self.options.effort().mean / SCRAMBLES as u32);
+            let budget = (places.clone().count() as u64 * mean).saturating_sub(taken);
+            let goal = goal.max(left / MOST_OF_A_ROUND);
             let wanted: Vec<Allotment> =
-                allot(places, &relative, &samples, self.most, ORDER, goal.max(left / MOST_OF_A_ROUND));
+                allot_within(budget, places, &relative, &samples, self.most, ORDER, goal);
             watch.pass(PASS);
             let more = in_chunks_in_time(wanted.len(), watch, |index| {
                 let Allotment { index: place, samples } = wanted[index];

@@ -8,11 +8,10 @@ use lumbre_optics::LightKind;
 
 use super::between::{BeforePart, Between};
 use super::cut_out::Pieces;
-use super::emitter_tree::EmitterTree;
+use super::emitter_tree::{EXACT_EMITTERS, EmitterTree, TERM_ERROR};
 use super::emitters::{Emitter, emitters, lamps};
 use super::light_cut::{FEW_LIGHTS, LightCut};
 use super::light_tree::{LightTree, has_place};
-use super::polygon::point_to_triangle;
 use super::share_variance::{share_variance, uneven_variance};
 use super::unoccluded::Unoccluded;
 use super::visible_part::visible_part;
@@ -223,19 +222,22 @@ impl<'a> Sources<'a> {
         for (place, (&part, weight)) in parts.iter().zip(weights).enumerate() {
             let own = allotted(samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
-            let unoccluded =
-                || Unoccluded::mean(|x, y| point(x, y).map(|receiver| self.unoccluded(part, &receiver)));
-            let known =
-                between.parts.iter().find(|between| between.part == part).and_then(|between| match between
-                    .emitters
-                    .is_empty()
-                {
+            let unoccluded = || {
+                Unoccluded::mean(|x, y| {
+                    point(x, y).map(|receiver| self.emitter_tree.unoccluded(&self.emitters, part, &receiver))
+                })
+            };
+            let known = between.parts.iter().find(|between| between.part == part).and_then(|between| {
+                match between.emitters.is_empty() {
                     true => Some(unoccluded()),
                     false => self.seen_past(between, sequence, (own, set), point, direct),
-                });
+                }
+            });
+            // What one term for many emitters leaves.
+            let by_terms = if self.emitter_tree.emitters(part) > EXACT_EMITTERS { TERM_ERROR } else { 0.0 };
             if let Some((light, variance)) = known {
                 irradiance += light;
-                direct.variance += variance;
+                direct.variance += variance + (by_terms * grey(light)).powi(2);
                 continue;
             }
             let mut share = self.seen_share(part, &anchor, sequence, (own, set), point, direct);
@@ -249,19 +251,9 @@ impl<'a> Sources<'a> {
             }
             irradiance += light * share.mean;
             direct.variance += grey(light).powi(2) * share.variance + uneven * grey(share.mean).powi(2);
+            direct.variance += (by_terms * grey(light * share.mean)).powi(2);
         }
         irradiance
-    }
-
-    /// Irradiance by a part of the emissive surfaces as if nothing were between.
-    pub(super) fn unoccluded(&self, part: u32, receiver: &Receiver) -> Vec3 {
-        let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
-        let of = |&index: &u32| {
-            let emitter = &self.emitters[index as usize];
-            let factor = point_to_triangle(position, normal, &emitter.corners_f64);
-            emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor)
-        };
-        self.emitters_of(part).iter().map(of).sum::<DVec3>().as_vec3()
     }
 
     /// The light of a part of which it is known what may stand between, at as many points as are worth so many shadow rays, and its variance;
@@ -432,8 +424,7 @@ fn spherical_triangle(corners: [Vec3; 3], u: f32, v: f32) -> Option<(Vec3, f32)>
     }
     let part = std::f64::consts::PI + f64::from(u) * solid_angle;
     let ((sine, cosine), (sine_part, cosine_part)) = (alpha.sin_cos(), part.sin_cos());
-    let (s, t) =
-        (sine_part * cosine - cosine_part * sine, cosine_part * cosine + sine_part * sine);
+    let (s, t) = (sine_part * cosine - cosine_part * sine, cosine_part * cosine + sine_part * sine);
     let (k, l) = (t + cosine, s - sine * a.dot(b));
     let along = (l + (l * t - k * s) * cosine) / ((l * s + k * t) * sine);
     if along.is_nan() {

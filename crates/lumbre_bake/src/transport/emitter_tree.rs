@@ -1,12 +1,13 @@
 //! Emissive triangles as a hierarchy: lamps (pieces that hang together), lamps of lamps, and the parts of a lamp, each with the
 //! ball it lies in, where it shines to and how much (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with
-//! Adaptive Tree Splitting", 2018). It tells about how much of the light each part brings, and takes samples. Not visibility: that is
-//! `direct`; not which parts have samples of their own: that is `light_cut`.
+//! Adaptive Tree Splitting", 2018). It tells about how much of the light each part brings, and how much exactly where nothing is between, and
+//! takes samples. Not visibility: that is `direct`; not which parts have samples of their own: that is `light_cut`.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 
 use super::direct::Receiver;
 use super::emitters::Emitter;
+use super::polygon::point_to_triangle;
 
 /// Emissive triangles as a hierarchy.
 #[derive(Clone, Debug, Default)]
@@ -27,8 +28,11 @@ struct Node {
     /// Unit, or zero: by power, where it shines to; no normal differs from it by more than `spread`, a chord.
     axis: Vec3,
     spread: f32,
-    /// Σ radiance · area, sum of the channels.
+    /// Σ radiance · area, and the sum of its channels.
+    light: Vec3,
     power: f32,
+    /// Σ radiance · area · normal: a column for each channel.
+    moments: Mat3,
     /// Lamps in it, wholly or in part.
     lamps: u32,
     /// Emitters in it: the first, in the order of all, and how many.
@@ -43,6 +47,21 @@ enum Kind {
     Leaf(u32),
     Inner([u32; 2]),
 }
+
+/// Up to this many emitters every one is summed exactly wherever it is.
+pub(super) const EXACT_EMITTERS: u32 = 48;
+/// Beyond, parts of at most this sine of their radius against their distance count as one term: it differs from a part of radius r at distance
+/// d by about (r/d)², here a quarter of a per cent, and by (r/d) times what its normals differ by.
+const OPENING: f32 = 0.05;
+/// A part of which some may look away is opened no further where it can bring no more than this share of what was found before.
+const NEGLIGIBLE: f32 = 0.003;
+/// What one term for a part leaves of the light of a lamp: root of the mean square, as a test measures it.
+pub(super) const TERM_ERROR: f32 = 0.005;
+
+/// Lamps whose common ball has at most this sine cast one shadow.
+const NARROW: f32 = 0.02;
+/// Parts that are opened at most to tell how much of what a receiver sees shines.
+const MOST_OPENED: usize = 64;
 
 /// Least share of a cosine in a weight, so that none is 0 where light may arrive.
 pub(super) const LEAST_COSINE: f32 = 0.02;
@@ -129,10 +148,111 @@ impl EmitterTree {
         if size < distance { size / distance } else { 1.0 }
     }
 
+    /// About how much of a receiver's light would come from emitters if all shone alike, in [0, 1] but for what its parts' balls overlap: near
+    /// large ones by the parts that have to be told apart.
+    pub fn form_factor(&self, receiver: &Receiver) -> f32 {
+        let (mut sum, mut open, mut opened) = (0.0, Vec::new(), 0);
+        open.extend(self.root());
+        while let Some(part) = open.pop() {
+            let sine = self.sine(part, receiver, 0.0);
+            match self.children(part).filter(|_| sine > 0.5 && opened < MOST_OPENED) {
+                Some(halves) => {
+                    opened += 1;
+                    open.extend(halves);
+                }
+                None => {
+                    let node = &self.nodes[part as usize];
+                    let direction = (node.center - receiver.position).normalize_or_zero();
+                    let receives = (direction.dot(receiver.normal) + sine).clamp(0.0, 1.0);
+                    let emits = (node.spread - direction.dot(node.axis)).clamp(0.0, 1.0);
+                    sum += receives * emits * sine * sine;
+                }
+            }
+        }
+        sum
+    }
+
+    /// The lamps, or groups of lamps, whose shadows are told apart at a receiver, at most so many: the brightest that subtend an angle are
+    /// parted first.
+    pub fn groups(&self, receiver: &Receiver, most: usize) -> Vec<u32> {
+        let mut groups: Vec<u32> = self.root().into_iter().collect();
+        while groups.len() < most {
+            let weight = |&(_, group): &(usize, &u32)| self.weight(*group, receiver, 0.0);
+            let parted = groups
+                .iter()
+                .enumerate()
+                .filter(|(_, group)| self.lamps(**group) > 1 && self.sine(**group, receiver, 0.0) > NARROW)
+                .max_by(|a, b| weight(a).total_cmp(&weight(b)).then(b.1.cmp(a.1)));
+            let Some((place, &group)) = parted else { break };
+            let Some([near, far]) = self.children(group) else { break };
+            groups[place] = near;
+            groups.push(far);
+        }
+        groups
+    }
+
     /// The emitters of a part, by number.
     pub fn emitters_of(&self, part: u32) -> &[u32] {
         let node = &self.nodes[part as usize];
         &self.order[node.first as usize..(node.first + node.emitters) as usize]
+    }
+
+    /// Irradiance of a part as if nothing were between.
+    pub fn unoccluded(&self, emitters: &[Emitter], part: u32, receiver: &Receiver) -> Vec3 {
+        let opening = if self.emitters(part) <= EXACT_EMITTERS { 0.0 } else { OPENING };
+        let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
+        let mut sum = DVec3::ZERO;
+        let mut open = Vec::with_capacity(64);
+        open.push(part);
+        while let Some(index) = open.pop() {
+            let node = &self.nodes[index as usize];
+            let children = match node.kind {
+                Kind::Leaf(emitter) => {
+                    let emitter = &emitters[emitter as usize];
+                    let factor = point_to_triangle(position, normal, &emitter.corners_f64);
+                    sum += emitter.radiance.as_dvec3() * (std::f64::consts::PI * factor);
+                    continue;
+                }
+                Kind::Inner(children) => children,
+            };
+            let towards = node.center - receiver.position;
+            let height = towards.dot(receiver.normal);
+            if height <= -node.radius {
+                continue;
+            }
+            let distance = towards.length();
+            if node.radius < opening * distance && height > node.radius {
+                let direction = towards / distance;
+                let (faces, may_differ) = (-direction.dot(node.axis), node.spread + node.radius / distance);
+                if faces + may_differ <= 0.0 {
+                    continue;
+                }
+                let per_power = height / (distance * distance * distance);
+                if faces >= may_differ {
+                    let moment = (node.moments.transpose() * -direction).max(Vec3::ZERO);
+                    sum += moment.as_dvec3() * f64::from(per_power);
+                    continue;
+                }
+                let most = node.power * per_power * (faces + may_differ).min(1.0);
+                if f64::from(most) < f64::from(NEGLIGIBLE) * sum.element_sum() {
+                    // The mean of max(0, cosine) over cosines spread evenly.
+                    let mean = match node.spread > faces.abs() {
+                        true => (faces + node.spread).powi(2) / (4.0 * node.spread),
+                        false => faces.max(0.0),
+                    };
+                    sum += (node.light * (per_power * mean)).as_dvec3();
+                    continue;
+                }
+            }
+            // The brighter first: it tells what is negligible.
+            let [a, b] = children.map(|child| {
+                let child = &self.nodes[child as usize];
+                child.power * (child.spread * distance + (receiver.position - child.center).dot(child.axis))
+            });
+            let [near, far] = children;
+            open.extend(if a > b { [far, near] } else { [near, far] });
+        }
+        sum.as_vec3()
     }
 
     /// An emitter of a part at `u` in [0, 1), the place within its interval stretched to [0, 1), and its probability: about in
@@ -170,11 +290,17 @@ impl EmitterTree {
 impl Node {
     fn over(emitters: &[Emitter], some: &[u32], lamps: u32, first: u32) -> Self {
         let of = |&index: &u32| &emitters[index as usize];
-        let mut power = 0.0f64;
+        let (mut power, mut sum) = (0.0f64, DVec3::ZERO);
         let (mut center, mut axis) = (DVec3::ZERO, DVec3::ZERO);
+        let mut moments = [DVec3::ZERO; 3];
         for emitter in some.iter().map(of) {
-            let own = emitter.radiance.as_dvec3().element_sum() * f64::from(emitter.area);
+            let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
+            let own = light.element_sum();
             power += own;
+            sum += light;
+            for (channel, moment) in moments.iter_mut().enumerate() {
+                *moment += light[channel] * emitter.normal.as_dvec3();
+            }
             center += own * emitter.middle().as_dvec3();
             axis += own * emitter.normal.as_dvec3();
         }
@@ -186,7 +312,10 @@ impl Node {
         let spread = some.iter().map(of).map(|e| e.normal.distance(axis)).fold(0.0, f32::max);
         let kind = Kind::Leaf(some.first().copied().unwrap_or(0));
         let emitters = some.len() as u32;
-        Self { center, radius, axis, spread, power: power as f32, lamps, first, emitters, kind }
+        let [red, green, blue] = moments.map(|moment| moment.as_vec3());
+        let moments = Mat3::from_cols(red, green, blue);
+        let (light, power) = (sum.as_vec3(), power as f32);
+        Self { center, radius, axis, spread, light, power, moments, lamps, first, emitters, kind }
     }
 }
 

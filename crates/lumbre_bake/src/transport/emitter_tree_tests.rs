@@ -74,6 +74,51 @@ fn one_term_far_away_is_as_good_as_the_sum() {
 }
 
 #[test]
+fn a_part_holds_the_emitters_of_its_halves() {
+    let (emitters, lamps) = scene();
+    let tree = EmitterTree::new(&emitters, &lamps);
+    let root = tree.root().expect("there are emitters");
+    assert_eq!((tree.lamps(root), tree.emitters(root) as usize), (3, emitters.len()));
+    let mut all = tree.emitters_of(root).to_vec();
+    all.sort_unstable();
+    assert!(all.iter().copied().eq(0..emitters.len() as u32));
+    let (mut open, mut lamps_found) = (vec![root], Vec::new());
+    while let Some(part) = open.pop() {
+        let Some(halves) = tree.children(part) else { continue };
+        let together: Vec<u32> = halves.iter().flat_map(|&half| tree.emitters_of(half)).copied().collect();
+        assert_eq!(tree.emitters_of(part), together);
+        for half in halves {
+            if tree.lamps(half) == 1 && tree.lamps(part) > 1 {
+                let own: Vec<u32> = tree.emitters_of(half).iter().map(|&e| lamps[e as usize]).collect();
+                assert!(own.iter().all(|lamp| *lamp == own[0]), "a lamp is one part");
+                lamps_found.push(own[0]);
+            }
+        }
+        open.extend(halves);
+    }
+    lamps_found.sort_unstable();
+    assert_eq!(lamps_found, [0, 1, 2]);
+    assert!(EmitterTree::new(&[], &[]).root().is_none());
+}
+
+#[test]
+fn no_weight_is_zero_and_near_balls_fill_the_sky() {
+    let (emitters, lamps) = scene();
+    let tree = EmitterTree::new(&emitters, &lamps);
+    for i in 0..200 {
+        let [x, y, z, w] = Sequence::new(5, 0, 0).point(i, 0);
+        let at = receiver(Vec3::new(3.0 * x - 1.5, 2.0 * y - 0.4, 3.0 * z - 1.5), Vec3::Y);
+        for part in 0..emitters.len() as u32 {
+            assert!(tree.weight(part, &at, 0.1 * w) > 0.0);
+            assert!((0.0..=1.0).contains(&tree.sine(part, &at, 0.0)));
+            assert!(tree.sine(part, &at, 0.5) >= tree.sine(part, &at, 0.0));
+        }
+    }
+    assert_eq!(tree.sine(0, &receiver(Vec3::new(0.2, 0.9, 0.0), Vec3::Y), 0.0), 1.0);
+    assert!(tree.sine(0, &receiver(Vec3::new(0.0, -200.0, 0.0), Vec3::Y), 0.0) < 0.02);
+}
+
+#[test]
 fn samples_have_the_light_of_all_as_their_mean() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
@@ -97,18 +142,4 @@ fn samples_have_the_light_of_all_as_their_mean() {
         // Relative deviation of a sample about 1: 5 sigma of 2^14 independent ones is 4 %; these are spread better.
         assert!((found / expected - 1.0).abs().max_element() < 0.02, "{position}: {found} {expected}");
     }
-}
-
-#[test]
-fn lamps_are_parted_where_they_can_be_told_apart() {
-    let (emitters, lamps) = scene();
-    let tree = EmitterTree::new(&emitters, &lamps);
-    let near = tree.groups(&receiver(Vec3::ZERO, Vec3::Y));
-    assert_eq!(near.len(), 3);
-    let total: Vec3 =
-        near.iter().map(|&g| tree.unoccluded(&emitters, g, &receiver(Vec3::ZERO, Vec3::Y))).sum();
-    let whole = tree.unoccluded(&emitters, 0, &receiver(Vec3::ZERO, Vec3::Y));
-    assert!((total - whole).abs().max_element() < 0.005 * whole.max_element());
-    assert_eq!(tree.groups(&receiver(Vec3::new(0.0, -200.0, 0.0), Vec3::Y)).len(), 1);
-    assert!(EmitterTree::new(&[], &[]).groups(&receiver(Vec3::ZERO, Vec3::Y)).is_empty());
 }

@@ -12,6 +12,8 @@ use super::direct::{Receiver, Sources};
 pub(crate) struct LightCut {
     /// Parts of the emissive surfaces that have samples of their own: lamps.
     pub lamps: Vec<u32>,
+    /// Whether those are all lamps that there are.
+    pub all_apart: bool,
     /// Lights that have, by number, ascending.
     pub lights: Vec<u32>,
     /// The others.
@@ -86,14 +88,17 @@ impl LightCut {
     }
 }
 
-/// Up to so many lamps, none of many emitters, and up to so many lights all have samples of their own: what is exact for them is quicker than
-/// many samples.
-const FEW_LAMPS: u32 = 4;
+/// Up to so many lamps, of so many emitters together, and up to so many lights all have samples of their own: what is exact for them, or the
+/// exact sum over them times the share that is seen, is less noisy than samples.
+const FEW_LAMPS: u32 = 8;
+const MOST_EMITTERS: u32 = 20_000;
 pub(super) const FEW_LIGHTS: usize = 16;
-/// Most emitters of a lamp that has samples of its own: of more, a sample's own is quicker than the sum of all.
+/// Most emitters of one of many lamps that has samples of its own.
 pub(super) const FEW_EMITTERS: u32 = 24;
-/// Lamps whose common ball has at most this sine cast one shadow.
-const NARROW: f32 = 0.02;
+/// Where more than this share of what a receiver sees shines, all lamps have samples of their own, too, in so many groups: the sum over them is
+/// exact, and little of it is hidden, while samples of what is near and large are noisy.
+const ENCLOSED: f32 = 0.25;
+const MOST_GROUPS: usize = 16;
 /// Of all that may arrive, what a source must bring to have samples of its own, and the most that have where sources are many.
 const OWN_SHARE: f32 = 0.12;
 const MOST_OWN: usize = 3;
@@ -134,12 +139,7 @@ impl Sources<'_> {
         let mut cut = LightCut { lights: self.lights_apart.clone(), ..LightCut::default() };
         let mut roots = Vec::new();
         match self.few_lamps(receiver) {
-            Some(lamps) => {
-                let (together, apart) = lamps.into_iter().partition(|lamp| shared.contains(lamp));
-                cut.lamps = apart;
-                let together: Vec<u32> = together;
-                roots.extend(together.into_iter().map(Branch::Emitters));
-            }
+            Some(lamps) => (cut.lamps, cut.all_apart) = (lamps, true),
             None => roots.extend(self.emitter_tree.root().map(Branch::Emitters)),
         }
         roots.extend(self.light_tree.root().map(Branch::Lights));
@@ -194,22 +194,15 @@ impl Sources<'_> {
         cut
     }
 
-    /// All lamps, where they are few of few emitters; those that are seen as one together.
+    /// All lamps, where they are few, or most of what a receiver sees.
     fn few_lamps(&self, receiver: &Receiver) -> Option<Vec<u32>> {
         let tree = &self.emitter_tree;
         let Some(root) = tree.root() else { return Some(Vec::new()) };
-        if tree.lamps(root) > FEW_LAMPS || tree.emitters(root) > FEW_LAMPS * FEW_EMITTERS {
+        let few = tree.lamps(root) <= FEW_LAMPS || tree.form_factor(receiver) > ENCLOSED;
+        if !few || tree.emitters(root) > MOST_EMITTERS {
             return None;
         }
-        let (mut found, mut open) = (Vec::new(), vec![root]);
-        while let Some(part) = open.pop() {
-            let one = tree.lamps(part) == 1 || tree.sine(part, receiver, 0.0) <= NARROW;
-            match tree.children(part).filter(|_| !one) {
-                Some(halves) => open.extend(halves),
-                None if tree.emitters(part) > FEW_EMITTERS => return None,
-                None => found.push(part),
-            }
-        }
+        let mut found = tree.groups(receiver, MOST_GROUPS);
         found.sort_unstable();
         Some(found)
     }

@@ -1,0 +1,104 @@
+//! Many sources that share samples: hundreds of glowing squares, and hundreds of point lights, against the sums of closed forms over all of
+//! them; and that the stated error covers the choice of sources. What it takes is a benchmark's: the example `many_lamps`.
+
+#![allow(clippy::print_stdout, reason = "the figures are what one wants to see of it")]
+
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_bake::{BakeOptions, BakeReport, Density, bake};
+use lumbre_mesh::TriangleMesh;
+use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_scene::{Mesh, StaticObject, Transform};
+
+mod common;
+
+/// A matt or glowing horizontal square of a side about a place, looking up or down.
+fn spawn_square(world: &mut World, middle: Vec3, side: f32, up: bool, radiance: f32) {
+    let h = 0.5 * side;
+    let mesh = TriangleMesh {
+        positions: [[-h, -h], [-h, h], [h, h], [h, -h]].map(|[x, z]| middle + Vec3::new(x, 0.0, z)).to_vec(),
+        indices: if up { vec![0, 1, 2, 0, 2, 3] } else { vec![0, 2, 1, 0, 3, 2] },
+        ..TriangleMesh::default()
+    };
+    let front = Surface { diffuse: Vec3::ZERO, emission: Vec3::splat(radiance), ..Surface::default() };
+    world.spawn((Mesh(Arc::new(mesh)), Material { front, ..Material::default() }, StaticObject));
+}
+
+/// Form factor from an element below to a square in a parallel plane at a height, by its four corners; the element lies under the point
+/// (x, z) measured from the square's middle.
+fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
+    let corner = |a: f64, b: f64| {
+        let (a, b) = (a / height, b / height);
+        let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * PI)
+    };
+    let h = 0.5 * side;
+    corner(h - x, h - z) + corner(h + x, h - z) + corner(h - x, h + z) + corner(h + x, h + z)
+}
+
+/// Where source `i` hangs, over a floor of 4 x 4 metres, and how bright it is: sixteen to one between the brightest and the faintest.
+fn source(i: u32) -> (DVec3, f64) {
+    let (row, column) = (f64::from(i / 20), f64::from(i % 20));
+    // All as high, so that none hides another.
+    let place = DVec3::new(0.2 * column - 1.9, 0.4, 0.2 * row - 1.9);
+    (place, 2.0f64.powi((i * 13 % 5) as i32))
+}
+
+/// Sources of all kinds of this test.
+const COUNT: u32 = 400;
+
+fn judge(name: &str, world: &mut World, value: impl Fn(DVec3) -> f64) -> BakeReport {
+    spawn_square(world, Vec3::ZERO, 4.0, true, 0.0);
+    let options = BakeOptions { density: Density::MapSize(96), error: 0.01, ..BakeOptions::default() };
+    let report = bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    let point = |i: i32| {
+        let place = |at: i32| 0.27 * f64::from(at - 6) + 0.011;
+        let position = DVec3::new(place(i % 13), 0.0, place(i / 13));
+        common::ReferencePoint { position, normal: DVec3::Y, irradiance: DVec3::splat(value(position)) }
+    };
+    let found = common::compare(world, &(0..169).map(point).collect::<Vec<_>>());
+    println!("{name}: {found}; stated {:.2} %, {} rays", 100.0 * report.estimated_error, report.rays);
+    assert_eq!(found.missed, 0);
+    // One per cent is asked for and stated; points lie between texels of 4 cm, a tenth of the height.
+    assert!(found.rmse < 0.02 && found.bias.abs() < 0.004, "{name}: {found}");
+    assert!(
+        found.rmse < 2.0 * report.estimated_error.max(0.005),
+        "{name}: the stated error is honest: {found}"
+    );
+    report
+}
+
+#[test]
+fn hundreds_of_glowing_squares() {
+    const SIDE: f32 = 0.06;
+    let mut world = World::new();
+    for (place, bright) in (0..COUNT).map(source) {
+        spawn_square(&mut world, place.as_vec3(), SIDE, false, bright as f32);
+    }
+    let report = judge("squares", &mut world, |p| {
+        let of = |(place, bright): (DVec3, f64)| {
+            bright * PI * to_square(p.x - place.x, p.z - place.z, f64::from(SIDE), place.y)
+        };
+        (0..COUNT).map(source).map(of).sum()
+    });
+    // Far fewer than one to each source from each texel; the squares, which nothing lights, have texels too.
+    assert!(report.texels as u64 * u64::from(COUNT) > 100 * report.rays, "{}", report.rays);
+}
+
+#[test]
+fn hundreds_of_point_lights() {
+    let mut world = World::new();
+    for (place, bright) in (0..COUNT).map(source) {
+        let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(1e-3 * bright as f32)) };
+        world.spawn((light, Transform::from_translation(place)));
+    }
+    let report = judge("point lights", &mut world, |p| {
+        let of = |(place, bright): (DVec3, f64)| PI * 1e-3 * bright * place.y / (place - p).length().powi(3);
+        (0..COUNT).map(source).map(of).sum()
+    });
+    assert!(report.rays < 96 * 96 * u64::from(COUNT) / 2, "{}", report.rays);
+}
