@@ -193,7 +193,9 @@ fn run(
         .iter()
         .map(|straddling| texels[straddling.texel as usize].index as usize)
         .collect();
-    let (hidden, rays) = watch.during(0.0, || remove_hidden(&scene, &layout, &mut texels, &touched))?;
+    let (hidden, rays) = watch.during(0.0, || {
+        remove_hidden(&scene, &layout, &mut texels, crossed.iter().map(|(place, _)| *place), &touched)
+    })?;
     (report.hidden_texels, report.rays) = (hidden, rays);
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
@@ -250,7 +252,7 @@ fn run(
             };
             let leaked_before = scene.leaks.count();
             if let Some(change) = &change {
-                kept = Some(change.keep(exchange, &texels, options, &mut watch)?);
+                kept = Some(change.keep(exchange, &texels, &local, options, &mut watch)?);
             }
             let receivers = Receivers {
                 texels: &texels,

@@ -28,13 +28,14 @@ pub(crate) struct Plan {
 const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4) as u64;
 
 /// Of a texel that shows a surface: what it has gathered before and after a round, raw and smoothed estimates with their guides, and
-/// eight lists of one number each for the errors.
+/// eight lists of one number each for the errors; the light around it, and its block. (What it has of shared samples is less, and gone by then.)
 const COVERED: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<Gathered>()
     + 2 * size_of::<Estimates>()
     + 24
-    + 8 * 4) as u64;
+    + 8 * 4
+    + 3 * 4) as u64;
 
 /// Of a texel of a map: its light, direct and filled, the fill's two lists with their errors, and its error; or, before that and more, the numbers
 /// that smoothing keeps in rows: estimates with their bias, those of the weighted fit, guides with the noise, products and nearness. Its place

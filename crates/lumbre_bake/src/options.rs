@@ -122,8 +122,8 @@ pub(crate) struct Effort {
     pub shared: [u32; 2],
     /// Gather rays of a texel: first round and most.
     pub gather: [u32; 2],
-    /// Most gather rays of a texel, and most samples of the sources that share them, on average: whatever error is asked for, this is the most
-    /// that a bake takes.
+    /// Most gather rays of a texel, and most samples of the sources that share them, on average, where that is more than [`FEW_RAYS`]: whatever
+    /// error is asked for, this is the most that a bake takes.
     pub mean: u32,
 }
 
@@ -149,7 +149,7 @@ impl Quality {
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
                 shared: [16, 1024],
-                gather: [16, 1024],
+                gather: [16, 8192],
                 mean: 64,
             },
             Self::Reference => Effort {
@@ -164,6 +164,16 @@ impl Quality {
         }
     }
 }
+
+impl Effort {
+    /// Most samples of so many texels together.
+    pub fn budget(&self, texels: u64) -> u64 {
+        (texels * u64::from(self.mean)).max(FEW_RAYS)
+    }
+}
+
+/// Rays that any bake may take: seconds, however few its texels are.
+const FEW_RAYS: u64 = 32_000_000;
 
 impl BakeOptions {
     /// The quality's effort, less where a larger error is asked for: what is cast before anything is known must not cost more than what was

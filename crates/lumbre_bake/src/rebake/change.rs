@@ -20,6 +20,7 @@ use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texels::blocks::Blocks;
 use crate::texels::chunks::in_chunks;
 use crate::texels::footprint::{Texel, receiver};
+use crate::texels::local_light::LocalLight;
 use crate::transport::direct::{Direct, Receiver, Sources};
 use crate::transport::exchange::Exchange;
 use crate::transport::form_factors::FormFactors;
@@ -46,8 +47,6 @@ pub(crate) struct Change<'a> {
     blocks: Blocks,
     /// Per texel of all maps, by how much direct light (mixed lights included) has changed, W/m².
     direct: Vec<Vec3>,
-    /// Mean of the direct light that is baked now, and of the channels.
-    mean_direct: f64,
     /// Irradiance of an unhidden sky now, W/m².
     sky: Vec3,
     /// The changed boxes as spheres: centre, radius.
@@ -67,10 +66,6 @@ struct PatchLight<'a> {
     unknown: &'a [bool],
 }
 
-fn grey(light: Vec3) -> f32 {
-    light.element_sum() / 3.0
-}
-
 impl<'a> Change<'a> {
     /// From the direct light of every covered texel as it is now.
     pub fn new(
@@ -87,16 +82,12 @@ impl<'a> Change<'a> {
                 change[texel.index as usize] = now.total() - known.direct.total();
             }
         }
-        let open = texels.iter().zip(direct).filter(|(texel, _)| !texel.is_hidden());
-        let (sum, count) =
-            open.fold((0.0, 0u32), |(sum, count), (_, own)| (sum + f64::from(grey(own.baked)), count + 1));
         Self {
             scene: sources.scene,
             layout,
             changes,
             blocks: Blocks::new(texels, charts, BLOCK),
             direct: change,
-            mean_direct: sum / f64::from(count.max(1)),
             sky: sources.sky,
             cones: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
             ways: Ways::new(sources, &changes.boxes),
@@ -192,6 +183,7 @@ impl<'a> Change<'a> {
         &self,
         exchange: &Exchange,
         texels: &[Texel],
+        local: &LocalLight,
         options: &BakeOptions,
         watch: &mut Watch<'_>,
     ) -> Result<Kept, BakeError> {
@@ -202,14 +194,7 @@ impl<'a> Change<'a> {
         let unknown = self.unknown_backs(patches);
         let light = PatchLight { patches, exitance, change, unknown: &unknown };
         let change = self.of_texels(texels, light, options, watch)?;
-        // The error asked for is relative to the light that there is: as it was or as it is, whichever is less.
-        let lit = self.changes.known.iter().flatten();
-        let (sum, count) = lit.fold((0.0, 0u32), |(sum, count), own| {
-            (sum + f64::from(grey(own.direct.baked + own.bounced)), count + 1)
-        });
-        let before = sum / f64::from(count.max(1));
-        let asked = options.error * before.min(self.mean_direct + exchange.mean_indirect());
-        Ok(Kept::choose(self.changes, texels, &change, asked))
+        Ok(Kept::choose(self.changes, texels, &change, local, options.error))
     }
 
     /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the channels: that of its block.

@@ -5,6 +5,7 @@ use super::changes::Changes;
 use super::samples::TexelSamples;
 use crate::texels::footprint::Texel;
 use crate::texels::gather::Gathered;
+use crate::texels::local_light::LocalLight;
 
 /// Of the error asked for, what all that is neglected may be together (RMSE), and at most in one texel. What is neglected is systematic, while the rest of
 /// the error is chance: it gets the lesser part.
@@ -20,14 +21,20 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
-    /// By the change of each covered texel (W/m², mean of the channels) and the RMSE asked for (W/m²).
-    pub fn choose(changes: &Changes<'_>, texels: &[Texel], change: &[f32], asked: f64) -> Self {
+    /// By the change of each covered texel (W/m², mean of the channels), the light around it, and the RMSE asked for, relative to that.
+    pub fn choose(
+        changes: &Changes<'_>,
+        texels: &[Texel],
+        change: &[f32],
+        local: &LocalLight,
+        asked: f64,
+    ) -> Self {
         let open = texels.iter().filter(|texel| !texel.is_hidden()).count();
         // With what was neglected before.
         let all = |index: usize| -> Option<f64> {
             let known = changes.known[index].filter(|known| known.gathered.samples > 0)?;
             let all = f64::from(known.neglected + change[index]);
-            (all <= MOST * asked).then_some(all)
+            (all <= MOST * asked * local.at(index)).then_some(all / local.at(index))
         };
         let mut candidates: Vec<(f64, usize)> =
             (0..texels.len()).filter_map(|index| Some((all(index)?, index))).collect();
@@ -43,7 +50,7 @@ impl Kept {
             }
             if let Some(known) = changes.known[index] {
                 kept.gathered[index] = known.gathered;
-                kept.neglected[index] = neglected as f32;
+                kept.neglected[index] = (neglected * local.at(index)) as f32;
             }
         }
         kept

@@ -2,6 +2,7 @@
 //! meet something at once. The hidden part is taken out of the footprint, so that a texel half under a box has the light of its open half.
 //! What a texel shows belongs to the map and not to the light: it is the same for every seed.
 
+use glam::Vec2;
 use rayon::prelude::*;
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
@@ -24,18 +25,21 @@ const JUDGES: u32 = 8;
 /// So many of those that judge have to see something: where faces touch, one may slip out along them.
 const CLEAR: u32 = 2;
 
-/// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. `touched` are the
-/// places, in the row of all maps, of texels that something stands on.
+/// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. Contact lines cross the
+/// texels that are `crossed`, and divide those that are `touched`: places in the row of all maps.
 pub(crate) fn remove_hidden(
     scene: &BakeScene,
     layout: &LightmapLayout,
     texels: &mut [Texel],
+    crossed: impl Iterator<Item = usize>,
     touched: &[usize],
 ) -> (usize, u64) {
     let (odd, mut rays) = odd(scene, texels);
     // Six rays may miss a corner of a texel; its neighbours' rays did not.
     let mut near = vec![false; layout.texels];
     touched.iter().for_each(|&index| near[index] = true);
+    let mut mixed = vec![false; layout.texels];
+    crossed.for_each(|index| mixed[index] = true);
     for (texel, _) in texels.iter().zip(&odd).filter(|(_, odd)| **odd) {
         let map = &layout.maps[texel.object as usize];
         for y in texel.y.saturating_sub(1)..=(texel.y + 1).min(map.height - 1) {
@@ -47,7 +51,7 @@ pub(crate) fn remove_hidden(
     let (hidden, judged) = texels
         .par_iter_mut()
         .filter(|texel| near[texel.index as usize] && !scene.stop.is_set())
-        .map(|texel| judge(scene, texel))
+        .map(|texel| judge(scene, texel, mixed[texel.index as usize]))
         .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     rays += judged;
     (hidden, rays)
@@ -129,8 +133,9 @@ fn looks_odd(scene: &BakeScene, texel: &Texel) -> bool {
     })
 }
 
-/// Keeps the points of a texel that are in the open. Returns 1 if some are not, and the rays cast.
-fn judge(scene: &BakeScene, texel: &mut Texel) -> (usize, u64) {
+/// Keeps the points of a texel that are in the open. Returns 1 if some are not, and the rays cast. Between contact lines a surface is hidden or
+/// is not: in a texel that is not `mixed`, having none, the corners and the middle tell for all, if they agree.
+fn judge(scene: &BakeScene, texel: &mut Texel, mixed: bool) -> (usize, u64) {
     let mut triangles: Vec<u32> = match &texel.footprint {
         Footprint::Whole(triangle) => vec![*triangle],
         Footprint::Points(points) => points.iter().map(|point| point.triangle).collect(),
@@ -145,11 +150,17 @@ fn judge(scene: &BakeScene, texel: &mut Texel) -> (usize, u64) {
     let sequence = Sequence::new(SEED, 3, texel.index);
     let pressed = pressed(scene, texel);
     let mut rays = 0;
+    let mut is_open = |index: usize| {
+        let (is_open, cast) = in_the_open(scene, &points[index], sequence, index as u32, pressed);
+        rays += u64::from(cast);
+        is_open
+    };
+    let telling = if mixed { Vec::new() } else { corners_and_middle(&points) };
+    let told: Vec<bool> = telling.into_iter().map(&mut is_open).collect();
+    let agreed = told.first().copied().filter(|first| told.iter().all(|told| told == first));
     let mut open: Vec<FootprintPoint> = Vec::new();
     for (index, point) in points.iter().enumerate() {
-        let (is_open, cast) = in_the_open(scene, point, sequence, index as u32, pressed);
-        rays += u64::from(cast);
-        if is_open {
+        if agreed.unwrap_or_else(|| is_open(index)) {
             open.push(*point);
         }
     }
@@ -161,6 +172,16 @@ fn judge(scene: &BakeScene, texel: &mut Texel) -> (usize, u64) {
         texel.footprint = Footprint::Points(open);
     }
     (usize::from(reduced), rays)
+}
+
+/// The points of a footprint that are nearest to its square's corners and middle, by index.
+fn corners_and_middle(points: &[FootprintPoint]) -> Vec<usize> {
+    let places = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE, Vec2::splat(0.5)];
+    let nearest = |place: Vec2| {
+        let distance = |index: &usize| points[*index].offset.distance_squared(place);
+        (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    };
+    places.into_iter().filter_map(nearest).collect()
 }
 
 /// Half the rays see the inside of something closed, or all see backs or end at once, or all but one where some end at once: the point is

@@ -68,7 +68,8 @@ fn is_even(scene: &BakeScene, placed: &PlacedLight, area: &Area, texel_side: f32
 /// Whether a light ends before it reaches an area.
 fn is_out_of_range(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> bool {
     let range = f64::from(placed.light.attenuation.range) * scene.space.scale;
-    if placed.light.kind == LightKind::Directional || !(range > 0.0) {
+    // What is no range is none.
+    if placed.light.kind == LightKind::Directional || range <= 0.0 || range.is_nan() {
         return false;
     }
     let (middle, reach) =

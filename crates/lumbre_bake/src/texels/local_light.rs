@@ -1,8 +1,8 @@
 //! The light around each texel: what an eye in that room adapts to, so that an error is told as that eye sees it and not beside the noon
-//! outside. A third of it is the light of the texel's own block, the rest that of what can be seen from there in two steps (from a wall its
-//! room, and what lies beyond the door a little); of all the square of the mean square root, between the arithmetic mean, which one bright
-//! window outshines, and the logarithmic one, which one closed cupboard pulls to nothing. Not an exact solution: a few walks through the
-//! scene, which read direct light where they hit. No eye fits into a gap of a few texels: what is nearer is not in view.
+//! outside: the light of what can be seen from there in two steps (from a wall its room, and what lies beyond the door a little), of which it is
+//! the square of the mean square root, between the arithmetic mean, which one bright window outshines, and the logarithmic one, which one closed
+//! cupboard pulls to nothing. What is brighter itself, as the sun on the floor, counts as a third of it. Not an exact solution: a few walks
+//! through the scene, which read direct light where they hit. No eye fits into a gap of a few texels: what is nearer is not in view.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -25,8 +25,8 @@ const BOUNCES: u32 = 6;
 /// Things in view that a walk looks at, none of them nearer to the one before than so many texels.
 const VIEW: usize = 2;
 const NEAREST: f32 = 8.0;
-/// Least local light, in shares of the whole level's mean: five stops, about as far as an automatic exposure follows.
-const FLOOR: f64 = 1.0 / 32.0;
+/// Least local light, in shares of the whole level's mean: four stops, about as far as an automatic exposure follows.
+const FLOOR: f64 = 1.0 / 16.0;
 /// Sequences of the walks.
 const PURPOSE: u32 = 80;
 
@@ -112,7 +112,8 @@ impl LocalLight {
         let of_blocks: Vec<f32> = (0..own.len())
             .into_par_iter()
             .map(|block| {
-                let root = (own[block].sqrt() + VIEW as f64 * view(block)) / (1 + VIEW) as f64;
+                let seen = view(block);
+                let root = seen.max((own[block].sqrt() + VIEW as f64 * seen) / (1 + VIEW) as f64);
                 (root * root).max(FLOOR * mean).max(f64::from(f32::MIN_POSITIVE)) as f32
             })
             .collect();
@@ -121,6 +122,11 @@ impl LocalLight {
 }
 
 impl LocalLight {
+    /// Of a covered texel, W/m²; positive.
+    pub fn at(&self, place: usize) -> f64 {
+        f64::from(self.of[place])
+    }
+
     /// Squared, what numbers of irradiance are of the light around their texels.
     pub fn relative(&self, squares: &[f32]) -> Vec<f32> {
         squares.par_iter().zip(&self.of).map(|(square, light)| square / light / light).collect()

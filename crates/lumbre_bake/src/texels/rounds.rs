@@ -23,11 +23,13 @@ const WORTH_RAYS: f64 = 0.1;
 /// A round's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.7;
 /// Of the squared error asked for, what a round aims at.
-const AIM: f64 = 0.85;
+const AIM: f64 = 0.92;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
 /// The most by which a round lowers the part that rays leave: the first estimates are rough.
 const MOST_OF_A_ROUND: f64 = 8.0;
+/// Share of the samples so far below which a round is not worth its smoothing.
+const LEAST_ROUND: f64 = 0.15;
 /// A round that leaves more than this of the squared error that it was to lower was the last.
 const STALLED: f64 = 0.95;
 
@@ -143,10 +145,13 @@ pub(crate) fn gather(
         let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-        let budget = (open as u64 * u64::from(effort.mean / SCRAMBLES as u32)).saturating_sub(cast);
+        let budget = (effort.budget(open as u64) / SCRAMBLES as u64).saturating_sub(cast);
+        // What little is left of it is not worth another smoothing.
+        let spent = (budget as f64) < LEAST_ROUND * cast as f64;
         wanted = allot_within(budget, open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
-        report.ended = Ended::after(report.error_reached, late || watch.is_late(), wanted.is_empty());
-        if report.error_reached || late || helpless || wanted.is_empty() {
+        report.ended =
+            Ended::after(report.error_reached, late || watch.is_late(), spent || wanted.is_empty());
+        if report.error_reached || late || helpless || spent || wanted.is_empty() {
             break (corrected(&estimates, &patch_bias), variances);
         }
     };

@@ -171,8 +171,8 @@ impl<'a> SharedLight<'a> {
             before = left;
             let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let mean = u64::from(self.options.effort().mean / SCRAMBLES as u32);
-            let budget = (places.clone().count() as u64 * mean).saturating_sub(taken);
+            let budget = self.options.effort().budget(places.clone().count() as u64) / SCRAMBLES as u64;
+            let budget = budget.saturating_sub(taken);
             let goal = goal.max(left / MOST_OF_A_ROUND);
             let wanted: Vec<Allotment> =
                 allot_within(budget, places, &relative, &samples, self.most, ORDER, goal);

@@ -156,15 +156,6 @@ impl Exchange {
         ranges.into_iter().map(of_nothing).collect()
     }
 
-    /// Irradiance by bounces and by the sky, mean over the patches' area and of the channels.
-    pub fn mean_indirect(&self) -> f64 {
-        let sum = |(sum, area): (f64, f64), (patch, light): (&Patch, &Vec3)| {
-            (sum + f64::from(patch.area * light.element_sum() / 3.0), area + f64::from(patch.area))
-        };
-        let (sum, area) = self.patches.list.iter().zip(&self.indirect).fold((0.0, 0.0), sum);
-        if area > 0.0 { sum / area } else { 0.0 }
-    }
-
     /// Of surfaces that reflect nothing.
     fn black(scene: &BakeScene, patches: Patches, side: f32) -> Self {
         let none = vec![Vec3::ZERO; patches.list.len()];

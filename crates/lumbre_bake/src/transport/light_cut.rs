@@ -97,7 +97,7 @@ pub(super) const FEW_LIGHTS: usize = 16;
 pub(super) const FEW_EMITTERS: u32 = 24;
 /// Where more than this share of what a receiver sees shines, all lamps have samples of their own, too, in so many groups: the sum over them is
 /// exact, and little of it is hidden, while samples of what is near and large are noisy.
-const ENCLOSED: f32 = 0.25;
+const ENCLOSED: f32 = 0.5;
 const MOST_GROUPS: usize = 16;
 /// Of all that may arrive, what a source must bring to have samples of its own, and the most that have where sources are many.
 const OWN_SHARE: f32 = 0.12;
