@@ -256,6 +256,9 @@ fn summary(report: &BakeReport) -> String {
         report.seconds,
         report.threads,
     );
+    for place in &report.worst {
+        text.push_str(&format!("  {place}\n"));
+    }
     if let Some(rebake) = &report.rebake {
         text.push_str(&format!("{rebake}\n"));
     }

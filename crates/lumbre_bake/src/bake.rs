@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::checkpoint::Tape;
 use crate::content_hash::hashes_of;
 use crate::memory::{self, Plan};
-use crate::notes::{finish, name_what_is_missing, note_direct_error, note_mean, note_whole};
+use crate::notes::{finish, name_what_is_missing, note_direct_error, note_mean, note_whole, note_worst};
 use crate::pages::Pages;
 use crate::probes::Wanted;
 use crate::progress::Watch;
@@ -289,6 +289,9 @@ fn run(
         report.ended = Ended::after(report.error_reached, watch.is_late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
+    watch.during(0.0, || {
+        note_worst(&scene, &objects, &texels, &local.relative(variances), &mut report);
+    })?;
     let samples = match former {
         Former::Forget => None,
         // Whoever has more time would not want to keep these.

@@ -64,7 +64,7 @@ pub use error::BakeError;
 pub use options::{BakeOptions, Density, Probes, Quality};
 pub use progress::Progress;
 pub use rebake::{RebakeReport, Samples, SamplesError};
-pub use report::{BakeReport, Ended, ErrorAtTime, ProbeReport, ResolutionReport, StageTime};
+pub use report::{BakeReport, Ended, ErrorAtTime, ProbeReport, ResolutionReport, StageTime, WorstPlace};
 pub use texels::seams::SeamReport;
 pub use transport::form_factors::FormFactorMethod;
 pub use transport::method_study::{FormFactorErrors, form_factor_errors};

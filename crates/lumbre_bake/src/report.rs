@@ -46,6 +46,27 @@ pub struct ResolutionReport {
     pub standard_error: f64,
 }
 
+/// A part of the level where the estimated error is larger than that of the whole.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WorstPlace {
+    /// The middle of its texels, metres, in the world.
+    pub center: [f64; 3],
+    /// Estimated RMSE of its texels, relative to the light around them.
+    pub error: f64,
+    /// Its share of all texels that show a surface, in (0, 1].
+    pub texels: f64,
+    /// The objects, at most two, to which most of that error belongs.
+    pub objects: Vec<String>,
+}
+
+impl std::fmt::Display for WorstPlace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y, z] = self.center;
+        let objects = self.objects.join(", ");
+        write!(f, "{:.2} % around ({x:.1}, {y:.1}, {z:.1}): {objects}", 100.0 * self.error)
+    }
+}
+
 /// Why a bake took no more samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ended {
@@ -137,6 +158,9 @@ pub struct BakeReport {
     pub estimated_error: f64,
     /// The same errors relative to the mean irradiance of the whole level.
     pub error_of_mean: f64,
+    /// Where it is largest: at most three places about the size of a room (an eighth of the level's longest side), each with a hundredth of all
+    /// texels or more; the worst first. Empty where no place is worse than the whole.
+    pub worst: Vec<WorstPlace>,
     /// That error against time: after each round of the final gather (or after direct light, where nothing bounces), and at the end. Empty
     /// where there was nothing to bake.
     pub curve: Vec<ErrorAtTime>,
@@ -183,6 +207,9 @@ impl std::fmt::Display for BakeReport {
             100.0 * self.error_of_mean,
             self.ended
         )?;
+        for place in &self.worst {
+            writeln!(f, "  {place}")?;
+        }
         if self.resolution.points > 0 {
             let ResolutionReport { points, error, standard_error } = self.resolution;
             writeln!(
