@@ -79,6 +79,8 @@ pub(crate) fn gather(
         .filter(|&index| gathered[index as usize].samples == 0)
         .map(|index| Allotment { index, samples: first })
         .collect();
+    // With everything kept there is nothing that the former bake did not know when it ended.
+    let settled = kept.is_some() && wanted.is_empty();
     let mut helped_before = f64::INFINITY;
     let mut round = 0;
     let (light, variances) = loop {
@@ -151,7 +153,7 @@ pub(crate) fn gather(
         wanted = allot_within(budget, open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
         report.ended =
             Ended::after(report.error_reached, late || watch.is_late(), spent || wanted.is_empty());
-        if report.error_reached || late || helpless || spent || wanted.is_empty() {
+        if report.error_reached || late || helpless || spent || settled || wanted.is_empty() {
             break (corrected(&estimates, &patch_bias), variances);
         }
     };
