@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::super::random::Random;
 use super::PathTracer;
+use super::hierarchy::Hit;
 use super::pieces::{Piece, cut, place_of, sides_of};
 
 pub struct Bounced {
@@ -27,6 +28,8 @@ const OUTSIDE: f64 = 1.0;
 const RAYS: usize = 12;
 const FIRST_ROUNDS: usize = 10;
 const ROUNDS: usize = 50;
+/// What is nearer than so many offsets of a ray covers a place: about a hundredth of a millimetre.
+const COVERED: f64 = 1e3;
 
 /// A mean that grows.
 #[derive(Clone, Copy, Default)]
@@ -96,7 +99,7 @@ impl Bounced {
         bounced.iter().map(Mean::value).collect()
     }
 
-    /// What one ray sees, as irradiance; nothing from inside of what covers the piece.
+    /// What one ray sees, as irradiance; nothing from where something covers the piece.
     fn gathered(
         &self,
         tracer: &PathTracer,
@@ -107,6 +110,15 @@ impl Bounced {
         let triangle = &tracer.scene.triangles[piece.triangle];
         let place = triangle.at(piece.shares([random.uniform(), random.uniform()]));
         let origin = place + triangle.normal * tracer.offset;
+        // Between a lamp and what it lies against light goes to and fro that nobody sees.
+        let above = tracer.scene.closest(origin, triangle.normal);
+        let covers = |hit: &Hit| {
+            hit.distance < COVERED * tracer.offset
+                || tracer.scene.triangles[hit.triangle].normal.dot(triangle.normal) >= 0.0
+        };
+        if above.as_ref().is_some_and(covers) {
+            return None;
+        }
         let chosen = tracer.directions.choose(origin, triangle.normal, random.uniform(), random.uniform());
         let Some((direction, weight)) = chosen else { return Some(DVec3::ZERO) };
         let Some(hit) = tracer.scene.closest(origin, direction) else {
@@ -114,7 +126,7 @@ impl Bounced {
         };
         let met = &tracer.scene.triangles[hit.triangle];
         if met.normal.dot(direction) >= 0.0 {
-            return None;
+            return Some(DVec3::ZERO);
         }
         let target = origin + direction * hit.distance;
         // Where it ends, not over the whole piece there: part of that may be hidden behind a lamp.
