@@ -196,3 +196,16 @@ fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
         }
     }
 }
+
+#[test]
+fn light_between_a_lamp_and_the_ceiling_that_it_lies_against_is_seen_by_nobody() {
+    let (build, layout) = scenes::find("cellar_0").expect("a level of the tests");
+    let mut world = build(layout, 1.0);
+    let place = [(DVec3::new(-1.242, 0.0, 2.731), DVec3::Y)];
+    let plain = PathTracer::new(&mut world).at(&place, Effort::fixed(36, 24), 5)[0];
+    let short = PathTracer::new(&mut world).with_bounced(7).at(&place, Effort::fixed(36, 24), 5)[0];
+    let apart = (plain.value - short.value).abs();
+    let allowed = 4.0 * (plain.error + short.error);
+    // With that light it was 16 % more.
+    assert!(apart.cmple(allowed).all() && apart.max_element() < 0.05 * plain.value.max_element(), "{apart}");
+}
