@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::checkpoint::Tape;
 use crate::content_hash::hashes_of;
 use crate::memory::{self, Plan};
-use crate::notes::{finish, name_what_is_missing, note_direct_error, note_mean, note_whole, note_worst};
+use crate::notes::{finish, name_what_is_missing, note_direct_error, note_mean, note_whole};
 use crate::pages::Pages;
 use crate::probes::Wanted;
 use crate::progress::Watch;
@@ -27,6 +27,7 @@ use crate::texels::resolution_error::{DensePoint, Light, compare};
 use crate::texels::rounds::{Bounced, Receivers};
 use crate::texels::seams::{Maps, close_seams};
 use crate::texels::straddling::{crossed, straddling};
+use crate::texels::worst_places::worst_places;
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::Sources;
 use crate::transport::emitters::coarse_textures;
@@ -289,9 +290,8 @@ fn run(
         report.ended = Ended::after(report.error_reached, watch.is_late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
-    watch.during(0.0, || {
-        note_worst(&scene, &objects, &texels, &local.relative(variances), &mut report);
-    })?;
+    let (squares, whole) = (local.relative(variances), report.estimated_error);
+    report.worst = watch.during(0.0, || worst_places(&scene, &objects, &texels, &squares, whole))?;
     let samples = match former {
         Former::Forget => None,
         // Whoever has more time would not want to keep these.
@@ -312,6 +312,7 @@ fn run(
             Some(watch.during(0.0, || found.samples(identity, &hashes, &objects, &sources, &exitance))?)
         }
     };
+    watch.advance(0.2)?;
     let known = (values.as_slice(), variances.as_slice());
     let (mut filled, errors) =
         watch.during(0.2, || fill(&layout, &texels, &charts, known, options.gap, &scene.stop))?;
@@ -321,6 +322,7 @@ fn run(
     let maps =
         Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
     note_seams(&maps, &mut filled, options, &mut watch, &mut report)?;
+    watch.advance(0.9)?;
     report.resolution = watch.during(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
     let pages = watch.during(1.0, || Pages::new(&layout, options.atlas_size, options.gap))?;
     watch.advance(1.0)?;

@@ -57,18 +57,6 @@ fn points(middle: f64, value: impl Fn(DVec3) -> f64) -> Vec<common::ReferencePoi
     (0..169).map(point).collect()
 }
 
-/// Form factor from an element below to a square of a side in a parallel plane at a height, by its four corners
-/// (the element lies under the point (x, z) measured from the square's middle).
-fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
-    let corner = |a: f64, b: f64| {
-        let (a, b) = (a / height, b / height);
-        let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
-        (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * PI)
-    };
-    let h = 0.5 * side;
-    corner(h - x, h - z) + corner(h + x, h - z) + corner(h - x, h + z) + corner(h + x, h + z)
-}
-
 #[test]
 fn a_tiny_bright_emitter() {
     // A millimetre across, a million times as bright as a lamp of a metre: E = L A cos⁴ θ / h², the rest of its size being 10⁻⁶.
@@ -129,7 +117,7 @@ fn light_ratios_of_a_hundred_million() {
     spawn(&mut world, wall, Material { double_sided: true, ..matt(0.0, 0.0) });
     run(&mut world, 64);
     for (x, radiance) in [(-1.0, 1.0), (1.0, 1e8)] {
-        let value = |p: DVec3| PI * radiance * to_square(p.x - x, p.z, 0.5, 0.8);
+        let value = |p: DVec3| PI * radiance * common::to_square(p.x - x, p.z, 0.5, 0.8);
         let found = common::compare(&mut world, &points(x, value));
         println!("{radiance:e}: {found}");
         assert!(found.missed == 0 && found.rmse < 0.002, "{found}");

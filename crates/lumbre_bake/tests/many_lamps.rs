@@ -28,18 +28,6 @@ fn spawn_square(world: &mut World, middle: Vec3, side: f32, up: bool, radiance: 
     world.spawn((Mesh(Arc::new(mesh)), Material { front, ..Material::default() }, StaticObject));
 }
 
-/// Form factor from an element below to a square in a parallel plane at a height, by its four corners; the element lies under the point
-/// (x, z) measured from the square's middle.
-fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
-    let corner = |a: f64, b: f64| {
-        let (a, b) = (a / height, b / height);
-        let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
-        (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * PI)
-    };
-    let h = 0.5 * side;
-    corner(h - x, h - z) + corner(h + x, h - z) + corner(h - x, h + z) + corner(h + x, h + z)
-}
-
 /// Where source `i` hangs, over a floor of 4 x 4 metres, and how bright it is: sixteen to one between the brightest and the faintest.
 fn source(i: u32) -> (DVec3, f64) {
     let (row, column) = (f64::from(i / 20), f64::from(i % 20));
@@ -83,7 +71,7 @@ fn hundreds_of_glowing_squares() {
     }
     let report = judge("squares", &mut world, |p| {
         let of = |(place, bright): (DVec3, f64)| {
-            bright * PI * to_square(p.x - place.x, p.z - place.z, f64::from(SIDE), place.y)
+            bright * PI * common::to_square(p.x - place.x, p.z - place.z, f64::from(SIDE), place.y)
         };
         (0..COUNT).map(source).map(of).sum()
     });

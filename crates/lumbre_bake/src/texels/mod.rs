@@ -34,3 +34,4 @@ pub(crate) mod surroundings;
 pub(crate) mod tile_sequence;
 pub(crate) mod tiles;
 pub(crate) mod weighted_fit;
+pub(crate) mod worst_places;

@@ -3,6 +3,8 @@
 //! Adaptive Tree Splitting", 2018). It tells about how much of the light each part brings, and how much exactly where nothing is between, and
 //! takes samples. Not visibility: that is `direct`; not which parts have samples of their own: that is `light_cut`.
 
+use std::f32::consts::PI;
+
 use glam::{DVec3, Mat3, Vec3};
 
 use super::direct::Receiver;
@@ -28,9 +30,10 @@ struct Node {
     /// Unit, or zero: by power, where it shines to; no normal differs from it by more than `spread`, a chord.
     axis: Vec3,
     spread: f32,
-    /// Σ radiance · area, and the sum of its channels.
+    /// Σ radiance · area, the sum of its channels, and Σ area.
     light: Vec3,
     power: f32,
+    area: f32,
     /// Σ radiance · area · normal: a column for each channel.
     moments: Mat3,
     /// Lamps in it, wholly or in part.
@@ -148,8 +151,8 @@ impl EmitterTree {
         if size < distance { size / distance } else { 1.0 }
     }
 
-    /// About how much of a receiver's light would come from emitters if all shone alike, in [0, 1] but for what its parts' balls overlap: near
-    /// large ones by the parts that have to be told apart.
+    /// About how much of what a receiver sees are emitters, weighted by the cosine, if nothing stood before them: from 0 to about 1. What is far
+    /// counts as one area in its middle; what is near is opened, and no part of it takes more than its ball does.
     pub fn form_factor(&self, receiver: &Receiver) -> f32 {
         let (mut sum, mut open, mut opened) = (0.0, Vec::new(), 0);
         open.extend(self.root());
@@ -165,7 +168,9 @@ impl EmitterTree {
                     let direction = (node.center - receiver.position).normalize_or_zero();
                     let receives = (direction.dot(receiver.normal) + sine).clamp(0.0, 1.0);
                     let emits = (node.spread - direction.dot(node.axis)).clamp(0.0, 1.0);
-                    sum += receives * emits * sine * sine;
+                    let squared = (node.center - receiver.position).length_squared();
+                    let of_area = node.area / (PI * squared.max(f32::MIN_POSITIVE));
+                    sum += receives * emits * of_area.min(sine * sine);
                 }
             }
         }
@@ -290,13 +295,14 @@ impl EmitterTree {
 impl Node {
     fn over(emitters: &[Emitter], some: &[u32], lamps: u32, first: u32) -> Self {
         let of = |&index: &u32| &emitters[index as usize];
-        let (mut power, mut sum) = (0.0f64, DVec3::ZERO);
+        let (mut power, mut area, mut sum) = (0.0f64, 0.0f64, DVec3::ZERO);
         let (mut center, mut axis) = (DVec3::ZERO, DVec3::ZERO);
         let mut moments = [DVec3::ZERO; 3];
         for emitter in some.iter().map(of) {
             let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
             let own = light.element_sum();
             power += own;
+            area += f64::from(emitter.area);
             sum += light;
             for (channel, moment) in moments.iter_mut().enumerate() {
                 *moment += light[channel] * emitter.normal.as_dvec3();
@@ -314,8 +320,8 @@ impl Node {
         let emitters = some.len() as u32;
         let [red, green, blue] = moments.map(|moment| moment.as_vec3());
         let moments = Mat3::from_cols(red, green, blue);
-        let (light, power) = (sum.as_vec3(), power as f32);
-        Self { center, radius, axis, spread, light, power, moments, lamps, first, emitters, kind }
+        let (light, power, area) = (sum.as_vec3(), power as f32, area as f32);
+        Self { center, radius, axis, spread, light, power, area, moments, lamps, first, emitters, kind }
     }
 }
 

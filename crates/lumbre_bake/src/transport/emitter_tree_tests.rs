@@ -143,3 +143,31 @@ fn samples_have_the_light_of_all_as_their_mean() {
         assert!((found / expected - 1.0).abs().max_element() < 0.02, "{position}: {found} {expected}");
     }
 }
+
+/// A horizontal square that looks down, as two triangles.
+fn square(middle: Vec3, side: f32) -> [Emitter; 2] {
+    let corner = |x: f32, z: f32| middle + 0.5 * side * Vec3::new(x, 0.0, z);
+    let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    [emitter([a, b, c], Vec3::ONE), emitter([a, c, d], Vec3::ONE)]
+}
+
+#[test]
+fn a_ceiling_with_few_lamps_encloses_nobody_and_one_that_shines_does() {
+    let at = receiver(Vec3::ZERO, Vec3::Y);
+    let exact = |emitters: &[Emitter]| -> f32 {
+        let of = |e: &Emitter| point_to_triangle(DVec3::ZERO, DVec3::Y, &e.corners_f64);
+        emitters.iter().map(of).sum::<f64>() as f32
+    };
+    let lamps_of =
+        |emitters: &[Emitter]| (0..emitters.len() as u32).map(|index| index / 2).collect::<Vec<_>>();
+    let place = |i: i32| Vec3::new(0.4 * (i % 10) as f32 - 1.8, 1.0, 0.4 * (i / 10) as f32 - 1.8);
+    // A hundredth of the ceiling, and all of it.
+    for (side, encloses) in [(0.04, false), (0.4, true)] {
+        let emitters: Vec<Emitter> = (0..100).flat_map(|i| square(place(i), side)).collect();
+        let found = EmitterTree::new(&emitters, &lamps_of(&emitters)).form_factor(&at);
+        let exact = exact(&emitters);
+        assert_eq!(found > 0.5, encloses, "{found} instead of {exact}");
+        // Whole triangles for their middles: about is enough.
+        assert!(found > 0.6 * exact && found < 1.6 * exact, "{found} instead of {exact}");
+    }
+}

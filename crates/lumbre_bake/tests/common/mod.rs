@@ -18,6 +18,18 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     None
 }
 
+/// Form factor from an element below to a square of a side in a parallel plane at a height, by its four corners (the element lies under the point
+/// (x, z) measured from the square's middle).
+pub fn to_square(x: f64, z: f64, side: f64, height: f64) -> f64 {
+    let corner = |a: f64, b: f64| {
+        let (a, b) = (a / height, b / height);
+        let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * std::f64::consts::PI)
+    };
+    let h = 0.5 * side;
+    corner(h - x, h - z) + corner(h + x, h - z) + corner(h - x, h + z) + corner(h + x, h + z)
+}
+
 /// A point of a surface and its converged irradiance, W/m²; NaN where a channel is unknown.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferencePoint {
