@@ -8,14 +8,14 @@ use glam::Vec3;
 
 use crate::checkpoint::Tape;
 use crate::content_hash::hashes_of;
-use crate::memory::{self, Plan};
+use crate::memory;
 use crate::notes::{finish, name_what_is_missing, note_direct_error, note_mean, note_whole};
 use crate::pages::Pages;
-use crate::probes::Wanted;
+use crate::probes;
 use crate::progress::Watch;
 use crate::rebake::change::Change;
 use crate::rebake::{Changes, Found, Samples, Usable, rebake_report};
-use crate::scene::{BakeScene, Canonical, collect, density_of, lights, sky, world_points};
+use crate::scene::{BakeScene, Canonical, WantedProbes, collect, density_of, lights, sky, world_points};
 use crate::texels::charts::charts;
 use crate::texels::divided_light::DividedLight;
 use crate::texels::error_estimate::variances;
@@ -131,7 +131,7 @@ fn run(
     watch.stage("layout", &mut report)?;
     let objects = Arc::new(watch.during(0.0, || collect(world))??);
     let (placed, sky) = (lights(world), sky(world));
-    let wanted = Wanted::of(world, &objects);
+    let wanted = WantedProbes::of(world, &objects);
     let hashes = watch.during(0.0, || hashes_of(&objects, &placed, sky, &wanted, options))?;
     report.content_hash = hashes.content.to_string();
     let points =
@@ -201,8 +201,9 @@ fn run(
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
     let side = texel_side(&scene, &texels);
-    let plan = watch
-        .during(0.0, || Plan::new(&scene, &layout, &texels, side, for_samples, options, &mut report))??;
+    let resolution = watch.during(0.0, || {
+        memory::resolution(&scene, &layout, &texels, side, for_samples, options, &mut report)
+    })??;
     let find = |u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels);
     let changes = watch.during(0.0, || usable.map(find))?;
     let known = |changes: &Changes<'_>| changes.known_direct(&sources, &texels, &charts);
@@ -216,11 +217,19 @@ fn run(
 
     let change = |changes| Change::new(&sources, &layout, changes, &texels, &charts, &direct);
     let change = watch.during(1.0, || changes.as_ref().map(change))?;
-    let exchange = Exchange::new(&scene, &sources, change.as_ref(), options, &plan, &mut watch, &mut report)?;
+    let exchange = Exchange::new(&scene, &sources, options, resolution, &mut watch, &mut report)?;
+    let (exchange, changed_patches) = match exchange {
+        None => (None, Vec::new()),
+        Some((exchange, factors)) => {
+            let of_patches =
+                change.as_ref().map(|own| own.of_patches(&exchange, &factors, options, &mut watch));
+            (Some(exchange), of_patches.transpose()?.unwrap_or_default())
+        }
+    };
     let mut kept = None;
     let (indirect, volume, points) = match &exchange {
         None => {
-            let volume = wanted.bake(&scene, &sources, None, options, &mut watch, &mut report)?;
+            let volume = probes::bake(&wanted, &scene, &sources, None, options, &mut watch, &mut report)?;
             let light = Light { scene: &scene, sources: &sources, outgoing: None };
             (None, volume, dense_points(&light, options, &mut watch, &mut report)?)
         }
@@ -253,7 +262,7 @@ fn run(
             };
             let leaked_before = scene.leaks.count();
             if let Some(change) = &change {
-                kept = Some(change.keep(exchange, &texels, &local, options, &mut watch)?);
+                kept = Some(change.keep(exchange, &changed_patches, &texels, &local, options, &mut watch)?);
             }
             let receivers = Receivers {
                 texels: &texels,
@@ -264,7 +273,8 @@ fn run(
             };
             let gathered = rounds::gather(&outgoing, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
-            let volume = wanted.bake(&scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
+            let volume =
+                probes::bake(&wanted, &scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
             let light = Light { scene: &scene, sources: &sources, outgoing: Some(&outgoing) };
             let points = dense_points(&light, options, &mut watch, &mut report)?;
             (Some(gathered), volume, points)
@@ -327,8 +337,7 @@ fn run(
     let pages = watch.during(1.0, || Pages::new(&layout, options.atlas_size, options.gap))?;
     watch.advance(1.0)?;
     apply::apply(world, &objects, &layout, &filled, &errors, &pages);
-    report.rays +=
-        change.as_ref().zip(exchange.as_ref()).map_or(0, |(change, exchange)| change.rays(exchange));
+    report.rays += change.as_ref().map_or(0, |change| change.rays(&changed_patches));
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
     apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));

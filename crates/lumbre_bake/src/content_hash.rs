@@ -13,8 +13,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
 
-use crate::probes::Wanted;
-use crate::scene::{Object, Part, PlacedLight, collect, lights, sky};
+use crate::scene::{Object, Part, PlacedLight, WantedProbes, collect, lights, sky};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
@@ -61,7 +60,7 @@ pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentH
     options.check()?;
     let objects = collect(world)?;
     let placed = lights(world);
-    let wanted = Wanted::of(world, &objects);
+    let wanted = WantedProbes::of(world, &objects);
     Ok(hashes_of(&objects, &placed, sky(world), &wanted, options).content)
 }
 
@@ -82,7 +81,7 @@ pub(crate) fn hashes_of(
     objects: &[Object],
     lights: &[PlacedLight],
     sky: Vec3,
-    wanted: &Wanted,
+    wanted: &WantedProbes,
     options: &BakeOptions,
 ) -> Hashes {
     let mut images = Images::default();

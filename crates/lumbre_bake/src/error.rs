@@ -97,11 +97,30 @@ pub enum BakeError {
         /// The file.
         path: std::path::PathBuf,
         /// Why not.
-        source: crate::CheckpointError,
+        source: CheckpointError,
     },
     /// The worker threads could not be started.
     #[error("worker threads could not be started: {reason}")]
     Threads {
+        /// What the system says.
+        reason: String,
+    },
+}
+
+/// Why a checkpoint cannot be used at all: the bake does not begin. One that is merely damaged or of another bake is replaced, with a
+/// warning that says why.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// Something else has the name.
+    #[error("the file is no checkpoint of Lumbre; move it away, or name another")]
+    Foreign,
+    /// Another process has it open.
+    #[error("another bake is using it; wait for its end, or name another output")]
+    InUse,
+    /// It cannot be read or written.
+    #[error("{reason}; check the folder, its permissions and the space left")]
+    Unusable {
         /// What the system says.
         reason: String,
     },

@@ -38,6 +38,7 @@
 mod apply;
 mod bake;
 mod checkpoint;
+mod chunks;
 mod content_hash;
 mod error;
 mod memory;
@@ -58,15 +59,15 @@ mod unwrapped_from;
 
 pub use apply::LightmapError;
 pub use bake::{bake, bake_with, rebake};
-pub use checkpoint::{Checkpoint, CheckpointError};
+pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};
-pub use error::BakeError;
-pub use options::{BakeOptions, Density, Probes, Quality};
+pub use error::{BakeError, CheckpointError};
+pub use options::{BakeOptions, Density, FormFactorMethod, Probes, Quality, Solver};
 pub use progress::Progress;
-pub use rebake::{RebakeReport, Samples, SamplesError};
-pub use report::{BakeReport, Ended, ErrorAtTime, ProbeReport, ResolutionReport, StageTime, WorstPlace};
-pub use texels::seams::SeamReport;
-pub use transport::form_factors::FormFactorMethod;
+pub use rebake::{Samples, SamplesError};
+pub use report::{
+    BakeReport, Ended, ErrorAtTime, ProbeReport, RebakeReport, ResolutionReport, SeamReport, StageTime,
+    WorstPlace,
+};
 pub use transport::method_study::{FormFactorErrors, form_factor_errors};
-pub use transport::solver::Solver;
 pub use unwrapped_from::UnwrappedFrom;

@@ -11,17 +11,9 @@ use crate::texels::gather::Gathered;
 use crate::texels::lanes::BESIDE_A_ROW;
 use crate::texels::smooth::Estimates;
 use crate::transport::direct::Direct;
+use crate::transport::exchange::Resolution;
 use crate::transport::patches::{Patch, Patches};
 use crate::{BakeError, BakeOptions, BakeReport};
-
-/// How finely the exchange of light is computed.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Plan {
-    /// Side of a patch, canonical units.
-    pub patch_side: f32,
-    /// Rays for all form factors together.
-    pub form_factor_rays: usize,
-}
 
 /// Of a triangle: itself, its corners for the hierarchy and with its index while it is built, two nodes of the binary tree that is built first,
 /// and of what rays meet: its lane of a block that may be half empty, and its share of nodes of eight (256 bytes each, one in four triangles at worst).
@@ -93,69 +85,67 @@ pub(crate) fn check_texels(
     Ok(())
 }
 
-impl Plan {
-    /// As fine as the quality asks for and the memory allows. States what will be needed.
-    ///
-    /// # Errors
-    /// [`BakeError::Memory`] if the coarsest does not fit.
-    pub fn new(
-        scene: &BakeScene,
-        layout: &LightmapLayout,
-        texels: &[Texel],
-        texel_side: f32,
-        samples: u64,
-        options: &BakeOptions,
-        report: &mut BakeReport,
-    ) -> Result<Self, BakeError> {
-        let effort = options.effort();
-        let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-        let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
-        let mut plan = Self { patch_side: side, form_factor_rays: effort.form_factor_rays };
-        let triangles = scene.triangles.len() as u64;
-        let covered = texels.len() as u64;
-        let listed = texels.iter().map(|texel| match &texel.footprint {
-            Footprint::Points(points) => points.capacity() as u64,
-            Footprint::Whole(_) | Footprint::Hidden => 0,
-        });
-        let points = listed.sum::<u64>();
-        let for_texels = covered * (COVERED + samples)
-            + points * size_of::<FootprintPoint>() as u64
-            + (layout.texels as u64 + margins(layout)) * MAPPED;
-        let asked = Patches::count(scene, side);
-        let (mut patches, mut fewest) = (asked, false);
-        loop {
-            let needed = for_texels + triangles * TRIANGLE + REST + plan.exchange_bytes(patches);
-            report.memory_bytes = needed;
-            let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
-            if fewest {
-                return Err(BakeError::Memory { needed, texels: for_texels, covered, limit });
-            }
-            plan.patch_side *= std::f32::consts::SQRT_2;
-            plan.form_factor_rays /= 2;
-            let fewer = Patches::count(scene, plan.patch_side);
-            fewest = fewer == patches && plan.form_factor_rays == 0;
-            patches = fewer;
+/// How finely light is exchanged: as the quality asks for and the memory allows. States what will be needed.
+///
+/// # Errors
+/// [`BakeError::Memory`] if the coarsest does not fit.
+pub(crate) fn resolution(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    texels: &[Texel],
+    texel_side: f32,
+    samples: u64,
+    options: &BakeOptions,
+    report: &mut BakeReport,
+) -> Result<Resolution, BakeError> {
+    let effort = options.effort();
+    let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
+    let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
+    let mut resolution = Resolution { patch_side: side, form_factor_rays: effort.form_factor_rays };
+    let triangles = scene.triangles.len() as u64;
+    let covered = texels.len() as u64;
+    let listed = texels.iter().map(|texel| match &texel.footprint {
+        Footprint::Points(points) => points.capacity() as u64,
+        Footprint::Whole(_) | Footprint::Hidden => 0,
+    });
+    let points = listed.sum::<u64>();
+    let for_texels = covered * (COVERED + samples)
+        + points * size_of::<FootprintPoint>() as u64
+        + (layout.texels as u64 + margins(layout)) * MAPPED;
+    let asked = Patches::count(scene, side);
+    let (mut patches, mut fewest) = (asked, false);
+    loop {
+        let needed = for_texels + triangles * TRIANGLE + REST + exchange_bytes(&resolution, patches);
+        report.memory_bytes = needed;
+        let Some(limit) = options.memory.filter(|&limit| needed > limit) else { break };
+        if fewest {
+            return Err(BakeError::Memory { needed, texels: for_texels, covered, limit });
         }
-        if plan.patch_side > side {
-            report.warnings.push(format!(
-                "{patches} patches instead of {asked}, and {} form factor rays instead of {}, so that the bake stays within {}",
-                plan.form_factor_rays,
-                effort.form_factor_rays,
-                mebibytes(options.memory.unwrap_or_default())
-            ));
-        }
-        tracing::info!(
-            "this bake needs about {} at most: {covered} texels, {triangles} triangles, {patches} patches",
-            mebibytes(report.memory_bytes)
-        );
-        Ok(plan)
+        resolution.patch_side *= std::f32::consts::SQRT_2;
+        resolution.form_factor_rays /= 2;
+        let fewer = Patches::count(scene, resolution.patch_side);
+        fewest = fewer == patches && resolution.form_factor_rays == 0;
+        patches = fewer;
     }
+    if resolution.patch_side > side {
+        report.warnings.push(format!(
+            "{patches} patches instead of {asked}, and {} form factor rays instead of {}, so that the bake stays within {}",
+            resolution.form_factor_rays,
+            effort.form_factor_rays,
+            mebibytes(options.memory.unwrap_or_default())
+        ));
+    }
+    tracing::info!(
+        "this bake needs about {} at most: {covered} texels, {triangles} triangles, {patches} patches",
+        mebibytes(report.memory_bytes)
+    );
+    Ok(resolution)
+}
 
-    /// Of the patches and their form factors.
-    fn exchange_bytes(&self, patches: u64) -> u64 {
-        // Every patch casts some, however small it is; no patch meets more others than there are.
-        let rays = (self.form_factor_rays as u64 + 32 * patches).min(patches.saturating_mul(patches));
-        // Regions are fewer than patches, and exchange no more pairs than these.
-        patches * (PATCH + GUIDED_PATCH) + rays * (RAY + GUIDE_PAIR)
-    }
+/// Of the patches and their form factors.
+fn exchange_bytes(resolution: &Resolution, patches: u64) -> u64 {
+    // Every patch casts some, however small it is; no patch meets more others than there are.
+    let rays = (resolution.form_factor_rays as u64 + 32 * patches).min(patches.saturating_mul(patches));
+    // Regions are fewer than patches, and exchange no more pairs than these.
+    patches * (PATCH + GUIDED_PATCH) + rays * (RAY + GUIDE_PAIR)
 }

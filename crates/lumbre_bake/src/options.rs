@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::transport::form_factors::FormFactorMethod;
-use crate::transport::solver::Solver;
+use crate::BakeError;
 
 /// How many texels a surface gets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,6 +40,29 @@ pub enum Quality {
     Final,
     /// To judge the others by: patches, form factors and rays far beyond what a game needs. Minutes, not seconds.
     Reference,
+}
+
+/// How form factors are counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FormFactorMethod {
+    /// Rays from points of every patch, by the cosine: F_ij is the share of i's rays that meet j first.
+    #[default]
+    CosineRays,
+    /// Lines spread evenly through the whole scene (Sbert, "An integral geometry based method for fast form-factor computation", 1993):
+    /// two surfaces that follow each other along a line and face each other exchange along it, both ways.
+    GlobalLines,
+}
+
+/// An iterative method for the radiosity system. They agree; they differ in iterations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Solver {
+    /// B ← E + ρ F B: one bounce more per iteration.
+    Jacobi,
+    /// The same, each patch reading what was found before it in the same sweep.
+    GaussSeidel,
+    /// On the symmetric positive definite form [diag(A_i/ρ_i) - G] B = A_i E_i/ρ_i, with its diagonal as preconditioner.
+    #[default]
+    ConjugateGradients,
 }
 
 /// What a bake is asked for.
@@ -198,9 +220,8 @@ impl BakeOptions {
     }
 
     /// Names the first option that is out of its range.
-    pub(crate) fn check(&self) -> Result<(), crate::BakeError> {
-        let wrong =
-            |option, found: String, expected| Err(crate::BakeError::Option { option, found, expected });
+    pub(crate) fn check(&self) -> Result<(), BakeError> {
+        let wrong = |option, found: String, expected| Err(BakeError::Option { option, found, expected });
         match self.density {
             Density::TexelsPerMeter(density) if !(density.is_finite() && density > 0.0) => {
                 return wrong("texels per metre", density.to_string(), "a positive finite number");

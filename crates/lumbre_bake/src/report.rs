@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{RebakeReport, SeamReport};
-
 /// The time of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageTime {
@@ -64,6 +62,61 @@ impl std::fmt::Display for WorstPlace {
         let [x, y, z] = self.center;
         let objects = self.objects.join(", ");
         write!(f, "{:.2} % around ({x:.1}, {y:.1}, {z:.1}): {objects}", 100.0 * self.error)
+    }
+}
+
+/// What closing the seams did. Relative to the mean irradiance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SeamReport {
+    /// Pairs of edges that lie in one place, join smoothly and have lightmap coordinates of their own.
+    pub edges: usize,
+    /// RMS difference between the two sides along them, before.
+    pub jump_before: f64,
+    /// And after.
+    pub jump_after: f64,
+    /// Mean change of the texels beside seams.
+    pub mean_change: f64,
+    /// Largest change of a texel's channel.
+    pub largest_change: f64,
+}
+
+/// What a bake kept of the former one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RebakeReport {
+    /// Why nothing could be kept; empty if something was.
+    pub whole: String,
+    /// What differs from the former bake: objects by name, or the lights.
+    pub changed: Vec<String>,
+    /// Texels that show a surface.
+    pub texels: usize,
+    /// Of them, those whose direct light was computed anew.
+    pub relit: usize,
+    /// Of them, those whose light by bounces was gathered anew.
+    pub gathered: usize,
+    /// RMSE relative to the mean irradiance by which the light of all others may have changed; it is part of the stated error.
+    pub neglected: f64,
+}
+
+impl std::fmt::Display for RebakeReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        /// Names that are listed.
+        const NAMED: usize = 5;
+        if !self.whole.is_empty() {
+            return write!(f, "baked whole: {}", self.whole);
+        }
+        let named = self.changed.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let others = self.changed.len().saturating_sub(NAMED);
+        let others = if others > 0 { format!(" and {others} more") } else { String::new() };
+        let named = if named.is_empty() { "no object".to_owned() } else { named + &others };
+        let share = |count: usize| 100.0 * count as f64 / self.texels.max(1) as f64;
+        write!(
+            f,
+            "baked again what changed: {named}; {:.1} % of the texels gathered anew, direct light of {:.1} % anew, the others kept (their light may \
+             have changed by {:.3} % of the mean)",
+            share(self.gathered),
+            share(self.relit),
+            100.0 * self.neglected
+        )
     }
 }
 

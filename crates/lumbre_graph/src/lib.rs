@@ -37,10 +37,13 @@
 
 mod access;
 mod compile;
+mod declaration;
 mod declare;
 mod error;
+mod executor;
 mod explain;
 mod handle;
+mod history;
 mod nearest;
 mod plan;
 mod resource;
@@ -50,21 +53,21 @@ mod site;
 pub use wgpu;
 
 pub use access::{BufferRead, BufferWrite, LoadOp, Part, TextureRead, TextureWrite};
-pub use compile::{CompileOptions, History};
-pub use declare::declaration::PassKind;
+pub use declaration::PassKind;
 pub use declare::graph::Graph;
 pub use declare::kind::{Compute, PassType, Raster, ResourceKind, Transfer};
 pub use declare::pass::PassBuilder;
 pub use error::{CycleStep, GraphError, GraphResult};
+pub use executor::{Executor, Frame};
 pub use explain::{Calling, Explanation, PassExplanation, ResourceExplanation, Use};
 pub use handle::{Buffer, BufferHandle, Handle, Texture, TextureHandle};
-pub use plan::{Memory, Plan, Status};
+pub use history::History;
+pub use plan::{CompileOptions, Memory, Plan, Status};
 pub use resource::{BufferDescriptor, Name, Origin, Shape, TextureDescriptor};
 pub use run::context::{
     BodyError, BodyResult, ComputeContext, PassResources, RasterContext, TransferContext,
 };
 pub use run::error::RunError;
-pub use run::executor::{Executor, Frame};
 pub use run::imports::Imports;
 pub use run::pool::{KEEP_RETAINED_FRAMES, KEEP_TRANSIENT_FRAMES, PoolStatistics};
 pub use run::probe::FiniteProbe;

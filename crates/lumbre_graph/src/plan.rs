@@ -2,10 +2,26 @@
 //! carried out by [`run`](crate::run).
 
 use crate::access::Part;
-use crate::compile::{CompileOptions, History};
-use crate::declare::declaration::Declarations;
-use crate::explain::Explanation;
+use crate::declaration::Declarations;
+use crate::history::History;
 use crate::resource::{Name, Shape};
+
+/// Choices of how to compile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CompileOptions {
+    /// Make one wgpu pass of raster passes in a row that draw into the same attachments. Off, each has its own, and
+    /// so its own time where timestamps can not be taken inside passes.
+    pub merge: bool,
+    /// Keep all that is drawn so that [`FiniteProbe`](crate::FiniteProbe) can look at it after each pass. Merges
+    /// nothing.
+    pub probe: bool,
+}
+
+impl Default for CompileOptions {
+    fn default() -> Self {
+        Self { merge: true, probe: false }
+    }
+}
 
 /// What becomes of a pass, and why.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -151,12 +167,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan as data for people and programs.
-    #[must_use]
-    pub fn explain(&self) -> Explanation {
-        Explanation::of(self)
-    }
-
     /// What becomes of the pass of this name; `None` if there is no such pass.
     #[must_use]
     pub fn status(&self, pass: &str) -> Option<&Status> {

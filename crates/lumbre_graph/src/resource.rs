@@ -96,6 +96,22 @@ impl TextureDescriptor {
         if self.dimension == wgpu::TextureDimension::D3 { 1 } else { self.size.depth_or_array_layers }
     }
 
+    /// Whether a texture of this shape can hold NaN or Inf where the probe can see it.
+    pub(crate) fn can_be_probed(&self) -> bool {
+        use wgpu::TextureFormat as Format;
+        let float = matches!(
+            self.format,
+            Format::R16Float
+                | Format::Rg16Float
+                | Format::Rgba16Float
+                | Format::R32Float
+                | Format::Rg32Float
+                | Format::Rgba32Float
+                | Format::Rg11b10Ufloat
+        );
+        float && self.dimension == wgpu::TextureDimension::D2
+    }
+
     /// Whether the texture has a single part, so that clearing an attachment overwrites all of it.
     pub(crate) fn is_one_part(&self) -> bool {
         self.mip_level_count == 1 && self.size.depth_or_array_layers == 1
@@ -148,6 +164,16 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Whether a resource made with this shape can be used as `asked`: all the same, and at least the usages.
+    pub(crate) fn serves(&self, asked: &Self) -> bool {
+        let usages = match (self, asked) {
+            (Self::Texture(made), Self::Texture(asked)) => made.usage.contains(asked.usage),
+            (Self::Buffer(made), Self::Buffer(asked)) => made.usage.contains(asked.usage),
+            _ => false,
+        };
+        usages && self.without_usage() == asked.without_usage()
+    }
+
     /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
@@ -185,4 +211,13 @@ pub(crate) struct ResourceDeclaration {
     /// What is known of an imported resource's content, see `Graph::fingerprint`.
     pub fingerprint: Option<u64>,
     pub site: Site,
+}
+
+/// `TextureUsages(COPY_SRC | COPY_DST)` without the type's name.
+pub(crate) fn flags(usage: &impl std::fmt::Debug) -> String {
+    let text = format!("{usage:?}");
+    match text.split_once('(') {
+        Some((_, inner)) => inner.trim_end_matches(')').into(),
+        None => text,
+    }
 }

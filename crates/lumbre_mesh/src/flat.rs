@@ -41,6 +41,13 @@ pub fn flat_shaded(mesh: &TriangleMesh) -> TriangleMesh {
     flat
 }
 
+/// The normals of a mesh that has none: flat, as glTF 2.0 asks (section 3.7.2.1), so vertices are split.
+///
+/// A mesh with normals comes back unchanged.
+pub fn compute_flat_normals(mesh: TriangleMesh) -> TriangleMesh {
+    if mesh.normals.is_empty() { flat_shaded(&mesh) } else { mesh }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -26,6 +26,7 @@ pub mod atlas;
 mod bounding_rectangle;
 mod chart;
 pub mod flat;
+mod grid;
 pub mod normals;
 mod planar_overlap;
 pub mod shapes;

@@ -2,7 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::flat::flat_shaded;
 use crate::{Adjacency, MeshError, TriangleMesh, weld_positions};
 
 /// What a face counts for in the average at a vertex.
@@ -26,13 +25,6 @@ pub fn face_normal(triangle: &[Vec3; 3]) -> Option<Vec3> {
 
 fn face_normal_f64([a, b, c]: &[DVec3; 3]) -> Option<DVec3> {
     (*b - *a).cross(*c - *a).try_normalize()
-}
-
-/// The normals of a mesh that has none: flat, as glTF 2.0 asks (section 3.7.2.1), so vertices are split.
-///
-/// A mesh with normals comes back unchanged.
-pub fn compute_flat_normals(mesh: TriangleMesh) -> TriangleMesh {
-    if mesh.normals.is_empty() { flat_shaded(&mesh) } else { mesh }
 }
 
 /// A mesh with averaged normals, and where there was none to average.

@@ -5,8 +5,9 @@
 use std::f64::consts::TAU;
 
 use glam::{Mat3, Vec3};
+use lumbre_mesh::flat::compute_flat_normals;
 use lumbre_mesh::flat::flat_triangles;
-use lumbre_mesh::normals::{NormalWeight, compute_flat_normals, compute_smooth_normals, face_normal};
+use lumbre_mesh::normals::{NormalWeight, compute_smooth_normals, face_normal};
 use lumbre_mesh::surfaces::{
     ImplicitSurface, ParametricSurface, Sphere, Torus, implicit_normal, parametric_mesh,
 };

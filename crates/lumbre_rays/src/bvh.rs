@@ -3,9 +3,10 @@
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec3;
 
-use crate::build::WideTree;
+use crate::build::build;
 use crate::canonical_scale::CanonicalScale;
 use crate::ray_setup::RaySetup;
+use crate::wide_tree::WideTree;
 use crate::{Hit, Ray};
 
 /// A hierarchy over triangles, immutable once built and shared freely between threads.
@@ -52,7 +53,7 @@ impl Bvh {
         if kept.is_empty() {
             bounds = [Vec3::ZERO; 2];
         }
-        Self { tree: WideTree::build(&kept), scale, bounds, skipped, level: Level::new() }
+        Self { tree: build(&kept), scale, bounds, skipped, level: Level::new() }
     }
 
     /// Indices of the triangles that were left out, ascending.

@@ -7,9 +7,9 @@
 use glam::Vec3;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 
-use crate::build::WideTree;
 use crate::triangle_block::TriangleBlock;
 use crate::wide_node::ChildRef;
+use crate::wide_tree::WideTree;
 
 /// Cost of a visit to a node, in tests of a block; measured (`cargo bench -p lumbre_rays --bench ratios`).
 const NODE_COST: f32 = 0.5;

@@ -60,6 +60,7 @@ mod traversal;
 mod triangle_block;
 mod visit_order;
 mod wide_node;
+mod wide_tree;
 
 pub use bvh::Bvh;
 pub use ray::{Hit, Ray};

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::build::WideTree;
 use crate::triangle_block::TriangleBlock;
 use crate::wide_node::ChildRef;
+use crate::wide_tree::WideTree;
 
 /// Fills an empty tree from (index, canonical triangle) pairs.
 pub(crate) fn build_balanced(tree: &mut WideTree, triangles: &[(u32, [Vec3; 3])]) {

@@ -3,11 +3,11 @@
 use fearless_simd::Simd;
 
 use crate::Hit;
-use crate::build::WideTree;
 use crate::ray_setup::RaySetup;
 use crate::triangle_block::{BlockRay, TriangleBlock};
 use crate::visit_order::visits;
 use crate::wide_node::NodeRay;
+use crate::wide_tree::WideTree;
 
 /// Levels whose stack needs no allocation.
 const SHORT: usize = 16;

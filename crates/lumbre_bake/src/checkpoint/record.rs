@@ -2,12 +2,6 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
-use crate::texels::resolution_error::DensePoint;
-use crate::texels::shared_light::Shared;
-use crate::transport::direct::{Direct, Seen};
-use crate::transport::form_factors::Cast;
-
 /// Something that a checkpoint keeps. What is read is what was written, to the last bit.
 pub(crate) trait Record: Sized {
     /// Fewest bytes of one.
@@ -66,17 +60,17 @@ number!(u8, u32, u64, f32, f64);
 /// A struct by its fields: whoever adds one is asked for it here.
 macro_rules! fields {
     ($kind:ident { $($field:ident: $of:ty),* $(,)? }) => {
-        impl Record for $kind {
-            const LEAST: usize = 0 $(+ <$of as Record>::LEAST)*;
+        impl $crate::checkpoint::Record for $kind {
+            const LEAST: usize = 0 $(+ <$of as $crate::checkpoint::Record>::LEAST)*;
 
             fn write(&self, out: &mut Vec<u8>) {
                 let Self { $($field),* } = self;
-                $($field.write(out);)*
+                $($crate::checkpoint::Record::write($field, out);)*
             }
 
-            fn read(from: &mut Cursor<'_>) -> Option<Self> {
+            fn read(from: &mut $crate::checkpoint::record::Cursor<'_>) -> Option<Self> {
                 // In the order in which they are written.
-                $(let $field = <$of as Record>::read(from)?;)*
+                $(let $field = <$of as $crate::checkpoint::Record>::read(from)?;)*
                 Some(Self { $($field),* })
             }
         }
@@ -84,34 +78,6 @@ macro_rules! fields {
 }
 
 pub(crate) use fields;
-
-fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, sampled: bool, seen: Seen });
-fields!(Seen { partly: bool, signature: u32 });
-fields!(Shared { sums: [Vec3; SCRAMBLES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
-fields!(Gathered {
-    sums: [Vec3; SCRAMBLES],
-    weights: [Weights; SCRAMBLES],
-    patch_errors: Vec2,
-    checks: u32,
-    differences: Vec3,
-    squared_differences: f32,
-    inverse_distances: f32,
-    samples: u32,
-    rays: u64,
-});
-fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
-fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: [u32; 2] });
-
-fields!(DensePoint {
-    triangle: u32,
-    at: (f32, f32),
-    counts: bool,
-    direct: [Vec3; 2],
-    indirect: [Vec3; 2],
-    checks: u32,
-    differences: Vec3,
-    rays: u64,
-});
 
 impl Record for bool {
     const LEAST: usize = 1;
@@ -195,6 +161,8 @@ impl<T: Record> Record for Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::direct::{Direct, Seen};
+    use crate::transport::form_factors::Cast;
 
     #[test]
     fn what_is_written_is_read_to_the_last_bit() {

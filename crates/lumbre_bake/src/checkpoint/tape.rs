@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::record::{Cursor, Record};
-use super::{Checkpoint, CheckpointError, VERSION};
+use super::{Checkpoint, VERSION};
 use crate::content_hash::ContentHash;
+use crate::error::CheckpointError;
 
 const MAGIC: &[u8; 8] = b"LUMBRECP";
 const CHECKSUM: usize = 32;

@@ -12,19 +12,14 @@ mod fill;
 mod grid;
 mod light;
 
-use bevy_ecs::prelude::*;
-use glam::DVec3;
-use lumbre_scene::{
-    AmbientCube, ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, IrradianceVolume, Mesh,
-};
+use lumbre_scene::{AmbientCube, IrradianceVolume};
 
 pub(crate) use light::Seen;
 
 use self::grid::Grid;
-use crate::options::Probes;
+use crate::chunks::in_chunks_anew;
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Object, under_a_dynamic_object, world_points};
-use crate::texels::chunks::in_chunks_anew;
+use crate::scene::{BakeScene, WantedProbes};
 use crate::texels::gather::Outgoing;
 use crate::transport::direct::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
@@ -35,106 +30,56 @@ pub(crate) struct PlacedVolume {
     pub grid: Grid,
 }
 
-/// What the World asks of the probes.
-pub(crate) struct Wanted {
-    /// Corners of what moves, world space.
-    moving: Vec<DVec3>,
-    any: bool,
-    /// By the index of its material in the scene, whether a surface is a polygon light in a frame.
-    pub(crate) real_time: Vec<bool>,
-}
-
-impl Wanted {
-    /// Reads the World.
-    pub fn of(world: &mut World, objects: &[Object]) -> Self {
-        let mut query = world.query_filtered::<(
-            &Mesh,
-            Option<&GlobalTransform>,
-            Option<&DynamicObject>,
-            Option<&ChildOf>,
-        ), Without<Hidden>>();
-        let (mut moving, mut any) = (Vec::new(), false);
-        for (mesh, transform, dynamic, parent) in query.iter(world) {
-            if dynamic.is_some() || under_a_dynamic_object(world, parent) {
-                any = true;
-                let transform = transform.copied().unwrap_or_default();
-                moving.extend(world_points(&transform.0, &mesh.0));
-            }
-        }
-        let parts = objects.iter().flat_map(|object| &object.parts);
-        let real_time = parts.map(|part| world.get::<EmissiveLight>(part.entity).is_some()).collect();
-        Self { moving, any, real_time }
+/// Bakes the probes, if they are called for; the report says why not.
+pub(crate) fn bake(
+    wanted: &WantedProbes,
+    scene: &BakeScene,
+    sources: &Sources<'_>,
+    outgoing: Option<&Outgoing<'_>>,
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<Option<PlacedVolume>, BakeError> {
+    if let Err(reason) = wanted.are(options) {
+        report.skipped.push(format!("probes: {reason}"));
+        return Ok(None);
     }
-
-    /// Whether probes are called for, or why not.
-    pub fn are(&self, options: &BakeOptions) -> Result<(), &'static str> {
-        match options.probes {
-            Probes::Never => Err("they are switched off"),
-            Probes::Automatic if !self.any => Err("nothing moves"),
-            Probes::Automatic | Probes::Always => Ok(()),
-        }
+    let real_time = |triangle: u32| {
+        let surface = scene.triangles[triangle as usize].surface;
+        wanted.real_time.get(surface as usize).copied().unwrap_or(false)
+    };
+    let emitters = sources.only_emitters(|emitter| !real_time(emitter.triangle));
+    if emitters.is_empty() && outgoing.is_none() {
+        report
+            .skipped
+            .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
+        return Ok(None);
     }
-
-    /// Corners of the box around what moves, world space; infinite and turned inside out if there is nothing.
-    pub fn bounds(&self) -> (DVec3, DVec3) {
-        let finite = self.moving.iter().filter(|point| point.is_finite());
-        finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| {
-            (low.min(point), high.max(point))
-        })
+    watch.stage("probes", report)?;
+    let grid = Grid::new(scene, &wanted.moving, options.probe_spacing, &mut report.warnings);
+    let light = light::ProbeLight { scene, emitters: &emitters, outgoing, effort: effort(options.quality) };
+    let seen: Vec<Seen> = in_chunks_anew(grid.count(), watch, |index| {
+        light.at(grid.position(index), options.seed, index as u32)
+    })?;
+    report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();
+    let valid: Vec<bool> = seen.iter().map(|seen| !seen.inside).collect();
+    let mut cubes: Vec<AmbientCube> = seen.iter().map(|seen| seen.cube).collect();
+    fill::fill(grid.resolution, &valid, &mut cubes);
+    report.probes = ProbeReport {
+        resolution: grid.resolution.to_array(),
+        spacing: grid.spacing(scene.space).to_array(),
+        inside: valid.iter().filter(|valid| !**valid).count(),
+        estimated_error: light::relative_error(&seen),
+    };
+    if report.probes.inside == grid.count() {
+        report.warnings.push(
+            "every probe lies inside geometry and is dark; give a smaller probe spacing, or turn the faces \
+             of the walls to the inside"
+                .into(),
+        );
     }
-
-    /// Bakes the probes, if they are called for; the report says why not.
-    pub fn bake(
-        &self,
-        scene: &BakeScene,
-        sources: &Sources<'_>,
-        outgoing: Option<&Outgoing<'_>>,
-        options: &BakeOptions,
-        watch: &mut Watch<'_>,
-        report: &mut BakeReport,
-    ) -> Result<Option<PlacedVolume>, BakeError> {
-        if let Err(reason) = self.are(options) {
-            report.skipped.push(format!("probes: {reason}"));
-            return Ok(None);
-        }
-        let real_time = |triangle: u32| {
-            let surface = scene.triangles[triangle as usize].surface;
-            self.real_time.get(surface as usize).copied().unwrap_or(false)
-        };
-        let emitters = sources.only_emitters(|emitter| !real_time(emitter.triangle));
-        if emitters.is_empty() && outgoing.is_none() {
-            report
-                .skipped
-                .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
-            return Ok(None);
-        }
-        watch.stage("probes", report)?;
-        let grid = Grid::new(scene, &self.moving, options.probe_spacing, &mut report.warnings);
-        let light =
-            light::ProbeLight { scene, emitters: &emitters, outgoing, effort: effort(options.quality) };
-        let seen: Vec<Seen> = in_chunks_anew(grid.count(), watch, |index| {
-            light.at(grid.position(index), options.seed, index as u32)
-        })?;
-        report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();
-        let valid: Vec<bool> = seen.iter().map(|seen| !seen.inside).collect();
-        let mut cubes: Vec<AmbientCube> = seen.iter().map(|seen| seen.cube).collect();
-        fill::fill(grid.resolution, &valid, &mut cubes);
-        report.probes = ProbeReport {
-            resolution: grid.resolution.to_array(),
-            spacing: grid.spacing(scene.space).to_array(),
-            inside: valid.iter().filter(|valid| !**valid).count(),
-            estimated_error: light::relative_error(&seen),
-        };
-        if report.probes.inside == grid.count() {
-            report.warnings.push(
-                "every probe lies inside geometry and is dark; give a smaller probe spacing, or turn the faces \
-                 of the walls to the inside"
-                    .into(),
-            );
-        }
-        let volume = IrradianceVolume { resolution: grid.resolution, cubes };
-        Ok(Some(PlacedVolume { volume, grid }))
-    }
+    let volume = IrradianceVolume { resolution: grid.resolution, cubes };
+    Ok(Some(PlacedVolume { volume, grid }))
 }
 
 /// Rays of a probe over the sphere for each of four scrambles, and to the emitters for each of its sides.

@@ -10,22 +10,23 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::changes::{ChangedBox, Changes};
+use super::choice;
 use super::estimate::{Estimate, Range, cap, in_cap};
-use super::kept::Kept;
 use super::relit::Ways;
+use crate::chunks::in_chunks;
 use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texels::blocks::Blocks;
-use crate::texels::chunks::in_chunks;
 use crate::texels::footprint::{Texel, receiver};
+use crate::texels::kept::Kept;
 use crate::texels::local_light::LocalLight;
 use crate::transport::direct::{Direct, Receiver, Sources};
 use crate::transport::exchange::Exchange;
 use crate::transport::form_factors::FormFactors;
 use crate::transport::patches::{Patch, Patches};
-use crate::transport::solver::{Solver, gather};
+use crate::transport::solver::gather;
 use crate::{BakeError, BakeOptions};
 
 /// Rays of a patch and of a block of texels; every other one towards what has changed.
@@ -95,9 +96,8 @@ impl<'a> Change<'a> {
     }
 
     /// About how many rays the estimate takes.
-    pub fn rays(&self, exchange: &Exchange) -> u64 {
-        let asked =
-            if exchange.change.is_empty() { 0 } else { exchange.change.len() + self.blocks.members.len() };
+    pub fn rays(&self, of_patches: &[Range]) -> u64 {
+        let asked = if of_patches.is_empty() { 0 } else { of_patches.len() + self.blocks.members.len() };
         u64::from(RAYS) * asked as u64
     }
 
@@ -108,16 +108,16 @@ impl<'a> Change<'a> {
     /// [`BakeError::Cancelled`].
     pub fn of_patches(
         &self,
-        patches: &Patches,
-        exitance: &[Vec3],
+        exchange: &Exchange,
         factors: &FormFactors,
-        solver: Solver,
         options: &BakeOptions,
         watch: &mut Watch<'_>,
     ) -> Result<Vec<Range>, BakeError> {
         if self.changes.none {
             return Ok(Vec::new());
         }
+        let Exchange { patches, exitance, .. } = exchange;
+        let solver = options.solver;
         let unknown = self.unknown_backs(patches);
         let light = PatchLight { patches, exitance, change: &[], unknown: &unknown };
         let is_new = |patch: &Patch| {
@@ -182,19 +182,20 @@ impl<'a> Change<'a> {
     pub fn keep(
         &self,
         exchange: &Exchange,
+        of_patches: &[Range],
         texels: &[Texel],
         local: &LocalLight,
         options: &BakeOptions,
         watch: &mut Watch<'_>,
     ) -> Result<Kept, BakeError> {
         if self.changes.none {
-            return Ok(Kept::all(self.changes));
+            return Ok(choice::all(self.changes));
         }
-        let Exchange { patches, exitance, change, .. } = exchange;
+        let Exchange { patches, exitance, .. } = exchange;
         let unknown = self.unknown_backs(patches);
-        let light = PatchLight { patches, exitance, change, unknown: &unknown };
+        let light = PatchLight { patches, exitance, change: of_patches, unknown: &unknown };
         let change = self.of_texels(texels, light, options, watch)?;
-        Ok(Kept::choose(self.changes, texels, &change, local, options.error))
+        Ok(choice::choose(self.changes, texels, &change, local, options.error))
     }
 
     /// By how much the light by bounces may have changed at every covered texel, W/m², root mean square of the channels: that of its block.

@@ -7,7 +7,7 @@
 //!                                   ├─► relit:  texels whose ways to a lamp lead through such a box: direct light anew
 //!                                   │
 //!                                   └─► change: a linear estimate of how the light by bounces changes, patches first, then texels
-//!                                          └─► kept: texels where that, with what was neglected before, is small beside the error asked for
+//!                                          └─► choice: texels where that, with what was neglected before, is small beside the error asked for
 //! ```
 //!
 //! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the change that is seen at first hand as
@@ -15,15 +15,14 @@
 
 pub(crate) mod change;
 mod changes;
+mod choice;
 mod estimate;
-pub(crate) mod kept;
 mod relit;
 mod report;
 mod samples;
 mod samples_file;
 
 pub(crate) use changes::{Changes, Usable};
-pub use report::RebakeReport;
 pub(crate) use report::rebake_report;
 pub use samples::Samples;
 pub(crate) use samples::{Found, TexelSamples};

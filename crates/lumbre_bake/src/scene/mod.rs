@@ -13,6 +13,7 @@ mod rooms;
 mod texture;
 mod texture_coordinates;
 mod triangles;
+mod wanted_probes;
 
 pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky, under_a_dynamic_object};
 pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, lay_out_with, world_points};
@@ -20,3 +21,4 @@ pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
 pub(crate) use texture_coordinates::reading_first;
 pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle};
+pub(crate) use wanted_probes::WantedProbes;

@@ -10,6 +10,7 @@ use super::arriving::{Arriving, Asked, Met, Way};
 use super::footprint::{Texel, receiver};
 pub(crate) use super::outgoing::Outgoing;
 use super::tile_sequence::TileSequence;
+use crate::checkpoint::record::fields;
 use crate::scene::material::Side;
 
 /// Independent scrambles per texel: their spread is the texel's error.
@@ -106,6 +107,8 @@ pub(crate) struct Weights {
     pub light_squares: f32,
 }
 
+fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
+
 impl Weights {
     fn add(&mut self, weight: f32, light: Vec3) {
         self.sum += weight;
@@ -135,6 +138,18 @@ pub(crate) struct Gathered {
     /// Rays cast.
     pub rays: u64,
 }
+
+fields!(Gathered {
+    sums: [Vec3; SCRAMBLES],
+    weights: [Weights; SCRAMBLES],
+    patch_errors: Vec2,
+    checks: u32,
+    differences: Vec3,
+    squared_differences: f32,
+    inverse_distances: f32,
+    samples: u32,
+    rays: u64,
+});
 
 /// Variance of weights below which they are all the same.
 const LEAST_SPREAD: f32 = 1e-4;

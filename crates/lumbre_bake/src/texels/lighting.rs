@@ -3,13 +3,13 @@
 //! then more where the error asked for is not in sight. The other sources share samples: that is `shared_light`.
 
 use super::allocation::allot;
-use super::chunks::{in_chunks, in_chunks_in_time};
 use super::footprint::{Texel, receiver};
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use super::shafts::Shafts;
 use super::shared_light::SharedLight;
 use super::surroundings::Surroundings;
+use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
 use crate::sampling::Sequence;
 use crate::scene::LightmapLayout;

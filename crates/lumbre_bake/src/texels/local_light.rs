@@ -8,9 +8,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::blocks::Blocks;
-use super::chunks::in_chunks_anew;
 use super::footprint::{Texel, receiver};
 use crate::BakeError;
+use crate::chunks::in_chunks_anew;
 use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about};
 use crate::scene::material::Side;

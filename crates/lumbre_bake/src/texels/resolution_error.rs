@@ -5,9 +5,10 @@
 
 use glam::{Vec2, Vec3};
 
-use super::chunks::in_chunks;
 use super::footprint::{Footprint, FootprintPoint, Texel, receiver};
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
+use crate::checkpoint::record::fields;
+use crate::chunks::in_chunks;
 use crate::progress::Watch;
 use crate::report::ResolutionReport;
 use crate::sampling::{Sequence, cosine_about, hash, triangle_point};
@@ -43,6 +44,17 @@ pub(crate) struct DensePoint {
     pub differences: Vec3,
     pub rays: u64,
 }
+
+fields!(DensePoint {
+    triangle: u32,
+    at: (f32, f32),
+    counts: bool,
+    direct: [Vec3; 2],
+    indirect: [Vec3; 2],
+    checks: u32,
+    differences: Vec3,
+    rays: u64,
+});
 
 /// What light is asked for at points.
 pub(crate) struct Light<'a> {

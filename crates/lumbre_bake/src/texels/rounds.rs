@@ -5,16 +5,16 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::allocation::{Allotment, allot_within};
-use super::chunks::in_chunks_in_time;
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, Outgoing, SCRAMBLES};
+use super::kept::Kept;
 use super::late::from_patches;
 use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
+use crate::chunks::in_chunks_in_time;
 use crate::progress::Watch;
-use crate::rebake::kept::Kept;
 use crate::transport::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 

@@ -6,7 +6,6 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::allocation::{Allotment, allot_within};
-use super::chunks::{in_chunks, in_chunks_in_time};
 use super::error_estimate::spread;
 use super::footprint::{Texel, receiver};
 use super::gather::SCRAMBLES;
@@ -15,6 +14,8 @@ use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
 use super::tile_sequence::TileSequence;
+use crate::checkpoint::record::fields;
+use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
 use crate::sampling::hash;
 use crate::transport::direct::{Direct, Sources};
@@ -35,6 +36,8 @@ pub(crate) struct Shared {
     /// Rays cast.
     pub rays: u32,
 }
+
+fields!(Shared { sums: [Vec3; SCRAMBLES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
 
 /// Purposes of the scrambles' sequences begin here.
 const PURPOSE: u32 = 96;

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::form_factors::FormFactors;
 use super::patches::Patches;
-use super::solver::{Solver, gather};
+use super::solver::gather;
+use crate::options::Solver;
 use crate::scene::BakeScene;
 
 /// Times larger.

@@ -4,10 +4,10 @@
 use super::form_factors::{Cast, counted};
 use super::patches::Patches;
 use crate::BakeError;
+use crate::chunks::in_chunks;
 use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
-use crate::texels::chunks::in_chunks;
 
 /// Least and most rays of a patch. The sequence has 65,536 points.
 const RAYS: (f64, f64) = (LEAST_RAYS as f64, 65_536.0);

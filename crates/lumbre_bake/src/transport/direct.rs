@@ -15,6 +15,7 @@ use super::light_tree::{LightTree, has_place};
 use super::share_variance::{share_variance, uneven_variance};
 use super::unoccluded::Unoccluded;
 use super::visible_part::visible_part;
+use crate::checkpoint::record::fields;
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -48,6 +49,8 @@ pub(crate) struct Direct {
     pub seen: Seen,
 }
 
+fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, sampled: bool, seen: Seen });
+
 /// What a receiver saw of the sources.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Seen {
@@ -56,6 +59,8 @@ pub(crate) struct Seen {
     /// One number for each combination of hidden sources.
     pub signature: u32,
 }
+
+fields!(Seen { partly: bool, signature: u32 });
 
 impl Seen {
     /// What the samples to source `id` found. Sources that are wholly seen, or that do not shine here, leave no mark: which of them

@@ -9,14 +9,13 @@ use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
 use super::guide::Guide;
 use super::patches::{Patch, Patches};
-use super::solver::{self, Solver};
-use crate::memory::Plan;
+use super::solver;
+use crate::chunks::in_chunks;
+use crate::options::Solver;
 use crate::progress::Watch;
-use crate::rebake::change::Change;
 use crate::sampling::{Sequence, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
-use crate::texels::chunks::in_chunks;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The solution that the final gather reads.
@@ -35,8 +34,15 @@ pub(crate) struct Exchange {
     pub guide: Guide,
     /// What leaves each patch without emission, W/m².
     pub exitance: Vec<Vec3>,
-    /// By how much `indirect` has changed since a former bake, at least and at most; empty without one.
-    pub change: Vec<[Vec3; 2]>,
+}
+
+/// How finely the exchange of light is computed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Resolution {
+    /// Side of a patch, canonical units.
+    pub patch_side: f32,
+    /// Rays for all form factors together.
+    pub form_factor_rays: usize,
 }
 
 /// Relative residual at which the solver stops: well below what form factors are known to.
@@ -46,17 +52,20 @@ const TOLERANCE: f64 = 1e-5;
 const SHADOW_RAYS: u32 = 8;
 
 impl Exchange {
-    /// `None` where nothing bounces; the report then says why.
+    /// With the form factors that it came from, which a change since a former bake is estimated by. `None` where nothing bounces; the report then
+    /// says why.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
     pub fn new(
         scene: &BakeScene,
         sources: &Sources<'_>,
-        change: Option<&Change<'_>>,
         options: &BakeOptions,
-        plan: &Plan,
+        resolution: Resolution,
         watch: &mut Watch<'_>,
         report: &mut BakeReport,
-    ) -> Result<Option<Self>, BakeError> {
-        let side = plan.patch_side;
+    ) -> Result<Option<(Self, FormFactors)>, BakeError> {
+        let side = resolution.patch_side;
         watch.stage("form factors", report)?;
         let patches = watch.during(0.0, || Patches::new(scene, side))?;
         report.patches = patches.list.len();
@@ -72,7 +81,7 @@ impl Exchange {
             let black = || sources.has_sky().then(|| Self::black(scene, patches, side));
             return watch.during(0.5, black);
         }
-        let (method, rays) = (options.form_factors, plan.form_factor_rays);
+        let (method, rays) = (options.form_factors, resolution.form_factor_rays);
         let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, watch)?;
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
@@ -121,22 +130,8 @@ impl Exchange {
         let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(leaves).collect();
         let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
         let guide = watch.during(0.8, || Guide::new(scene, &patches, side, &factors, &radiosity, &sky))?;
-        let change = match change {
-            Some(change) => {
-                change.of_patches(&patches, &exitance, &factors, options.solver, options, watch)?
-            }
-            None => Vec::new(),
-        };
-        Ok(Some(Self {
-            patches,
-            direct,
-            indirect,
-            indirect_error,
-            near: 2.0 * side,
-            guide,
-            exitance,
-            change,
-        }))
+        let near = 2.0 * side;
+        Ok(Some((Self { patches, direct, indirect, indirect_error, near, guide, exitance }, factors)))
     }
 }
 
@@ -157,12 +152,13 @@ impl Exchange {
     }
 
     /// Of surfaces that reflect nothing.
-    fn black(scene: &BakeScene, patches: Patches, side: f32) -> Self {
+    fn black(scene: &BakeScene, patches: Patches, side: f32) -> (Self, FormFactors) {
         let none = vec![Vec3::ZERO; patches.list.len()];
         let zeros = vec![0.0; patches.list.len()];
         let exact = vec![Vec2::ZERO; patches.list.len()];
-        let guide = Guide::new(scene, &patches, side, &FormFactors::none(&patches), &zeros, &none);
-        Self {
+        let factors = FormFactors::none(&patches);
+        let guide = Guide::new(scene, &patches, side, &factors, &zeros, &none);
+        let exchange = Self {
             direct: none.clone(),
             indirect: none.clone(),
             indirect_error: exact,
@@ -170,8 +166,8 @@ impl Exchange {
             patches,
             guide,
             exitance: none,
-            change: Vec::new(),
-        }
+        };
+        (exchange, factors)
     }
 }
 

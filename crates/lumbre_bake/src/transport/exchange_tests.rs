@@ -7,11 +7,9 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 
 use super::direct::Sources;
-use super::exchange::Exchange;
-use super::form_factors::FormFactorMethod;
+use super::exchange::{Exchange, Resolution};
 use super::method_study::form_factor_errors;
-use super::solver::Solver;
-use crate::memory::Plan;
+use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
 use crate::stop::Stop;
@@ -50,9 +48,9 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let mut watch = Watch::new(&mut carry_on, None);
     let mut report = BakeReport::default();
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
-    let plan = Plan { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
-    let exchange = Exchange::new(&scene, &sources, None, &options, &plan, &mut watch, &mut report).unwrap();
-    (exchange.expect("light bounces").indirect, report)
+    let resolution = Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
+    let exchange = Exchange::new(&scene, &sources, &options, resolution, &mut watch, &mut report).unwrap();
+    (exchange.expect("light bounces").0.indirect, report)
 }
 
 #[test]

@@ -8,8 +8,9 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::Material;
 
-use super::form_factors::{FormFactorMethod, FormFactors};
+use super::form_factors::FormFactors;
 use super::patches::Patches;
+use crate::options::FormFactorMethod;
 use crate::progress::{Progress, Watch};
 use crate::scene::{BakeScene, Canonical, Object, Part, lay_out};
 use crate::stop::Stop;

@@ -5,26 +5,15 @@
 
 use rayon::prelude::*;
 
-use serde::{Deserialize, Serialize};
-
 use super::near_pairs::{NearPairs, near_pairs};
 use super::patches::Patches;
 use super::{cosine_rays, global_lines};
 use crate::BakeError;
+use crate::checkpoint::record::fields;
+use crate::options::FormFactorMethod;
 use crate::progress::Watch;
 use crate::scene::BakeScene;
 use crate::stop::Stop;
-
-/// How form factors are counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum FormFactorMethod {
-    /// Rays from points of every patch, by the cosine: F_ij is the share of i's rays that meet j first.
-    #[default]
-    CosineRays,
-    /// Lines spread evenly through the whole scene (Sbert, "An integral geometry based method for fast form-factor computation", 1993):
-    /// two surfaces that follow each other along a line and face each other exchange along it, both ways.
-    GlobalLines,
-}
 
 /// The symmetric matrix of exchange areas, row by row, sparse.
 #[derive(Clone, Debug, Default)]
@@ -214,6 +203,8 @@ pub(crate) struct Cast {
     /// How many they were.
     pub count: [u32; 2],
 }
+
+fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: [u32; 2] });
 
 /// The same, of one half or of both together.
 #[derive(Clone, Debug, Default)]

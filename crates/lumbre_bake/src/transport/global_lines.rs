@@ -12,11 +12,11 @@ use super::cosine_rays::{self, LEAST_RAYS};
 use super::form_factors::{Cast, counted};
 use super::patches::Patches;
 use crate::BakeError;
+use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_direction, frame, sphere_direction};
 use crate::scene::BakeScene;
 use crate::scene::crossings::Face;
-use crate::texels::chunks::{in_chunks, in_chunks_in_time};
 
 /// Lines of one value of the list that is computed in chunks.
 const BATCH: u32 = 64;

@@ -8,9 +8,10 @@ use glam::Vec3;
 
 use super::direct::Sources;
 use super::exchange::patch_direct;
-use super::form_factors::{FormFactorMethod, FormFactors};
+use super::form_factors::FormFactors;
 use super::patches::Patches;
-use super::solver::{Solver, gather};
+use super::solver::gather;
+use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
 use crate::sampling::Sequence;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};

@@ -2,22 +2,10 @@
 //! Not the form factors, and not the colours: channels do not mix.
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::components::levels;
 use super::form_factors::FormFactors;
-
-/// An iterative method for the radiosity system. They agree; they differ in iterations.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Solver {
-    /// B ← E + ρ F B: one bounce more per iteration.
-    Jacobi,
-    /// The same, each patch reading what was found before it in the same sweep.
-    GaussSeidel,
-    /// On the symmetric positive definite form [diag(A_i/ρ_i) - G] B = A_i E_i/ρ_i, with its diagonal as preconditioner.
-    #[default]
-    ConjugateGradients,
-}
+use crate::options::Solver;
 
 /// A solution and how it was come by.
 #[derive(Clone, Debug, Default, PartialEq)]

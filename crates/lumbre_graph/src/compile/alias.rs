@@ -1,10 +1,10 @@
 //! Lifetimes, memory, and whether attachments are stored. Transients of one shape whose lifetimes do not overlap take
 //! turns in one slot. Time is counted in steps: passes merged into one render pass are alive together.
 
-use crate::compile::CompileOptions;
 use crate::compile::cull::Needs;
 use crate::compile::flow::{Flow, Need};
 use crate::compile::merge::live;
+use crate::plan::CompileOptions;
 use crate::plan::{Memory, ResourcePlan, Slot, Step};
 use crate::resource::{Origin, Shape};
 

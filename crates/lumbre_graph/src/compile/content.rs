@@ -2,17 +2,13 @@
 //! holds, made of the fingerprint of the pass that wrote it and of the numbers of what that pass took in. Content that
 //! depends on anything without a number has none.
 
-use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::access::Part;
 use crate::compile::flow::{Flow, Need};
-use crate::compile::history::History;
-use crate::declare::declaration::AccessDeclaration;
+use crate::declaration::AccessDeclaration;
+use crate::history::{Content, History};
 use crate::resource::Origin;
-
-/// What each part of a resource holds. The key `None` is what the parts that are not listed hold.
-pub(super) type Content = BTreeMap<Option<Part>, Option<u64>>;
 
 /// What each version of each resource holds.
 pub(super) struct Contents {

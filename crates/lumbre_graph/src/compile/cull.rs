@@ -3,7 +3,7 @@
 
 use crate::compile::flow::{Flow, Need};
 use crate::compile::retain::Retention;
-use crate::declare::declaration::Declarations;
+use crate::declaration::Declarations;
 use crate::error::GraphResult;
 use crate::resource::Origin;
 

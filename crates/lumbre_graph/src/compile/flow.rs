@@ -1,9 +1,9 @@
 //! What each version holds, now that it is known which passes are skipped, and what each access needs of it.
 
 use crate::access::{Access, LoadOp};
-use crate::compile::History;
-use crate::declare::declaration::{AccessDeclaration, Declarations};
+use crate::declaration::{AccessDeclaration, Declarations};
 use crate::error::{GraphError, GraphResult};
+use crate::history::History;
 use crate::resource::{Origin, Shape};
 
 /// What an access needs to be there beforehand.

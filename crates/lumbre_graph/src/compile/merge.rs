@@ -4,7 +4,7 @@
 use crate::access::{Access, LoadOp};
 use crate::compile::cull::Needs;
 use crate::compile::flow::{Flow, Need};
-use crate::declare::declaration::{AccessDeclaration, PassKind};
+use crate::declaration::{AccessDeclaration, PassKind};
 use crate::plan::{ColorTarget, DepthTarget, Step, Target};
 
 /// The steps of the passes that run, in order. Whether attachments are stored is left for later.

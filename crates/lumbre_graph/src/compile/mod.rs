@@ -11,7 +11,6 @@ mod alias;
 mod content;
 mod cull;
 mod flow;
-mod history;
 mod merge;
 mod names;
 mod order;
@@ -19,29 +18,10 @@ mod retain;
 mod shapes;
 mod usage;
 
-pub use history::History;
-pub(crate) use history::serves;
-
-use crate::declare::declaration::{Declarations, PassDeclaration};
+use crate::declaration::{Declarations, PassDeclaration};
 use crate::error::GraphResult;
-use crate::plan::{Plan, Status};
-
-/// Choices of how to compile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CompileOptions {
-    /// Make one wgpu pass of raster passes in a row that draw into the same attachments. Off, each has its own, and
-    /// so its own time where timestamps can not be taken inside passes.
-    pub merge: bool,
-    /// Keep all that is drawn so that [`FiniteProbe`](crate::FiniteProbe) can look at it after each pass. Merges
-    /// nothing.
-    pub probe: bool,
-}
-
-impl Default for CompileOptions {
-    fn default() -> Self {
-        Self { merge: true, probe: false }
-    }
-}
+use crate::history::History;
+use crate::plan::{CompileOptions, Plan, Status};
 
 /// Compiles a graph.
 pub(crate) fn compile(

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::declare::declaration::Declarations;
+use crate::declaration::Declarations;
 use crate::error::{GraphError, GraphResult};
 use crate::resource::Name;
 use crate::site::Site;

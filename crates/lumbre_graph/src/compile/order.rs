@@ -6,7 +6,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::declare::declaration::Declarations;
+use crate::declaration::Declarations;
 use crate::error::{CycleStep, GraphError, GraphResult};
 use crate::nearest::nearest;
 

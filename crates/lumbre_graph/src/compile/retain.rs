@@ -6,9 +6,9 @@
 //! them is drawn again without the others. Content without a number is never unchanged: this errs towards running.
 
 use crate::access::Part;
-use crate::compile::content::{Content, Contents};
+use crate::compile::content::Contents;
 use crate::compile::flow::Flow;
-use crate::compile::history::{History, Retained};
+use crate::history::{Content, History, Retained};
 use crate::resource::{Origin, Shape};
 
 /// What is unchanged, and the numbers.

@@ -1,7 +1,7 @@
 //! Checks each resource's shape, and that each access fits it: format, size, samples, parts, usage.
 
 use crate::access::Access;
-use crate::declare::declaration::{AccessDeclaration, Declarations, PassDeclaration, PassKind};
+use crate::declaration::{AccessDeclaration, Declarations, PassDeclaration, PassKind};
 use crate::error::{GraphError, GraphResult};
 use crate::resource::{Origin, ResourceDeclaration, Shape, TextureDescriptor};
 

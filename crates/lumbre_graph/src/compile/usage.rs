@@ -1,8 +1,8 @@
 //! Infers the GPU usages of each resource from the accesses of all passes, skipped and culled ones too: so the usages,
 //! and with them the GPU objects, stay the same while the scene's content comes and goes.
 
-use crate::compile::CompileOptions;
-use crate::declare::declaration::Declarations;
+use crate::declaration::Declarations;
+use crate::plan::CompileOptions;
 use crate::resource::{Origin, Shape};
 
 /// The shape of each resource with all usages it needs.
@@ -24,7 +24,7 @@ pub(super) fn infer(declarations: &Declarations, options: CompileOptions) -> Vec
         for (shape, resource) in shapes.iter_mut().zip(&declarations.resources) {
             if let Shape::Texture(texture) = shape
                 && resource.origin != Origin::Imported
-                && crate::run::probe::can_probe(texture)
+                && texture.can_be_probed()
             {
                 texture.usage |= wgpu::TextureUsages::TEXTURE_BINDING;
             }

@@ -2,12 +2,14 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::compile::{self, CompileOptions, History};
-use crate::declare::declaration::{Declarations, PassDeclaration};
+use crate::compile;
+use crate::declaration::{Declarations, PassDeclaration};
 use crate::declare::kind::{Compute, PassType, Raster, ResourceKind, Transfer};
 use crate::declare::pass::PassBuilder;
 use crate::error::{GraphError, GraphResult};
 use crate::handle::{BufferHandle, Handle, TextureHandle};
+use crate::history::History;
+use crate::plan::CompileOptions;
 use crate::plan::Plan;
 use crate::resource::{BufferDescriptor, Name, Origin, ResourceDeclaration, Shape, TextureDescriptor};
 use crate::run::context::Body;

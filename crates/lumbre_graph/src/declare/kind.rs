@@ -1,7 +1,7 @@
 //! Marks at type level: which accesses a resource has, and which methods a pass has. No data.
 
 use crate::access::{Access, BufferRead, BufferWrite, TextureRead, TextureWrite};
-use crate::declare::declaration::PassKind;
+use crate::declaration::PassKind;
 use crate::handle::{Buffer, Texture};
 
 mod sealed {

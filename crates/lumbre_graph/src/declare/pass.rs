@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use crate::access::{Access, LoadOp, Part, TextureRead};
-use crate::declare::declaration::{AccessDeclaration, PassDeclaration};
+use crate::declaration::{AccessDeclaration, PassDeclaration};
 use crate::declare::graph::Graph;
 use crate::declare::kind::{AnyAccess, Compute, PassType, Raster, ResourceKind, Transfer};
 use crate::error::GraphError;

@@ -4,9 +4,9 @@
 mod dot;
 mod text;
 
-use crate::declare::declaration::{AccessDeclaration, PassKind};
+use crate::declaration::{AccessDeclaration, PassKind};
 use crate::plan::{Memory, Plan, Status};
-use crate::resource::{Origin, Shape};
+use crate::resource::{Origin, Shape, flags};
 
 /// A plan, explained.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -80,6 +80,14 @@ pub struct ResourceExplanation {
     pub slot: Option<usize>,
     /// First and last group that use it.
     pub lifetime: Option<[usize; 2]>,
+}
+
+impl Plan {
+    /// The plan as data for people and programs.
+    #[must_use]
+    pub fn explain(&self) -> Explanation {
+        Explanation::of(self)
+    }
 }
 
 impl Explanation {
@@ -187,14 +195,5 @@ fn describe_shape(shape: &Shape) -> String {
             text
         }
         Shape::Buffer(_) => "buffer".into(),
-    }
-}
-
-/// `TextureUsages(COPY_SRC | COPY_DST)` without the type's name.
-pub(crate) fn flags(usage: &impl std::fmt::Debug) -> String {
-    let text = format!("{usage:?}");
-    match text.split_once('(') {
-        Some((_, inner)) => inner.trim_end_matches(')').into(),
-        None => text,
     }
 }

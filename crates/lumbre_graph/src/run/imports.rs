@@ -1,8 +1,8 @@
 //! What the caller binds to a graph's imported resources, and the check that it is what was declared.
 
-use crate::declare::declaration::Declarations;
-use crate::explain::flags;
+use crate::declaration::Declarations;
 use crate::nearest::nearest;
+use crate::resource::flags;
 use crate::resource::{Name, Shape, TextureDescriptor};
 use crate::run::error::RunError;
 use crate::run::pool::{GpuObject, GpuTexture};

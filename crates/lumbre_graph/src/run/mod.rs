@@ -2,7 +2,6 @@
 
 pub(crate) mod context;
 pub(crate) mod error;
-pub(crate) mod executor;
 pub(crate) mod imports;
 pub(crate) mod measure;
 pub(crate) mod pool;

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 
 use crate::access::Part;
-use crate::compile::serves;
 use crate::resource::{Name, Shape, TextureDescriptor};
 use crate::run::error::RunError;
 
@@ -102,7 +101,7 @@ impl Pool {
         shape: &Shape,
         frame: u64,
     ) -> Result<&mut GpuObject, RunError> {
-        let free = |entry: &Entry| entry.used_in != frame && serves(&entry.shape, shape);
+        let free = |entry: &Entry| entry.used_in != frame && entry.shape.serves(shape);
         let index = match self.transients.iter().position(free) {
             Some(index) => index,
             None => {
@@ -124,7 +123,7 @@ impl Pool {
         shape: &Shape,
         frame: u64,
     ) -> Result<(&mut GpuObject, bool), RunError> {
-        let fresh = !self.retained.get(name).is_some_and(|entry| serves(&entry.shape, shape));
+        let fresh = !self.retained.get(name).is_some_and(|entry| entry.shape.serves(shape));
         if fresh {
             let object = self.create(device, name, shape)?;
             self.retained.insert(name.clone(), Entry { shape: *shape, object, used_in: frame });

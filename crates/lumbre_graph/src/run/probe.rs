@@ -3,7 +3,7 @@
 //! (normalized, integer, depth, shared exponent) are not looked at.
 
 use crate::access::Part;
-use crate::resource::{Name, TextureDescriptor};
+use crate::resource::Name;
 use crate::run::report::NonFinite;
 
 /// Bytes from one result to the next: the largest alignment that a device may ask of a storage buffer's offset.
@@ -23,22 +23,6 @@ pub(crate) struct Probed {
     pub part: Part,
     /// In texels, to make a column and a row of the index.
     pub width: u32,
-}
-
-/// Whether a texture of this shape can hold NaN or Inf where the probe can see it.
-pub(crate) fn can_probe(texture: &TextureDescriptor) -> bool {
-    use wgpu::TextureFormat as Format;
-    let float = matches!(
-        texture.format,
-        Format::R16Float
-            | Format::Rg16Float
-            | Format::Rgba16Float
-            | Format::R32Float
-            | Format::Rg32Float
-            | Format::Rgba32Float
-            | Format::Rg11b10Ufloat
-    );
-    float && texture.dimension == wgpu::TextureDimension::D2
 }
 
 /// The find of the earliest look that has one.

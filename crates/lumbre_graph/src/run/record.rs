@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::access::Part;
-use crate::declare::declaration::{AccessDeclaration, PassKind};
+use crate::declaration::{AccessDeclaration, PassKind};
 use crate::handle::{BufferHandle, Handle, TextureHandle};
 use crate::plan::{Plan, Step, Target};
 use crate::resource::{Origin, Shape};
@@ -11,7 +11,7 @@ use crate::run::context::{Body, ComputeContext, PassResources, RasterContext, Tr
 use crate::run::error::RunError;
 use crate::run::measure::{FrameQueries, Scope};
 use crate::run::pool::{GpuObject, GpuTexture};
-use crate::run::probe::{FiniteProbe, Probed, can_probe};
+use crate::run::probe::{FiniteProbe, Probed};
 use crate::run::report::{GpuTime, PassReport};
 
 /// The GPU objects behind the resources of one frame.
@@ -135,7 +135,7 @@ pub(crate) fn looks(plan: &Plan, step: &Step) -> Vec<(usize, Part)> {
             };
             // Whether an imported texture may be looked at is its maker's word: what the passes need of it is no answer.
             let bindable = described.usage.contains(wgpu::TextureUsages::TEXTURE_BINDING);
-            if !can_probe(&texture) || planned.lifetime.is_none() || (imported && !bindable) {
+            if !texture.can_be_probed() || planned.lifetime.is_none() || (imported && !bindable) {
                 continue;
             }
             match declared.touched_part() {

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{GridVertex, MAX_SEGMENTS};
 use crate::TriangleMesh;
+use crate::grid::{GridVertex, MAX_SEGMENTS};
 
 /// A rectangle in the xz plane that faces +y: `width` along x, `depth` along z, in metres, in `columns` by `rows`
 /// quads (1 to [`MAX_SEGMENTS`]).

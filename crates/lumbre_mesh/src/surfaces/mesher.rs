@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{ParametricSurface, SurfaceError};
 use crate::TriangleMesh;
-use crate::shapes::{GridVertex, MAX_SEGMENTS};
+use crate::grid::{GridVertex, MAX_SEGMENTS};
 
 /// A mesh of a parametric surface in `columns` cells along u and `rows` along v, two triangles each, with the surface's own normals
 /// and with (u, v) as texture coordinates: u to the right, v upwards.

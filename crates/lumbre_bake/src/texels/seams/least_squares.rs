@@ -12,7 +12,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::samples::{Reading, Sample};
-use super::{Maps, NO_CHART, SeamReport};
+use super::{Maps, NO_CHART};
+use crate::report::SeamReport;
 use crate::stop::Stop;
 
 /// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.

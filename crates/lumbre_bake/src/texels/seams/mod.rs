@@ -16,26 +16,11 @@ mod least_squares;
 mod samples;
 
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use super::footprint::Texel;
+use crate::report::SeamReport;
 use crate::scene::{BakeScene, LightmapLayout};
 use least_squares::Unknowns;
-
-/// What closing the seams did. Relative to the mean irradiance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SeamReport {
-    /// Pairs of edges that lie in one place, join smoothly and have lightmap coordinates of their own.
-    pub edges: usize,
-    /// RMS difference between the two sides along them, before.
-    pub jump_before: f64,
-    /// And after.
-    pub jump_after: f64,
-    /// Mean change of the texels beside seams.
-    pub mean_change: f64,
-    /// Largest change of a texel's channel.
-    pub largest_change: f64,
-}
 
 /// The maps as they are before the seams are closed.
 pub(crate) struct Maps<'a> {

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::compile::{CompileOptions, History};
 use crate::declare::graph::Graph;
 use crate::error::GraphResult;
+use crate::history::History;
+use crate::plan::CompileOptions;
 use crate::plan::Plan;
 use crate::resource::Origin;
 use crate::run::error::RunError;

@@ -1,4 +1,6 @@
-//! The plan of the house, kept: crates depend downwards only, and of wgpu, winit and glam one each is built.
+//! The plan of the house, kept: crates depend downwards only, modules of a crate too, and of wgpu, winit and glam one each is built.
+
+mod module_circles;
 
 use std::collections::BTreeSet;
 

@@ -2,8 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::compile::content::Content;
+use crate::access::Part;
 use crate::resource::{Name, Shape};
+
+/// What each part of a resource holds, as numbers: equal numbers, equal content. The key `None` is what the parts that are not listed hold.
+pub(crate) type Content = BTreeMap<Option<Part>, Option<u64>>;
 
 /// What one retained resource holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,16 +26,6 @@ pub struct History {
 impl History {
     /// The record of a resource, if what it holds can serve a resource of `shape`.
     pub(crate) fn find(&self, name: &Name, shape: &Shape) -> Option<&Retained> {
-        self.retained.get(name).filter(|kept| serves(&kept.shape, shape))
+        self.retained.get(name).filter(|kept| kept.shape.serves(shape))
     }
-}
-
-/// Whether a resource made as `made` can be used as `asked`: all the same, and at least the usages.
-pub(crate) fn serves(made: &Shape, asked: &Shape) -> bool {
-    let usages = match (made, asked) {
-        (Shape::Texture(made), Shape::Texture(asked)) => made.usage.contains(asked.usage),
-        (Shape::Buffer(made), Shape::Buffer(asked)) => made.usage.contains(asked.usage),
-        _ => false,
-    };
-    usages && made.without_usage() == asked.without_usage()
 }
