@@ -61,7 +61,7 @@ pub(crate) fn apply(
                 (Lightmap { image }, LightmapError(own.map(error).collect()))
             }
         };
-        for ((part, mesh), &moved) in object.parts.iter().zip(&map.meshes).zip(&map.moved) {
+        for ((part, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
             let Ok(mut entity) = world.get_entity_mut(part.entity) else { continue };
             let made = match pages.places[index] {
                 Some(_) => pages.on_page(layout, index, mesh),
@@ -88,7 +88,8 @@ pub(crate) fn apply(
 
 /// Takes away the lightmaps of an earlier bake from everything but `objects`: their light would count twice.
 pub(crate) fn forget_lightmaps(world: &mut World, objects: &[Object]) {
-    let kept: HashSet<_> = objects.iter().flat_map(|object| &object.parts).map(|part| part.entity).collect();
+    let kept: HashSet<_> =
+        objects.iter().flat_map(|object| &object.primitives).map(|part| part.entity).collect();
     let mut mapped = world.query_filtered::<Entity, With<Lightmap>>();
     let stale: Vec<Entity> = mapped.iter(world).filter(|entity| !kept.contains(entity)).collect();
     for entity in stale {

@@ -21,7 +21,7 @@ use crate::texels::divided_light::DividedLight;
 use crate::texels::error_estimate::variances;
 use crate::texels::fill::fill;
 use crate::texels::footprint::{Texel, footprints};
-use crate::texels::gather::{Outgoing, SCRAMBLES};
+use crate::texels::gather::{REPLICATES, RadianceCache};
 use crate::texels::hidden::remove_hidden;
 use crate::texels::resolution_error::{DensePoint, Light, compare};
 use crate::texels::rounds::{Bounced, Receivers};
@@ -134,8 +134,9 @@ fn run(
     let wanted = WantedProbes::of(world, &objects);
     let hashes = watch.during(0.0, || hashes_of(&objects, &placed, sky, &wanted, options))?;
     report.content_hash = hashes.content.to_string();
-    let points =
-        || objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+    let points = || {
+        objects.iter().flat_map(|o| &o.primitives).flat_map(|part| world_points(&part.transform, &part.mesh))
+    };
     let mut space = Canonical::of(points());
     let usable = match former {
         Former::Samples(samples) => Some(Usable::new(samples, &hashes, &objects, space, options)),
@@ -230,7 +231,7 @@ fn run(
     let (indirect, volume, points) = match &exchange {
         None => {
             let volume = probes::bake(&wanted, &scene, &sources, None, options, &mut watch, &mut report)?;
-            let light = Light { scene: &scene, sources: &sources, outgoing: None };
+            let light = Light { scene: &scene, sources: &sources, cache: None };
             (None, volume, dense_points(&light, options, &mut watch, &mut report)?)
         }
         Some(exchange) => {
@@ -246,7 +247,7 @@ fn run(
                 total[texel.index as usize] = direct.total();
             }
             divided.places().for_each(|index| total[index] = Vec3::NAN);
-            let outgoing = Outgoing {
+            let cache = RadianceCache {
                 scene: &scene,
                 layout: &layout,
                 patches: &exchange.patches,
@@ -258,7 +259,7 @@ fn run(
                 patch_error: &exchange.indirect_error,
                 near: exchange.near,
                 guide: &exchange.guide,
-                run: options.effort().gather[0] / SCRAMBLES as u32,
+                run: options.effort().gather[0] / REPLICATES as u32,
             };
             let leaked_before = scene.leaks.count();
             if let Some(change) = &change {
@@ -271,11 +272,11 @@ fn run(
                 local: &local,
                 kept: kept.as_ref(),
             };
-            let gathered = rounds::gather(&outgoing, receivers, options, &mut watch, &mut report)?;
+            let gathered = rounds::gather(&cache, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
             let volume =
-                probes::bake(&wanted, &scene, &sources, Some(&outgoing), options, &mut watch, &mut report)?;
-            let light = Light { scene: &scene, sources: &sources, outgoing: Some(&outgoing) };
+                probes::bake(&wanted, &scene, &sources, Some(&cache), options, &mut watch, &mut report)?;
+            let light = Light { scene: &scene, sources: &sources, cache: Some(&cache) };
             let points = dense_points(&light, options, &mut watch, &mut report)?;
             (Some(gathered), volume, points)
         }

@@ -13,7 +13,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
 
-use crate::scene::{Object, Part, PlacedLight, WantedProbes, collect, lights, sky};
+use crate::scene::{Object, PlacedLight, PlacedPrimitive, WantedProbes, collect, lights, sky};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
@@ -112,7 +112,7 @@ pub(crate) fn hashes_of(
     }
     // Objects that share their meshes share their unwrap.
     let mut numbers: HashMap<*const TriangleMesh, u64> = HashMap::new();
-    for part in objects.iter().flat_map(|object| &object.parts) {
+    for part in objects.iter().flat_map(|object| &object.primitives) {
         let next = numbers.len() as u64;
         hasher.number(*numbers.entry(Arc::as_ptr(&part.mesh)).or_insert(next));
     }
@@ -134,11 +134,11 @@ pub(crate) fn hashes_of(
 fn object_hash(object: &Object, images: &mut Images) -> ContentHash {
     let mut hasher = Hasher::new("object");
     // The map is named after the object.
-    let Object { name, parts } = object;
+    let Object { name, primitives } = object;
     hasher.bytes(name.as_bytes());
-    hasher.number(parts.len() as u64);
-    for part in parts {
-        let Part { entity: _, mesh, material, textures, transform } = part;
+    hasher.number(primitives.len() as u64);
+    for primitive in primitives {
+        let PlacedPrimitive { entity: _, mesh, material, textures, transform } = primitive;
         hasher.mesh(mesh);
         hasher.material(material);
         hasher.textures(textures.as_ref().unwrap_or(&MaterialTextures::default()), images);

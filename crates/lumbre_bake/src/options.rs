@@ -84,7 +84,7 @@ pub struct BakeOptions {
     /// Lets the maps of several objects share atlases of at most so many texels a side, in [16, 8192]; each object has a map of
     /// its own without it. Copies of an object then have meshes of their own, with their places in the atlas.
     pub atlas_size: Option<u32>,
-    /// Scrambles every sample sequence. The same seed gives the same bits on any number of threads.
+    /// Replicates every sample sequence. The same seed gives the same bits on any number of threads.
     pub seed: u32,
     /// Worker threads; as many as the machine has if absent.
     pub threads: Option<usize>,

@@ -9,7 +9,7 @@ use lumbre_scene::AmbientCube;
 use super::ProbeEffort;
 use crate::sampling::{Sequence, sphere_direction};
 use crate::scene::{BakeScene, SurfaceHit};
-use crate::texels::gather::{Outgoing, SCRAMBLES};
+use crate::texels::gather::{REPLICATES, RadianceCache};
 use crate::transport::direct::{Direct, Receiver, Sources};
 
 /// Normals of the sides, in the order of [`AmbientCube`].
@@ -30,13 +30,13 @@ pub(crate) struct ProbeLight<'a> {
     /// Emissive faces.
     pub emitters: &'a Sources<'a>,
     /// What surfaces reflect; `None` where nothing bounces.
-    pub outgoing: Option<&'a Outgoing<'a>>,
+    pub cache: Option<&'a RadianceCache<'a>>,
     pub effort: ProbeEffort,
 }
 
 /// What a probe sees.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Seen {
+pub(crate) struct ProbeSample {
     /// E/π.
     pub cube: AmbientCube,
     /// Variance that sampling leaves, mean of the sides and channels.
@@ -48,26 +48,26 @@ pub(crate) struct Seen {
 
 impl ProbeLight<'_> {
     /// The light at a point, canonical units.
-    pub fn at(&self, position: Vec3, seed: u32, index: u32) -> Seen {
-        let mut runs = [[Vec3::ZERO; 6]; SCRAMBLES];
-        let mut seen = Seen::default();
+    pub fn at(&self, position: Vec3, seed: u32, index: u32) -> ProbeSample {
+        let mut runs = [[Vec3::ZERO; 6]; REPLICATES];
+        let mut seen = ProbeSample::default();
         let mut backs = 0u32;
-        for (scramble, run) in runs.iter_mut().enumerate() {
-            let sequence = Sequence::new(seed, PURPOSE + scramble as u32, index);
+        for (replicate, run) in runs.iter_mut().enumerate() {
+            let sequence = Sequence::new(seed, PURPOSE + replicate as u32, index);
             backs += self.bounces(position, sequence, run);
             seen.rays += u64::from(self.effort.sphere);
         }
-        let all = self.effort.sphere * SCRAMBLES as u32;
+        let all = self.effort.sphere * REPLICATES as u32;
         seen.inside = backs as f32 >= INSIDE * all as f32;
         if seen.inside {
             return seen;
         }
-        let count = SCRAMBLES as f32;
+        let count = REPLICATES as f32;
         for (side, (light, normal)) in seen.cube.0.iter_mut().zip(SIDES).enumerate() {
             *light = runs.iter().map(|run| run[side]).sum::<Vec3>() / count;
             let squares: Vec3 = runs.iter().map(|run| (run[side] - *light).powf(2.0)).sum();
             let of_mean = squares / (count * (count - 1.0));
-            let sequence = Sequence::new(seed, PURPOSE + (SCRAMBLES + side) as u32, index);
+            let sequence = Sequence::new(seed, PURPOSE + (REPLICATES + side) as u32, index);
             let direct = self.shining(position, normal, sequence);
             *light += direct.baked / PI;
             seen.rays += u64::from(direct.rays);
@@ -99,9 +99,9 @@ impl ProbeLight<'_> {
             let direction = sphere_direction(u, v);
             let leaves = match self.scene.first_hit(position, direction) {
                 SurfaceHit::Lit { triangle, side, at, .. } => {
-                    self.outgoing.map_or(Vec3::ZERO, |outgoing| outgoing.leaving(triangle, side, at))
+                    self.cache.map_or(Vec3::ZERO, |cache| cache.leaving(triangle, side, at))
                 }
-                SurfaceHit::None => self.outgoing.map_or(Vec3::ZERO, |outgoing| outgoing.sky),
+                SurfaceHit::None => self.cache.map_or(Vec3::ZERO, |cache| cache.sky),
                 SurfaceHit::Back | SurfaceHit::Inside => {
                     backs += 1;
                     Vec3::ZERO
@@ -123,7 +123,7 @@ impl ProbeLight<'_> {
 }
 
 /// Root mean square of the probes' standard errors over their mean.
-pub(crate) fn relative_error(seen: &[Seen]) -> f64 {
+pub(crate) fn relative_error(seen: &[ProbeSample]) -> f64 {
     let (mut variance, mut sum, mut count) = (0.0, 0.0, 0u32);
     for seen in seen.iter().filter(|seen| !seen.inside) {
         variance += f64::from(seen.variance);

@@ -14,13 +14,13 @@ mod light;
 
 use lumbre_scene::{AmbientCube, IrradianceVolume};
 
-pub(crate) use light::Seen;
+pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
 use crate::chunks::in_chunks_anew;
 use crate::progress::Watch;
 use crate::scene::{BakeScene, WantedProbes};
-use crate::texels::gather::Outgoing;
+use crate::texels::gather::RadianceCache;
 use crate::transport::direct::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
 
@@ -35,7 +35,7 @@ pub(crate) fn bake(
     wanted: &WantedProbes,
     scene: &BakeScene,
     sources: &Sources<'_>,
-    outgoing: Option<&Outgoing<'_>>,
+    cache: Option<&RadianceCache<'_>>,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
@@ -49,7 +49,7 @@ pub(crate) fn bake(
         wanted.real_time.get(surface as usize).copied().unwrap_or(false)
     };
     let emitters = sources.only_emitters(|emitter| !real_time(emitter.triangle));
-    if emitters.is_empty() && outgoing.is_none() {
+    if emitters.is_empty() && cache.is_none() {
         report
             .skipped
             .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
@@ -57,8 +57,8 @@ pub(crate) fn bake(
     }
     watch.stage("probes", report)?;
     let grid = Grid::new(scene, &wanted.moving, options.probe_spacing, &mut report.warnings);
-    let light = light::ProbeLight { scene, emitters: &emitters, outgoing, effort: effort(options.quality) };
-    let seen: Vec<Seen> = in_chunks_anew(grid.count(), watch, |index| {
+    let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(options.quality) };
+    let seen: Vec<ProbeSample> = in_chunks_anew(grid.count(), watch, |index| {
         light.at(grid.position(index), options.seed, index as u32)
     })?;
     report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();
@@ -82,7 +82,7 @@ pub(crate) fn bake(
     Ok(Some(PlacedVolume { volume, grid }))
 }
 
-/// Rays of a probe over the sphere for each of four scrambles, and to the emitters for each of its sides.
+/// Rays of a probe over the sphere for each of four replicates, and to the emitters for each of its sides.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProbeEffort {
     sphere: u32,

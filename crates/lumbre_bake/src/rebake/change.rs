@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::changes::{ChangedBox, Changes};
 use super::choice;
 use super::estimate::{Estimate, Range, cap, in_cap};
-use super::relit::Ways;
+use super::relit::ShadowVolumes;
 use crate::chunks::in_chunks;
 use crate::progress::Watch;
 use crate::sampling::{Sequence, cosine_about, triangle_point};
@@ -52,7 +52,7 @@ pub(crate) struct Change<'a> {
     sky: Vec3,
     /// The changed boxes as spheres: centre, radius.
     cones: Vec<(Vec3, f32)>,
-    ways: Ways,
+    shadow_volumes: ShadowVolumes,
 }
 
 /// What leaves the patches now, and the change of what they receive by bounces, if it is known yet.
@@ -91,7 +91,7 @@ impl<'a> Change<'a> {
             direct: change,
             sky: sources.sky,
             cones: changes.boxes.iter().map(|b| (b.center(), b.radius())).collect(),
-            ways: Ways::new(sources, &changes.boxes),
+            shadow_volumes: ShadowVolumes::new(sources, &changes.boxes),
         }
     }
 
@@ -170,7 +170,7 @@ impl<'a> Change<'a> {
         let is_unknown = |patch: &Patch| {
             patch.side == Side::Back
                 && patch.reflectance != Vec3::ZERO
-                && (self.changes.lights || self.ways.cross(&patches.corners(self.scene, patch)))
+                && (self.changes.lights || self.shadow_volumes.cross(&patches.corners(self.scene, patch)))
         };
         patches.list.par_iter().map(is_unknown).collect()
     }

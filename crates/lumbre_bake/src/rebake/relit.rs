@@ -52,12 +52,12 @@ const LIFTED: [(f32, f32); 5] = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0),
 const SLACK: f32 = 1e-4;
 
 /// The ways on which a box may stand, or have stood, in the light.
-pub(crate) struct Ways {
+pub(crate) struct ShadowVolumes {
     sources: Vec<Source>,
     boxes: Vec<Sphere>,
 }
 
-impl Ways {
+impl ShadowVolumes {
     pub fn new(sources: &Sources<'_>, boxes: &[ChangedBox]) -> Self {
         let boxes = boxes.iter().map(|b| Sphere { center: b.center(), radius: b.radius() + SLACK });
         Self { sources: spheres(sources), boxes: boxes.collect() }
@@ -81,7 +81,7 @@ pub(crate) fn shadowed(
     boxes: &[ChangedBox],
 ) -> Vec<bool> {
     let scene = sources.scene;
-    let ways = Ways::new(sources, boxes);
+    let volumes = ShadowVolumes::new(sources, boxes);
     let blocks = Blocks::new(texels, charts, BLOCK);
     let reached: Vec<bool> = blocks
         .members
@@ -96,7 +96,7 @@ pub(crate) fn shadowed(
                     shown.extend(lifted.map(|point| receiver(scene, &point).position));
                 }
             }
-            ways.cross(&shown)
+            volumes.cross(&shown)
         })
         .collect();
     blocks.of.iter().map(|&block| reached[block as usize]).collect()

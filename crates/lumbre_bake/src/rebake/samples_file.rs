@@ -21,7 +21,7 @@ use crate::checkpoint::record::{Cursor, fields};
 use crate::checkpoint::{Record, tape};
 use crate::content_hash::ContentHash;
 use crate::scene::Canonical;
-use crate::texels::gather::{Gathered, SCRAMBLES, Weights};
+use crate::texels::gather::{Gathered, REPLICATES, Weights};
 use crate::transport::direct::Direct;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
@@ -52,7 +52,7 @@ pub enum SamplesError {
 
 /// What a texel has gathered, weights apart: those of settled samples follow from the rest.
 struct Settled {
-    sums: [Vec3; SCRAMBLES],
+    sums: [Vec3; REPLICATES],
     patch_errors: Vec2,
     checks: u32,
     differences: Vec3,
@@ -62,7 +62,7 @@ struct Settled {
 }
 
 fields!(Settled {
-    sums: [Vec3; SCRAMBLES],
+    sums: [Vec3; REPLICATES],
     patch_errors: Vec2,
     checks: u32,
     differences: Vec3,

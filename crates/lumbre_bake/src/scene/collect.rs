@@ -17,7 +17,7 @@ use crate::{BakeError, UnwrappedFrom};
 
 /// A mesh with its material: one entity.
 #[derive(Clone, Debug)]
-pub(crate) struct Part {
+pub(crate) struct PlacedPrimitive {
     pub entity: Entity,
     pub mesh: Arc<TriangleMesh>,
     pub material: Material,
@@ -30,7 +30,7 @@ pub(crate) struct Part {
 #[derive(Clone, Debug)]
 pub(crate) struct Object {
     pub name: String,
-    pub parts: Vec<Part>,
+    pub primitives: Vec<PlacedPrimitive>,
 }
 
 /// A point, spot or directional light in its place.
@@ -58,7 +58,7 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
     if world.run_system_once(propagate_transforms).is_err() {
         tracing::warn!("transforms could not be propagated; baking with those found");
     }
-    let mut parts: BTreeMap<Entity, Vec<(usize, Part)>> = BTreeMap::new();
+    let mut parts: BTreeMap<Entity, Vec<(usize, PlacedPrimitive)>> = BTreeMap::new();
     let mut query = world.query_filtered::<(
         Entity,
         &Mesh,
@@ -74,7 +74,7 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
             continue;
         }
         let (mesh, textures) = UnwrappedFrom::read(unwrapped, mesh, textures);
-        let part = Part {
+        let part = PlacedPrimitive {
             entity,
             mesh,
             material: material.clone(),
@@ -95,7 +95,7 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
         for (_, part) in &parts {
             part.mesh.validate().map_err(|source| BakeError::Mesh { object: name.clone(), source })?;
         }
-        objects.push(Object { name, parts: parts.into_iter().map(|(_, part)| part).collect() });
+        objects.push(Object { name, primitives: parts.into_iter().map(|(_, part)| part).collect() });
     }
     Ok(objects)
 }

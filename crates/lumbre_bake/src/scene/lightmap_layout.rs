@@ -114,8 +114,8 @@ pub(crate) fn lay_out_with(
 
 /// Objects that share their meshes and differ by a rotation and translation only share their coordinates.
 fn instance_key(object: &Object, space: Canonical) -> Vec<u64> {
-    let mut key = Vec::with_capacity(object.parts.len() * 7);
-    for part in &object.parts {
+    let mut key = Vec::with_capacity(object.primitives.len() * 7);
+    for part in &object.primitives {
         key.push(Arc::as_ptr(&part.mesh) as usize as u64);
         // A mesh whose second set holds a texture's coordinates in one place may be free in another.
         key.extend(sets_read(part.textures.as_ref()).map(u64::from));
@@ -151,8 +151,8 @@ impl Placed {
     fn new(object: &Object, space: Canonical) -> Self {
         let mut mesh = TriangleMesh::default();
         let has_uv =
-            object.parts.iter().all(|part| !part.mesh.uv1.is_empty() || part.mesh.positions.is_empty());
-        for part in &object.parts {
+            object.primitives.iter().all(|part| !part.mesh.uv1.is_empty() || part.mesh.positions.is_empty());
+        for part in &object.primitives {
             let base = mesh.positions.len() as u32;
             let place = |p: &Vec3| space.position(part.transform.transform_point3(p.as_dvec3()));
             mesh.positions.extend(part.mesh.positions.iter().map(place));
@@ -201,8 +201,8 @@ fn lay_out_object(
         };
         match validate_uv1(&placed.mesh, side, side) {
             Ok(report) if report.is_sound() => {
-                let meshes = object.parts.iter().map(|part| Arc::clone(&part.mesh)).collect();
-                return Ok(Made { meshes, moved: vec![false; object.parts.len()], width: side, height: side });
+                let meshes = object.primitives.iter().map(|part| Arc::clone(&part.mesh)).collect();
+                return Ok(Made { meshes, moved: vec![false; object.primitives.len()], width: side, height: side });
             }
             Ok(report) => warnings.push(format!(
                 "{}: its TEXCOORD_1 cannot hold a lightmap at {side} x {side} texels ({} triangles out of range, {} \
@@ -340,8 +340,8 @@ const MOST_DENSITIES: u32 = 40;
 /// Gives the parts their shares of the unwrapped whole.
 fn split(object: &Object, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {
     let (mut first_vertex, mut first_index) = (0u32, 0usize);
-    let mut meshes = Vec::with_capacity(object.parts.len());
-    for part in &object.parts {
+    let mut meshes = Vec::with_capacity(object.primitives.len());
+    for part in &object.primitives {
         let vertices = part.mesh.positions.len() as u32;
         let own = first_vertex..first_vertex + vertices;
         let mut local = HashMap::new();

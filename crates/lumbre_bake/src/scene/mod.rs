@@ -15,7 +15,9 @@ mod texture_coordinates;
 mod triangles;
 mod wanted_probes;
 
-pub(crate) use collect::{Object, Part, PlacedLight, collect, lights, sky, under_a_dynamic_object};
+pub(crate) use collect::{
+    Object, PlacedLight, PlacedPrimitive, collect, lights, sky, under_a_dynamic_object,
+};
 pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, lay_out_with, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;

@@ -72,7 +72,7 @@ impl BakeScene {
 
     /// As [`first_hit`](Self::first_hit), for rays that tell where they began: what a solid stands on is in one place with the solid's own side,
     /// and from the inside either may be met first. What leaves the scene where it is dark outside began there. Takes up to three times as long.
-    pub fn telling_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
+    pub fn classify_hit(&self, origin: Vec3, direction: Vec3) -> SurfaceHit {
         let hit = self.first_hit(origin, direction);
         let SurfaceHit::Lit { triangle, distance, .. } = hit else {
             return if hit == SurfaceHit::None && self.dark_outside { SurfaceHit::Inside } else { hit };

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_mesh::TriangleMesh;
 use lumbre_scene::MaterialTextures;
 
-use super::{Object, Part};
+use super::{Object, PlacedPrimitive};
 use crate::BakeError;
 
 /// Which of a mesh's two sets of coordinates a material's textures read.
@@ -34,8 +34,8 @@ pub(crate) fn reading_first(textures: &MaterialTextures) -> MaterialTextures {
 /// [`BakeError::CoordinatesInUse`] where both sets are read and differ: a mesh has no third.
 pub(crate) fn free_second(object: &Object) -> Result<(Object, Vec<bool>), BakeError> {
     let mut freed = object.clone();
-    let mut moved = vec![false; object.parts.len()];
-    for (part, moved) in freed.parts.iter_mut().zip(&mut moved) {
+    let mut moved = vec![false; object.primitives.len()];
+    for (part, moved) in freed.primitives.iter_mut().zip(&mut moved) {
         match sets_read(part.textures.as_ref()) {
             [_, false] => {}
             [true, true] if part.mesh.uv0 != part.mesh.uv1 => {
@@ -52,6 +52,6 @@ pub(crate) fn free_second(object: &Object) -> Result<(Object, Vec<bool>), BakeEr
 }
 
 /// A part's textures, which read `uv0` if its `uv1` has moved there.
-pub(crate) fn textures_of(part: &Part, moved: bool) -> Option<MaterialTextures> {
+pub(crate) fn textures_of(part: &PlacedPrimitive, moved: bool) -> Option<MaterialTextures> {
     if moved { part.textures.as_ref().map(reading_first) } else { part.textures.clone() }
 }

@@ -153,7 +153,7 @@ impl BakeScene {
         stop: &Stop,
         warnings: &mut Vec<String>,
     ) -> Result<Self, BakeError> {
-        let count = objects.iter().flat_map(|o| &o.parts).map(|part| part.mesh.triangle_count()).sum();
+        let count = objects.iter().flat_map(|o| &o.primitives).map(|part| part.mesh.triangle_count()).sum();
         if count > MOST_TRIANGLES {
             return Err(BakeError::TooManyTriangles { triangles: count, limit: MOST_TRIANGLES });
         }
@@ -201,7 +201,7 @@ fn extract(
     let map = &layout.maps[index as usize];
     let size = Vec2::new(map.width as f32, map.height as f32);
     let (mut not_finite, mut without_area) = (0, 0);
-    for ((part, mesh), &moved) in object.parts.iter().zip(&map.meshes).zip(&map.moved) {
+    for ((part, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
         let surface = surfaces.len() as u32;
         // A texture brings its factor down; what is above the limit after that is clamped texel by texel.
         let textured = part

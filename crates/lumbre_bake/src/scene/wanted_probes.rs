@@ -34,7 +34,7 @@ impl WantedProbes {
                 moving.extend(world_points(&transform.0, &mesh.0));
             }
         }
-        let parts = objects.iter().flat_map(|object| &object.parts);
+        let parts = objects.iter().flat_map(|object| &object.primitives);
         let real_time = parts.map(|part| world.get::<EmissiveLight>(part.entity).is_some()).collect();
         Self { moving, any, real_time }
     }

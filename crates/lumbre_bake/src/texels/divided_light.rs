@@ -21,7 +21,7 @@ const PURPOSE: u32 = 64;
 
 /// One side of each line through a texel.
 #[derive(Clone, Debug)]
-struct Part {
+struct TexelPart {
     /// A bit for each line that it lies on the left of.
     sides: u32,
     /// The middle of its points.
@@ -36,7 +36,7 @@ struct Divided {
     lines: Vec<[Vec2; 2]>,
     /// There were more.
     full: bool,
-    parts: Vec<Part>,
+    parts: Vec<TexelPart>,
 }
 
 /// All of them.
@@ -94,7 +94,7 @@ impl DividedLight {
         let divided = self.texels.get(&index)?;
         let sides = sides(&divided.lines, offset);
         let own = divided.parts.iter().find(|part| part.sides == sides);
-        let apart = |part: &&Part| part.middle.distance_squared(offset);
+        let apart = |part: &&TexelPart| part.middle.distance_squared(offset);
         // A corner too small for a point of its own.
         let nearest = || divided.parts.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         own.or_else(nearest).map(|part| part.light)
@@ -145,9 +145,9 @@ fn divide(
         });
         rays += u64::from(direct.rays);
         let middle = own.iter().map(|(_, point)| point.offset).sum::<Vec2>() / own.len() as f32;
-        Part { sides: own[0].0, middle, light: direct.total() }
+        TexelPart { sides: own[0].0, middle, light: direct.total() }
     });
-    let parts: Vec<Part> = parts.collect();
+    let parts: Vec<TexelPart> = parts.collect();
     Some((Divided { lines: kept, full, parts }, rays))
 }
 
@@ -165,8 +165,11 @@ mod tests {
         // A wall along x = 0.5, and a corner of another one beyond it that no point of the grid fell into.
         let lines =
             vec![[Vec2::new(0.5, 0.0), Vec2::new(0.5, 1.0)], [Vec2::new(0.9, 1.0), Vec2::new(1.0, 0.9)]];
-        let part =
-            |at: Vec2, light: f32| Part { sides: sides(&lines, at), middle: at, light: Vec3::splat(light) };
+        let part = |at: Vec2, light: f32| TexelPart {
+            sides: sides(&lines, at),
+            middle: at,
+            light: Vec3::splat(light),
+        };
         let parts = vec![part(Vec2::new(0.25, 0.5), 1.0), part(Vec2::new(0.75, 0.5), 8.0)];
         assert_ne!(parts[0].sides, parts[1].sides);
         let divided = Divided { lines, full: false, parts };

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   variance = direct light: spread of interleaved groups of shadow samples
-//!            + final gather: spread of four scrambles, after smoothing
-//!            + smoothing:    half of the scrambles smoothed against the other half raw, over the neighbourhood
+//!            + final gather: spread of four replicates, after smoothing
+//!            + smoothing:    half of the replicates smoothed against the other half raw, over the neighbourhood
 //!            + form factors: half the difference of two half solutions, gathered by the texel's own rays
 //!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
 //!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
@@ -36,22 +36,22 @@ pub(crate) struct GatherErrors<'a> {
     pub neglected: &'a [f32],
 }
 
-/// Steps each way, and texels of a step, over which the spread of the scrambles is put together.
+/// Steps each way, and texels of a step, over which the spread of the replicates is put together.
 const SPREAD_STEPS: usize = 2;
 const SPREAD_STEP: usize = 3;
-/// Squared, by how much of itself the variance of four scrambles is off: 2 / (4 - 1).
+/// Squared, by how much of itself the variance of four replicates is off: 2 / (4 - 1).
 const ALONE: f32 = 2.0 / 3.0;
 
 /// Standard errors of the neighbours' mean: with one, two rooms of which 1 % is asked are within twice what is stated on 94.6 % of their texels
 /// (mean of four seeds), with one and a half on 96.6 %, and with two on 97.9 % for twice the rays.
 const BEYOND: f32 = 1.5;
 
-/// Variance of every texel's mean, mean of the channels. Four scrambles alone tell it badly: in one case of seven the mean is further than
+/// Variance of every texel's mean, mean of the channels. Four replicates alone tell it badly: in one case of seven the mean is further than
 /// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts,
 /// with so many standard errors of the neighbours' mean, since rays end where it is small by chance.
 pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> Vec<f32> {
     let own: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum() / 3.0).collect();
-    // The scrambles of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
+    // The replicates of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
         .par_iter()
         .map(|[a, b, c, d]| {

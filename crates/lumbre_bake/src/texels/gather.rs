@@ -1,20 +1,20 @@
 //! The final gather: rays from every texel read the light that leaves what they meet. Direct light there is that of
 //! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it,
-//! those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `arriving`.
+//! those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
 
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
 
-use super::arriving::{Arriving, Asked, Met, Way};
 use super::footprint::{Texel, receiver};
-pub(crate) use super::outgoing::Outgoing;
+use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
+pub(crate) use super::radiance_cache::RadianceCache;
 use super::tile_sequence::TileSequence;
 use crate::checkpoint::record::fields;
 use crate::scene::material::Side;
 
-/// Independent scrambles per texel: their spread is the texel's error.
-pub(crate) const SCRAMBLES: usize = 4;
+/// Independent replicates per texel: their spread is the texel's error.
+pub(crate) const REPLICATES: usize = 4;
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
 pub(crate) const CHECKED: u32 = 4;
@@ -27,12 +27,12 @@ const BATCH: usize = 16;
 
 /// Samples to follow, and how far they are.
 struct Batch {
-    asked: [Asked; BATCH],
+    requests: [GatherRequest; BATCH],
     /// Which they are.
     numbers: [(usize, u32); BATCH],
     count: usize,
-    ways: [Way; BATCH],
-    found: [Arriving; BATCH],
+    paths: [SamplePath; BATCH],
+    found: [IncidentSample; BATCH],
 }
 
 /// A batch of samples and one of those that check them.
@@ -51,21 +51,21 @@ thread_local! {
 
 impl Batch {
     const NONE: Self = Self {
-        asked: [Asked::NOWHERE; BATCH],
+        requests: [GatherRequest::NOWHERE; BATCH],
         numbers: [(0, 0); BATCH],
         count: 0,
-        ways: [Way::NONE; BATCH],
-        found: [Arriving::NOTHING; BATCH],
+        paths: [SamplePath::NONE; BATCH],
+        found: [IncidentSample::NOTHING; BATCH],
     };
 
-    fn push(&mut self, asked: Asked, first: usize, second: u32) {
-        self.asked[self.count] = asked;
+    fn push(&mut self, request: GatherRequest, first: usize, second: u32) {
+        self.requests[self.count] = request;
         self.numbers[self.count] = (first, second);
         self.count += 1;
     }
 
-    fn follow(&mut self, outgoing: &Outgoing<'_>) {
-        outgoing.arriving(&self.asked[..self.count], &mut self.ways, &mut self.found);
+    fn follow(&mut self, cache: &RadianceCache<'_>) {
+        cache.incident(&self.requests[..self.count], &mut self.paths, &mut self.found);
     }
 }
 
@@ -94,7 +94,7 @@ impl Reading {
     };
 }
 
-/// The weights of a scramble's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
+/// The weights of a replicate's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
 /// gathered (regression; Owen and Zhou, "Safe and Effective Importance Sampling", 2000). Under light that is the same all around nothing
 /// else differs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -121,10 +121,10 @@ impl Weights {
 /// What a texel has gathered: irradiance by bounces.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Gathered {
-    /// Sum of the samples of each scramble.
-    pub sums: [Vec3; SCRAMBLES],
+    /// Sum of the samples of each replicate.
+    pub sums: [Vec3; REPLICATES],
     /// What tells how far their weights alone made them so.
-    pub weights: [Weights; SCRAMBLES],
+    pub weights: [Weights; REPLICATES],
     /// Sum over all samples of what the patches' errors add.
     pub patch_errors: Vec2,
     /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
@@ -133,15 +133,15 @@ pub(crate) struct Gathered {
     pub squared_differences: f32,
     /// Sum over all samples of 1 / distance to what was met, canonical units.
     pub inverse_distances: f32,
-    /// Samples of each scramble.
+    /// Samples of each replicate.
     pub samples: u32,
     /// Rays cast.
     pub rays: u64,
 }
 
 fields!(Gathered {
-    sums: [Vec3; SCRAMBLES],
-    weights: [Weights; SCRAMBLES],
+    sums: [Vec3; REPLICATES],
+    weights: [Weights; REPLICATES],
     patch_errors: Vec2,
     checks: u32,
     differences: Vec3,
@@ -157,23 +157,23 @@ const LEAST_SPREAD: f32 = 1e-4;
 const EXPLAINED: f32 = 0.6;
 
 impl Gathered {
-    /// The estimate of each scramble.
-    pub fn estimates(&self) -> [Vec3; SCRAMBLES] {
+    /// The estimate of each replicate.
+    pub fn estimates(&self) -> [Vec3; REPLICATES] {
         if self.samples == 0 {
-            return [Vec3::ZERO; SCRAMBLES];
+            return [Vec3::ZERO; REPLICATES];
         }
         let count = self.samples as f32;
         std::array::from_fn(|own| {
-            // How light goes with weight is taken from the other scrambles: so the mean stays what it is.
+            // How light goes with weight is taken from the other replicates: so the mean stays what it is.
             let (mut light, mut weights) = (Vec3::ZERO, Weights::default());
-            for other in (0..SCRAMBLES).filter(|&other| other != own) {
+            for other in (0..REPLICATES).filter(|&other| other != own) {
                 light += self.sums[other];
                 weights.sum += self.weights[other].sum;
                 weights.squares += self.weights[other].squares;
                 weights.products += self.weights[other].products;
                 weights.light_squares += self.weights[other].light_squares;
             }
-            let all = count * (SCRAMBLES - 1) as f32;
+            let all = count * (REPLICATES - 1) as f32;
             let spread = weights.squares - weights.sum * weights.sum / all;
             let together = weights.products - light * (weights.sum / all);
             let grey = |light: Vec3| light.element_sum() / 3.0;
@@ -190,17 +190,17 @@ impl Gathered {
     /// Mean of 1 / distance to what light comes from: the irradiance changes over lengths of its inverse (Ward, Rubinstein and Clear,
     /// "A Ray Tracing Solution for Diffuse Interreflection", 1988).
     pub fn inverse_distance(&self) -> f32 {
-        self.inverse_distances / (self.samples.max(1) * SCRAMBLES as u32) as f32
+        self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 
-    /// What the patches' errors add to the mean of the scrambles.
+    /// What the patches' errors add to the mean of the replicates.
     pub fn patch_error(&self) -> f32 {
-        self.patch_errors.length() / (self.samples.max(1) * SCRAMBLES as u32) as f32
+        self.patch_errors.length() / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 }
 
-impl Outgoing<'_> {
-    /// Adds samples `self.samples..samples` of every scramble.
+impl RadianceCache<'_> {
+    /// Adds samples `self.samples..samples` of every replicate.
     pub fn gather(&self, texel: &Texel, gathered: &mut Gathered, samples: u32, seed: u32) {
         BATCHES.with_borrow_mut(|batches| self.gather_with(batches, texel, gathered, samples, seed));
     }
@@ -214,17 +214,17 @@ impl Outgoing<'_> {
         seed: u32,
     ) {
         let from = gathered.samples;
-        let sequences: [TileSequence; SCRAMBLES] =
-            std::array::from_fn(|scramble| TileSequence::new(seed, 16 + scramble as u32, texel, self.run));
+        let sequences: [TileSequence; REPLICATES] =
+            std::array::from_fn(|replicate| TileSequence::new(seed, 16 + replicate as u32, texel, self.run));
         let numbers =
-            (0..SCRAMBLES).flat_map(|scramble| (from..samples).map(move |sample| (scramble, sample)));
+            (0..REPLICATES).flat_map(|replicate| (from..samples).map(move |sample| (replicate, sample)));
         batches.samples.count = 0;
-        for (scramble, sample) in numbers {
-            let [x, y, u, v] = sequences[scramble].first(sample);
+        for (replicate, sample) in numbers {
+            let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
                 let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
-                let asked = Asked { receiver: receiver(self.scene, &point), region, u, v };
-                batches.samples.push(asked, scramble, sample);
+                let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
+                batches.samples.push(request, replicate, sample);
             }
             if batches.samples.count == BATCH {
                 self.gather_batch(texel, &sequences, batches, gathered);
@@ -238,40 +238,40 @@ impl Outgoing<'_> {
     fn gather_batch(
         &self,
         texel: &Texel,
-        sequences: &[TileSequence; SCRAMBLES],
+        sequences: &[TileSequence; REPLICATES],
         Batches { samples, readings, checks }: &mut Batches,
         gathered: &mut Gathered,
     ) {
         samples.follow(self);
         checks.count = 0;
         let numbers = &samples.numbers[..samples.count];
-        for (place, (found, &(scramble, sample))) in samples.found.iter().zip(numbers).enumerate() {
+        for (place, (found, &(replicate, sample))) in samples.found.iter().zip(numbers).enumerate() {
             let reading = &mut readings[place];
             *reading = Reading { light: found.light, weight: found.weight, ..Reading::NONE };
-            let Some(met) = &found.met else { continue };
-            gathered.inverse_distances += found.weight / met.distance.max(f32::MIN_POSITIVE);
-            // In turn over scrambles, samples and texels, so that every neighbourhood has some at any number of samples.
+            let Some(hit) = &found.hit else { continue };
+            gathered.inverse_distances += found.weight / hit.distance.max(f32::MIN_POSITIVE);
+            // In turn over replicates, samples and texels, so that every neighbourhood has some at any number of samples.
             let turn =
-                (sample * SCRAMBLES as u32 + scramble as u32).wrapping_add(texel.index.wrapping_mul(7));
+                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.wrapping_mul(7));
             reading.checked = turn.is_multiple_of(CHECKED);
-            let last = self.read(met, &sequences[scramble], sample, reading);
+            let last = self.read(hit, &sequences[replicate], sample, reading);
             if let Some(last) = last.filter(|_| reading.checked) {
-                let [u, v, ..] = sequences[scramble].point(sample, 1);
+                let [u, v, ..] = sequences[replicate].point(sample, 1);
                 let region = self.guide.regions.at(last.triangle, last.side, last.at);
-                let asked = Asked { receiver: self.receiver_at(&last), region, u, v };
-                checks.push(asked, place, last.patch);
+                let request = GatherRequest { receiver: self.receiver_at(&last), region, u, v };
+                checks.push(request, place, last.patch);
             }
         }
         checks.follow(self);
         for (found, &(place, patch)) in checks.found.iter().zip(&checks.numbers[..checks.count]) {
-            let leaving = |met: &Met| found.weight * met.reflectance * (met.direct + met.indirect);
-            let real = found.met.as_ref().map_or(found.light, leaving);
+            let leaving = |hit: &Hit| found.weight * hit.reflectance * (hit.direct + hit.indirect);
+            let real = found.hit.as_ref().map_or(found.light, leaving);
             readings[place].rays += 1;
             readings[place].difference *= self.patch_indirect[patch as usize] - real;
         }
-        for (reading, &(scramble, _)) in readings.iter().zip(numbers) {
-            gathered.sums[scramble] += reading.light;
-            gathered.weights[scramble].add(reading.weight, reading.light);
+        for (reading, &(replicate, _)) in readings.iter().zip(numbers) {
+            gathered.sums[replicate] += reading.light;
+            gathered.weights[replicate].add(reading.weight, reading.light);
             gathered.rays += 1 + u64::from(reading.rays);
             gathered.patch_errors += reading.error;
             gathered.checks += u32::from(reading.checked);
@@ -283,9 +283,9 @@ impl Outgoing<'_> {
 
     /// The light that leaves a point that was met, emission apart, times a weight. Returns the surface whose patch was read, if one was; the
     /// difference of that to a real bounce is then still to be multiplied by it.
-    fn read(&self, met: &Met, sequence: &TileSequence, sample: u32, reading: &mut Reading) -> Option<Met> {
-        let mut weight = reading.weight * met.reflectance;
-        let (mut light, mut last) = (weight * met.direct, *met);
+    fn read(&self, hit: &Hit, sequence: &TileSequence, sample: u32, reading: &mut Reading) -> Option<Hit> {
+        let mut weight = reading.weight * hit.reflectance;
+        let (mut light, mut last) = (weight * hit.direct, *hit);
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
             if last.distance >= self.near || weight == Vec3::ZERO {
@@ -293,17 +293,17 @@ impl Outgoing<'_> {
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
-            let asked = Asked { receiver: self.receiver_at(&last), region: None, u, v };
-            let mut found = [Arriving::NOTHING];
-            self.arriving(&[asked], &mut [Way::NONE], &mut found);
+            let request = GatherRequest { receiver: self.receiver_at(&last), region: None, u, v };
+            let mut found = [IncidentSample::NOTHING];
+            self.incident(&[request], &mut [SamplePath::NONE], &mut found);
             let [found] = found;
-            let Some(met) = found.met else {
+            let Some(hit) = found.hit else {
                 reading.light = light + weight * found.light;
                 return None;
             };
-            weight *= found.weight * met.reflectance;
-            light += weight * met.direct;
-            last = met;
+            weight *= found.weight * hit.reflectance;
+            light += weight * hit.direct;
+            last = hit;
         }
         reading.light = light + weight * last.indirect;
         reading.error = last.error * (weight.element_sum() / 3.0);

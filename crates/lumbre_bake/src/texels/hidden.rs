@@ -113,7 +113,7 @@ fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
     let Some(point) = texel.point(scene, x, y) else { return Probe::Clear };
     let receiver = receiver(scene, &point);
     let direction = cosine_about(receiver.geometric_normal, u, v);
-    match scene.telling_hit(receiver.origin, direction) {
+    match scene.classify_hit(receiver.origin, direction) {
         SurfaceHit::Inside | SurfaceHit::Back => Probe::Hidden,
         SurfaceHit::Lit { distance, .. } if distance < pressed(scene, texel) => Probe::Pressed,
         SurfaceHit::Lit { .. } | SurfaceHit::None => Probe::Clear,
@@ -197,7 +197,7 @@ fn in_the_open(
     let (mut inside, mut pressed, mut clear) = (0, 0, 0);
     for ray in 0..JUDGES {
         let [u, v, ..] = sequence.point(index * JUDGES + ray, 0);
-        match scene.telling_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
+        match scene.classify_hit(receiver.origin, cosine_about(receiver.geometric_normal, u, v)) {
             SurfaceHit::Inside => inside += 1,
             SurfaceHit::Back => {}
             SurfaceHit::Lit { distance, .. } if distance < at_once => pressed += 1,

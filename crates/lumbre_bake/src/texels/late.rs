@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::footprint::Texel;
-use super::gather::{Gathered, Outgoing, SCRAMBLES};
+use super::gather::{Gathered, REPLICATES, RadianceCache};
 use crate::scene::material::Side;
 
 /// Fewer gathered texels than this say nothing about the others.
@@ -11,16 +11,16 @@ const ENOUGH: u32 = 256;
 
 /// Gives every texel that has gathered nothing the irradiance of its patch. Its error is by as much as patches are off where texels did
 /// gather, relative to the light, and all of it where too few did.
-pub(crate) fn from_patches(outgoing: &Outgoing<'_>, texels: &[Texel], gathered: &mut [Gathered]) {
+pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered: &mut [Gathered]) {
     let of_patch = |texel: &Texel| -> Vec3 {
-        let Some(point) = texel.point(outgoing.scene, 0.5, 0.5) else { return Vec3::ZERO };
-        let patch = outgoing.patches.at(point.triangle, Side::Front, point.at);
-        patch.map_or(Vec3::ZERO, |patch| outgoing.patch_indirect[patch as usize])
+        let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
+        let patch = cache.patches.at(point.triangle, Side::Front, point.at);
+        patch.map_or(Vec3::ZERO, |patch| cache.patch_indirect[patch as usize])
     };
     let grey = |light: Vec3| f64::from(light.element_sum()) / 3.0;
     let (mut apart, mut all, mut count) = (0.0, 0.0, 0u32);
     for (texel, own) in texels.iter().zip(&*gathered).filter(|(_, own)| own.samples > 0) {
-        let mean = own.estimates().iter().copied().sum::<Vec3>() / SCRAMBLES as f32;
+        let mean = own.estimates().iter().copied().sum::<Vec3>() / REPLICATES as f32;
         apart += (grey(mean) - grey(of_patch(texel))).powi(2);
         all += grey(mean).powi(2);
         count += 1;
@@ -31,9 +31,9 @@ pub(crate) fn from_patches(outgoing: &Outgoing<'_>, texels: &[Texel], gathered: 
     {
         let light = of_patch(texel);
         *own = Gathered {
-            sums: [light; SCRAMBLES],
+            sums: [light; REPLICATES],
             samples: 1,
-            patch_errors: Vec2::X * SCRAMBLES as f32 * (off * grey(light)) as f32,
+            patch_errors: Vec2::X * REPLICATES as f32 * (off * grey(light)) as f32,
             ..Gathered::default()
         };
     }

@@ -44,7 +44,7 @@ pub(crate) fn direct_light(
             return Direct::default();
         }
         let sequence = Sequence::new(options.seed, 4, texel.index);
-        sources.own(cuts.of(place), &shafts.between(place, texel), sequence, samples, &|x, y| {
+        sources.own(cuts.of(place), &shafts.visibility(place, texel), sequence, samples, &|x, y| {
             texel.point(scene, x, y).map(|point| receiver(scene, &point))
         })
     };

@@ -2,26 +2,26 @@
 //! that show none. Not the transport between patches that the gather reads.
 
 pub(crate) mod allocation;
-mod arriving;
 pub(crate) mod blocks;
 pub(crate) mod charts;
 pub(crate) mod divided_light;
 pub(crate) mod error_estimate;
 pub(crate) mod fill;
+pub(crate) mod filter_features;
 pub(crate) mod footprint;
 pub(crate) mod gather;
-pub(crate) mod guides;
 pub(crate) mod hidden;
+mod incident;
 pub(crate) mod kept;
 pub(crate) mod lanes;
 pub(crate) mod late;
 mod light_cuts;
-mod light_ways;
+mod light_visibility;
 pub(crate) mod lighting;
 pub(crate) mod local_light;
 pub(crate) mod neighbours;
-pub(crate) mod outgoing;
 pub(crate) mod plane;
+pub(crate) mod radiance_cache;
 pub(crate) mod resolution_error;
 pub(crate) mod rounds;
 pub(crate) mod seams;

@@ -1,15 +1,15 @@
-//! Weighted planes through the values of a neighbourhood, one for each half of the scrambles, of eight texels at once. Not the weights.
+//! Weighted planes through the values of a neighbourhood, one for each half of the replicates, of eight texels at once. Not the weights.
 
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
-use super::gather::SCRAMBLES;
+use super::gather::REPLICATES;
 use super::lanes::{WINDOW, lanes};
 use super::neighbours::OWN;
 
-/// Scrambles of one half: the values of one plane.
-pub(crate) const HALF: usize = SCRAMBLES / 2;
-/// Numbers of a texel: the channels of all scrambles; and of a half.
-pub(crate) const VALUES: usize = 3 * SCRAMBLES;
+/// Replicates of one half: the values of one plane.
+pub(crate) const HALF: usize = REPLICATES / 2;
+/// Numbers of a texel: the channels of all replicates; and of a half.
+pub(crate) const VALUES: usize = 3 * REPLICATES;
 pub(crate) const OF_HALF: usize = 3 * HALF;
 
 /// Weighted sums of planes a + b x + c y through the values of each half.
@@ -60,7 +60,7 @@ impl<S: Simd> Planes<S> {
     #[inline(always)]
     pub fn add_values<const COLUMNS: usize>(
         &mut self,
-        scramble: usize,
+        replicate: usize,
         step: usize,
         y: f32,
         weights: &[f32x8<S>; COLUMNS],
@@ -78,7 +78,7 @@ impl<S: Simd> Planes<S> {
             }
         }
         for channel in 0..3 {
-            let place = 3 * scramble + channel;
+            let place = 3 * replicate + channel;
             self.sums[0][place] += sums[channel];
             self.sums[1][place] += with_x[channel];
             self.sums[2][place] += sums[channel] * y;
@@ -99,18 +99,18 @@ impl<S: Simd> Planes<S> {
             let inverse = simd.splat_f32x8(1.0) / (xx * yy - xy * xy);
             let (xx, xy, yy) = (xx * inverse, -(xy * inverse), yy * inverse);
             let (right, down) = (yy * -sx + xy * -sy, xy * -sx + xx * -sy);
-            for scramble in half * HALF..(half + 1) * HALF {
+            for replicate in half * HALF..(half + 1) * HALF {
                 let mut fitted = [zero; 3];
                 let mut finite = simd.splat_mask32x8(true);
                 for (channel, fitted) in fitted.iter_mut().enumerate() {
-                    let place = 3 * scramble + channel;
+                    let place = 3 * replicate + channel;
                     let mean = self.sums[0][place] / weight;
                     let (with_x, with_y) = (self.sums[1][place] / weight, self.sums[2][place] / weight);
                     *fitted = mean + (with_x - mean * sx) * right + (with_y - mean * sy) * down;
                     finite &= fitted.abs().simd_lt(f32::INFINITY);
                 }
                 for (channel, fitted) in fitted.into_iter().enumerate() {
-                    let value = &mut values[3 * scramble + channel];
+                    let value = &mut values[3 * replicate + channel];
                     *value = finite.select(fitted.max(zero), *value);
                 }
             }

@@ -6,7 +6,7 @@
 use glam::{Vec2, Vec3};
 
 use super::footprint::{Footprint, FootprintPoint, Texel, receiver};
-use super::gather::{Gathered, Outgoing, SCRAMBLES};
+use super::gather::{Gathered, REPLICATES, RadianceCache};
 use crate::checkpoint::record::fields;
 use crate::chunks::in_chunks;
 use crate::progress::Watch;
@@ -21,7 +21,7 @@ const SHARE: u64 = 20;
 const LEAST_RAYS: u64 = 1 << 16;
 /// Fewest and most points.
 const POINTS: (u64, u64) = (256, 4096);
-/// Shadow rays of a point to each source and gather rays of each scramble; two scrambles are a half.
+/// Shadow rays of a point to each source and gather rays of each replicate; two replicates are a half.
 const SHADOW_RAYS: u32 = 16;
 const GATHER_RAYS: u32 = 32;
 /// Rays that tell whether a point lies inside other geometry.
@@ -61,7 +61,7 @@ pub(crate) struct Light<'a> {
     pub scene: &'a BakeScene,
     pub sources: &'a Sources<'a>,
     /// None where nothing bounces.
-    pub outgoing: Option<&'a Outgoing<'a>>,
+    pub cache: Option<&'a RadianceCache<'a>>,
 }
 
 impl Light<'_> {
@@ -85,7 +85,7 @@ impl Light<'_> {
                 running
             })
             .collect();
-        let of_gather = if self.outgoing.is_some() { GATHER_RAYS * SCRAMBLES as u32 } else { 0 };
+        let of_gather = if self.cache.is_some() { GATHER_RAYS * REPLICATES as u32 } else { 0 };
         let cost = u64::from(JUDGES + 2 * SHADOW_RAYS + of_gather);
         let count = ((rays / SHARE).max(LEAST_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
         let sequence = Sequence::new(options.seed, PURPOSE, 0);
@@ -113,12 +113,12 @@ impl Light<'_> {
             *direct = found.baked;
             point.rays += u64::from(found.rays);
         }
-        let Some(outgoing) = self.outgoing else { return point };
+        let Some(cache) = self.cache else { return point };
         // A texel of one point, in a tile and of an object of its own: so its samples are no texel's.
         let footprint = Footprint::Points(vec![footprint]);
         let texel = Texel { index, object: index, x: 0, y: 0, triangle, footprint };
         let mut gathered = Gathered::default();
-        outgoing.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ PURPOSE));
+        cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ PURPOSE));
         let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);
         point.indirect = [0.5 * (a + b), 0.5 * (c + d)];
         (point.checks, point.differences) = (gathered.checks, gathered.differences);
@@ -131,7 +131,7 @@ impl Light<'_> {
         let meets_inside = |ray: &u32| {
             let [u, v, ..] = sequence.point(*ray, 0);
             let direction = cosine_about(receiver.geometric_normal, u, v);
-            let hit = self.scene.telling_hit(receiver.origin, direction);
+            let hit = self.scene.classify_hit(receiver.origin, direction);
             matches!(hit, SurfaceHit::Inside | SurfaceHit::Back)
         };
         2 * (0..JUDGES).filter(meets_inside).count() < JUDGES as usize

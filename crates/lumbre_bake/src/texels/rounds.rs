@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::allocation::{Allotment, allot_within};
 use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
 use super::footprint::Texel;
-use super::gather::{Gathered, Outgoing, SCRAMBLES};
+use super::gather::{Gathered, REPLICATES, RadianceCache};
 use super::kept::Kept;
 use super::late::from_patches;
 use super::local_light::LocalLight;
@@ -57,7 +57,7 @@ pub(crate) struct Receivers<'a> {
 
 /// Gathers the light by bounces, beginning with what is kept of a former bake.
 pub(crate) fn gather(
-    outgoing: &Outgoing<'_>,
+    cache: &RadianceCache<'_>,
     receivers: Receivers<'_>,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
@@ -65,7 +65,7 @@ pub(crate) fn gather(
 ) -> Result<Bounced, BakeError> {
     let Receivers { texels, charts, direct, local, kept } = receivers;
     let effort = options.effort();
-    let [first, most] = effort.gather.map(|samples| samples / SCRAMBLES as u32);
+    let [first, most] = effort.gather.map(|samples| samples / REPLICATES as u32);
     let nothing = || vec![Gathered::default(); texels.len()];
     let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
     let open_texels = (0..texels.len() as u32).filter(|&index| !texels[index as usize].is_hidden());
@@ -73,7 +73,7 @@ pub(crate) fn gather(
     let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
     let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
     let surroundings =
-        watch.during(0.0, || Surroundings::new(outgoing.scene, outgoing.layout, texels, charts, &[]))?;
+        watch.during(0.0, || Surroundings::new(cache.scene, cache.layout, texels, charts, &[]))?;
     let mut wanted: Vec<Allotment> = open_texels
         .clone()
         .filter(|&index| gathered[index as usize].samples == 0)
@@ -88,7 +88,7 @@ pub(crate) fn gather(
         let found = in_chunks_in_time(wanted.len(), watch, |place| {
             let Allotment { index, samples } = wanted[place];
             let mut own = gathered[index as usize];
-            outgoing.gather(&texels[index as usize], &mut own, samples, options.seed);
+            cache.gather(&texels[index as usize], &mut own, samples, options.seed);
             own
         })?;
         let in_time = found.len() == wanted.len();
@@ -96,7 +96,7 @@ pub(crate) fn gather(
             gathered[allotted.index as usize] = own;
         }
         if !in_time && round == 0 {
-            from_patches(outgoing, texels, &mut gathered);
+            from_patches(cache, texels, &mut gathered);
         }
         round += 1;
         let raw: Vec<Estimates> = gathered.par_iter().map(Gathered::estimates).collect();
@@ -108,7 +108,7 @@ pub(crate) fn gather(
             false => (raw.clone(), vec![0.0; texels.len()]),
         })?;
         let patch_bias = watch.during(1.0, || {
-            patch_bias(&surroundings, texels, &gathered, &raw, outgoing.patches.mean_reflectance())
+            patch_bias(&surroundings, texels, &gathered, &raw, cache.patches.mean_reflectance())
         })?;
         let spread = watch.during(1.0, || spread(&surroundings, &estimates))?;
         let errors = GatherErrors {
@@ -147,7 +147,7 @@ pub(crate) fn gather(
         let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-        let budget = (effort.budget(open as u64) / SCRAMBLES as u64).saturating_sub(cast);
+        let budget = (effort.budget(open as u64) / REPLICATES as u64).saturating_sub(cast);
         // What little is left of it is not worth another smoothing.
         let spent = (budget as f64) < LEAST_ROUND * cast as f64;
         wanted = allot_within(budget, open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
@@ -160,7 +160,7 @@ pub(crate) fn gather(
     report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
     // Without rays: the patches' light, for want of time.
     let cast = gathered.iter().filter(|own| own.rays > 0);
-    let cast: u64 = cast.map(|own| u64::from(own.samples) * SCRAMBLES as u64).sum();
+    let cast: u64 = cast.map(|own| u64::from(own.samples) * REPLICATES as u64).sum();
     report.gather_rays = cast as f64 / open;
     Ok(Bounced { light, variances, gathered })
 }

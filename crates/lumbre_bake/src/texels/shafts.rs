@@ -8,22 +8,22 @@ use rayon::prelude::*;
 
 use super::footprint::{Footprint, Texel};
 use super::light_cuts::LightCuts;
-use super::light_ways::ways;
+use super::light_visibility::visibilities;
 use super::tiles::{Tiles, area, positions_of, shows_plane};
 use crate::scene::BakeScene;
-use crate::transport::between::{BeforePart, Between};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::direct::Sources;
 use crate::transport::light_cut::LightCut;
-use crate::transport::lit_part::{Shown, Way};
+use crate::transport::shadow_clipping::{LightVisibility, ReceiverShape};
 use crate::transport::shaft::Shaft;
+use crate::transport::visibility::{PartOccluders, Visibility};
 
 /// What may stand between a tile and the sources.
 #[derive(Default)]
 struct OfTile {
     parts: Vec<OfPart>,
     /// By the lights' numbers.
-    lights: Vec<(u32, Way)>,
+    lights: Vec<(u32, LightVisibility)>,
     /// A texel of it, by its place, that shows something: none if nobody wants to know.
     asked: Option<u32>,
 }
@@ -107,7 +107,7 @@ impl<'a> Shafts<'a> {
             Some(OfPart { part, emitters: found })
         };
         let parts = cut.lamps.iter().filter_map(lamp).collect();
-        let lights = ways(self.sources, &cut.lights, &area, first.side(self.scene), tree);
+        let lights = visibilities(self.sources, &cut.lights, &area, first.side(self.scene), tree);
         Some(OfTile { parts, lights, asked: None })
     }
 
@@ -135,13 +135,13 @@ impl<'a> Shafts<'a> {
     }
 
     /// What may stand between a texel, by its number, and those of the sources for which that is known.
-    pub fn between(&self, place: usize, texel: &Texel) -> Between<'_> {
-        let Some(&tile) = self.tile_of.get(place) else { return Between::UNKNOWN };
+    pub fn visibility(&self, place: usize, texel: &Texel) -> Visibility<'_> {
+        let Some(&tile) = self.tile_of.get(place) else { return Visibility::UNKNOWN };
         let tile = &self.tiles[tile as usize];
         let (mut own, mut positions) = (None, Vec::new());
         let one = |of_part: &OfPart| {
             if of_part.emitters.iter().all(|(_, blockers)| blockers.is_empty()) {
-                return Some(BeforePart { part: of_part.part, emitters: Vec::new() });
+                return Some(PartOccluders { part: of_part.part, emitters: Vec::new() });
             }
             if own.is_none() {
                 positions_of(self.scene, texel, &mut positions);
@@ -159,22 +159,27 @@ impl<'a> Shafts<'a> {
             };
             let emitters: Vec<(u32, Vec<_>)> = of_part.emitters.iter().filter_map(narrowed).collect();
             let clear = emitters.iter().all(|(_, blockers)| blockers.is_empty());
-            Some(BeforePart { part: of_part.part, emitters: if clear { Vec::new() } else { emitters } })
+            Some(PartOccluders { part: of_part.part, emitters: if clear { Vec::new() } else { emitters } })
         };
         let parts = tile.parts.iter().filter_map(one).collect();
-        let in_shadow = tile.lights.iter().any(|(_, way)| matches!(way, Way::Shadows(..)));
-        Between { parts, lights: &tile.lights, shown: in_shadow.then(|| shown(self.scene, texel)) }
+        let in_shadow =
+            tile.lights.iter().any(|(_, visibility)| matches!(visibility, LightVisibility::Shadows(..)));
+        Visibility {
+            parts,
+            lights: &tile.lights,
+            receiver_shape: in_shadow.then(|| receiver_shape(self.scene, texel)),
+        }
     }
 }
 
 /// What a texel on a plane shows of it.
-fn shown(scene: &BakeScene, texel: &Texel) -> Shown {
+fn receiver_shape(scene: &BakeScene, texel: &Texel) -> ReceiverShape {
     let mut positions = Vec::new();
     positions_of(scene, texel, &mut positions);
     let place = |position: &Vec3| position.as_dvec3();
     match (&texel.footprint, &positions[..]) {
-        (Footprint::Whole(_), [a, b, d, c]) => Shown::Parallelogram([a, b, c, d].map(place)),
-        _ => Shown::Points(positions.iter().map(place).collect()),
+        (Footprint::Whole(_), [a, b, d, c]) => ReceiverShape::Parallelogram([a, b, c, d].map(place)),
+        _ => ReceiverShape::Points(positions.iter().map(place).collect()),
     }
 }
 

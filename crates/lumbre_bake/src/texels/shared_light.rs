@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::allocation::{Allotment, allot_within};
 use super::error_estimate::spread;
 use super::footprint::{Texel, receiver};
-use super::gather::SCRAMBLES;
+use super::gather::REPLICATES;
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, smooth};
@@ -25,21 +25,21 @@ use crate::{BakeError, BakeOptions};
 /// What a texel has found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shared {
-    /// Sum of the samples of each scramble, of what is baked.
-    pub sums: [Vec3; SCRAMBLES],
+    /// Sum of the samples of each replicate, of what is baked.
+    pub sums: [Vec3; REPLICATES],
     /// Sum of all samples, of mixed lights.
     pub mixed: Vec3,
     /// Sum of 1 / distance to what was asked, canonical units.
     pub inverse_distances: f32,
-    /// Samples of each scramble.
+    /// Samples of each replicate.
     pub samples: u32,
     /// Rays cast.
     pub rays: u32,
 }
 
-fields!(Shared { sums: [Vec3; SCRAMBLES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
+fields!(Shared { sums: [Vec3; REPLICATES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
 
-/// Purposes of the scrambles' sequences begin here.
+/// Purposes of the replicates' sequences begin here.
 const PURPOSE: u32 = 96;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
@@ -58,13 +58,13 @@ impl Shared {
     }
 
     fn inverse_distance(&self) -> f32 {
-        self.inverse_distances / (self.samples.max(1) * SCRAMBLES as u32) as f32
+        self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 
-    /// Adds samples up to `samples` of each scramble.
+    /// Adds samples up to `samples` of each replicate.
     fn add(&mut self, sources: &Sources<'_>, rest: &Rest, texel: &Texel, run: u32, samples: u32, seed: u32) {
-        for (scramble, sum) in self.sums.iter_mut().enumerate() {
-            let sequence = TileSequence::new(seed, PURPOSE + scramble as u32, texel, run);
+        for (replicate, sum) in self.sums.iter_mut().enumerate() {
+            let sequence = TileSequence::new(seed, PURPOSE + replicate as u32, texel, run);
             for sample in self.samples..samples {
                 let [x, y, ..] = sequence.first(sample);
                 let Some(point) = texel.point(sources.scene, x, y) else { continue };
@@ -88,7 +88,7 @@ pub(crate) struct SharedLight<'a> {
     cuts: &'a LightCuts,
     surroundings: Surroundings<'a>,
     options: &'a BakeOptions,
-    /// Samples of each scramble: in the first round, and at most.
+    /// Samples of each replicate: in the first round, and at most.
     first: u32,
     most: u32,
     pub found: Vec<Shared>,
@@ -108,7 +108,7 @@ impl<'a> SharedLight<'a> {
         watch: &mut Watch<'_>,
     ) -> Result<Self, BakeError> {
         let texels = surroundings.texels;
-        let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(SCRAMBLES as u32));
+        let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
         let mut light = Self { sources, texels, cuts, surroundings, options, first, most, found: Vec::new() };
         // A complete map first, whatever time it takes.
         let clock = watch.clock();
@@ -174,7 +174,7 @@ impl<'a> SharedLight<'a> {
             before = left;
             let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let budget = self.options.effort().budget(places.clone().count() as u64) / SCRAMBLES as u64;
+            let budget = self.options.effort().budget(places.clone().count() as u64) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
             let goal = goal.max(left / MOST_OF_A_ROUND);
             let wanted: Vec<Allotment> =
@@ -197,7 +197,7 @@ impl<'a> SharedLight<'a> {
         for (direct, ((estimates, variance), own)) in direct.iter_mut().zip(found) {
             if own.samples > 0 {
                 direct.baked += mean(estimates).max(Vec3::ZERO);
-                direct.mixed += own.mixed / (own.samples * SCRAMBLES as u32) as f32;
+                direct.mixed += own.mixed / (own.samples * REPLICATES as u32) as f32;
                 direct.variance += variance;
                 direct.rays += own.rays;
                 direct.sampled = true;

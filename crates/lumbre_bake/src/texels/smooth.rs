@@ -1,5 +1,5 @@
 //! Smooths the gathered light within charts: a weighted plane through each texel's neighbourhood, with weights that stop at
-//! edges larger than the noise. The same weights for every scramble, so that their spread stays an estimate of the error.
+//! edges larger than the noise. The same weights for every replicate, so that their spread stays an estimate of the error.
 //! In levels: the second takes what the first has made of every third texel, and so reaches three times as far for the same work
 //! (Dammertz, Sewtz, Hanika and Lensch, "Edge-Avoiding À-Trous Wavelet Transform", 2010).
 
@@ -7,8 +7,10 @@ use fearless_simd::{Select, Simd, f32x8, prelude::*};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::gather::SCRAMBLES;
-use super::guides::{GUIDES, Guides, NOISE, NOISE_STEPS, Variances, own_values, sum_of_variances};
+use super::filter_features::{
+    FEATURES, Features, NOISE, NOISE_STEPS, Variances, own_values, sum_of_variances,
+};
+use super::gather::REPLICATES;
 use super::lanes::{Grid, Kernel, Strips};
 use super::neighbours::Block;
 use super::plane::VALUES;
@@ -17,7 +19,7 @@ use super::surroundings::Surroundings;
 use super::weighted_fit::Fit;
 
 /// What a texel has, before and after.
-pub(crate) type Estimates = [Vec3; SCRAMBLES];
+pub(crate) type Estimates = [Vec3; REPLICATES];
 /// The channels of the estimates, and the squared bias, mean of the channels.
 pub(crate) type Smoothed = Strips<{ VALUES + 1 }>;
 const BIAS: usize = VALUES;
@@ -34,7 +36,7 @@ pub(crate) struct Level {
 }
 
 /// The first reaches little further than a texel's own size, whatever is near; the second only where everything is far. `chance`, for
-/// the first: four times the variance of a texel for one scramble, a ninth of it in a block, of which the radius holds 49/9, twice for
+/// the first: four times the variance of a texel for one replicate, a ninth of it in a block, of which the radius holds 49/9, twice for
 /// two halves: 4 / 9 / sqrt(2 * 49 / 9). What the second takes in goes together over some 20 texels: its blocks hold four
 /// that do not, and the radius as many blocks.
 const FIRST: Level = Level { width: 2.5, near: 1.0, guide_steps: 1, chance: 0.135 };
@@ -57,7 +59,7 @@ pub(crate) fn smooth(
     smooth_strips(grid, things, &mut smoothed);
     let found = surroundings.read(&smoothed).into_par_iter();
     let of_texels = found.zip(surroundings.texels).zip(estimates).map(|((found, texel), estimates)| {
-        let smoothed = std::array::from_fn(|scramble| Vec3::from_slice(&found[3 * scramble..]));
+        let smoothed = std::array::from_fn(|replicate| Vec3::from_slice(&found[3 * replicate..]));
         if texel.is_hidden() { (*estimates, 0.0) } else { (smoothed, found[BIAS]) }
     });
     of_texels.unzip()
@@ -80,14 +82,14 @@ impl Level {
         nearness: &Strips<1>,
     ) {
         let variances = grid.compute(&Variances(estimates));
-        let guides =
-            grid.compute(&Guides::<STEP> { steps: self.guide_steps, estimates, variances: &variances });
+        let features =
+            grid.compute(&Features::<STEP> { steps: self.guide_steps, estimates, variances: &variances });
         drop(variances);
-        let fit = Fit::<STEP, COLUMNS> { level: self, estimates, nearness, guides: &guides };
+        let fit = Fit::<STEP, COLUMNS> { level: self, estimates, nearness, features: &features };
         let smoothed = grid.compute(&fit);
         let products = grid.compute(&Products::<STEP> { raw: estimates, smoothed: &smoothed });
         let choice =
-            Choice::<STEP> { level: self, smoothed: &smoothed, guides: &guides, products: &products };
+            Choice::<STEP> { level: self, smoothed: &smoothed, features: &features, products: &products };
         grid.change(estimates, &choice);
     }
 }
@@ -109,7 +111,7 @@ impl Kernel<1> for Nearness<'_> {
 struct Choice<'a, const STEP: usize> {
     level: &'a Level,
     smoothed: &'a Strips<VALUES>,
-    guides: &'a Strips<GUIDES>,
+    features: &'a Strips<FEATURES>,
     products: &'a Strips<1>,
 }
 
@@ -121,7 +123,7 @@ impl<const STEP: usize> Kernel<{ VALUES + 1 }> for Choice<'_, STEP> {
         estimates: &[f32x8<S>; VALUES + 1],
     ) -> [f32x8<S>; VALUES + 1] {
         let zero = block.simd.splat_f32x8(0.0);
-        let before = block.own(self.guides, NOISE) / 3.0;
+        let before = block.own(self.features, NOISE) / 3.0;
         let bias = squared_bias(block, STEP, self.products);
         let bias = (bias - before * self.level.chance).max(zero);
         let smoothed = own_values(block, self.smoothed);
@@ -138,16 +140,16 @@ impl<const STEP: usize> Kernel<{ VALUES + 1 }> for Choice<'_, STEP> {
     }
 }
 
-/// Mean of the scrambles.
+/// Mean of the replicates.
 pub(crate) fn mean(estimates: &Estimates) -> Vec3 {
-    estimates.iter().sum::<Vec3>() / SCRAMBLES as f32
+    estimates.iter().sum::<Vec3>() / REPLICATES as f32
 }
 
 /// Variance of that mean.
 pub(crate) fn variance(estimates: &Estimates) -> Vec3 {
     let mean = mean(estimates);
     let squares: Vec3 = estimates.iter().map(|&e| (e - mean) * (e - mean)).sum();
-    squares / (SCRAMBLES * (SCRAMBLES - 1)) as f32
+    squares / (REPLICATES * (REPLICATES - 1)) as f32
 }
 
 #[cfg(test)]

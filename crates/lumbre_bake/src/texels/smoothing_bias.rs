@@ -2,7 +2,7 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::guides::own_values;
+use super::filter_features::own_values;
 use super::lanes::{Kernel, Strips, lanes};
 use super::neighbours::Block;
 use super::plane::{OF_HALF, VALUES};
@@ -13,7 +13,7 @@ const BLOCK_RADIUS: usize = 1;
 const BIAS_RADIUS: usize = 3;
 
 /// The smoothed value of one half against the raw values of the other, which know nothing of it: the product of its differences
-/// to two scrambles, each averaged over a block, has the square of the bias as its mean, and the smoothed value's own variance.
+/// to two replicates, each averaged over a block, has the square of the bias as its mean, and the smoothed value's own variance.
 /// (A single texel's squared difference says the same with ten times the noise.) May be negative, by chance.
 /// Blocks are of texels `STEP` apart.
 pub(crate) struct Products<'a, const STEP: usize> {
@@ -38,10 +38,10 @@ impl<const STEP: usize> Kernel<1> for Products<'_, STEP> {
                     let one: f32x8<S> = lanes(simd, self.smoothed.beside(beside, first), at);
                     let two: f32x8<S> = lanes(simd, self.smoothed.beside(beside, first + 3), at);
                     let mean = (one + two) * 0.5;
-                    for scramble in 0..2 {
-                        let raw = (1 - half) * OF_HALF + 3 * scramble + channel;
+                    for replicate in 0..2 {
+                        let raw = (1 - half) * OF_HALF + 3 * replicate + channel;
                         let raw: f32x8<S> = lanes(simd, self.raw.beside(beside, raw), at);
-                        differences[first + 3 * scramble] = mean - raw;
+                        differences[first + 3 * replicate] = mean - raw;
                     }
                 }
                 differences

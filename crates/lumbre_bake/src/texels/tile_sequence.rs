@@ -24,7 +24,7 @@ pub(crate) struct TileSequence {
 }
 
 impl TileSequence {
-    /// `purpose` scrambles; every texel takes `run` points at first, and later as many again as it has.
+    /// `purpose` replicates; every texel takes `run` points at first, and later as many again as it has.
     pub fn new(seed: u32, purpose: u32, texel: &Texel, run: u32) -> Self {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);

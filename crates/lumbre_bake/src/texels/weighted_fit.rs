@@ -2,7 +2,7 @@
 
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
-use super::guides::{GUIDES, NOISE, own_values};
+use super::filter_features::{FEATURES, NOISE, own_values};
 use super::lanes::{Kernel, Strips, lanes};
 use super::neighbours::{Beside, Block, OWN};
 use super::plane::{HALF, Planes, VALUES};
@@ -15,7 +15,7 @@ pub(crate) struct Fit<'a, const STEP: usize, const COLUMNS: usize> {
     pub level: &'a Level,
     pub estimates: &'a Smoothed,
     pub nearness: &'a Strips<1>,
-    pub guides: &'a Strips<GUIDES>,
+    pub features: &'a Strips<FEATURES>,
 }
 
 impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, COLUMNS> {
@@ -23,9 +23,9 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
     fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; VALUES]) -> [f32x8<S>; VALUES] {
         let simd = block.simd;
         let zero = simd.splat_f32x8(0.0);
-        let mut own = [zero; GUIDES];
+        let mut own = [zero; FEATURES];
         for (place, own) in own.iter_mut().enumerate() {
-            *own = block.own(self.guides, place);
+            *own = block.own(self.features, place);
         }
         let near = self.level.near * self.level.near;
         let narrow = block.own(self.nearness, 0) * near + self.level.width.powi(-2);
@@ -43,14 +43,14 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
             }
             for (half, weights) in weights.iter().enumerate() {
                 planes.add_weights(half, STEP, y, weights);
-                for scramble in half * HALF..(half + 1) * HALF {
-                    let first = 3 * scramble;
+                for replicate in half * HALF..(half + 1) * HALF {
+                    let first = 3 * replicate;
                     let [r, g, b] = [first, first + 1, first + 2];
                     let values = [r, g, b].map(
                         #[inline(always)]
                         |channel| self.estimates.beside(&beside, channel),
                     );
-                    planes.add_values(scramble, STEP, y, weights, values);
+                    planes.add_values(replicate, STEP, y, weights, values);
                 }
             }
         }
@@ -62,10 +62,10 @@ impl<const STEP: usize, const COLUMNS: usize> Kernel<VALUES> for Fit<'_, STEP, C
 
 /// What the weights depend on of the texels themselves.
 struct Texels<S: Simd> {
-    own: [f32x8<S>; GUIDES],
+    own: [f32x8<S>; FEATURES],
     /// Of a squared distance in texels.
     narrow: f32x8<S>,
-    /// Of the noise of two texels, by which squared differences of their guides are divided.
+    /// Of the noise of two texels, by which squared differences of their features are divided.
     guide_noise: f32,
 }
 
@@ -83,14 +83,14 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
         let zero = simd.splat_f32x8(0.0);
         let Texels { own, narrow, guide_noise } = texels;
         let y = beside.down as f32;
-        let mut guides = [self.guides.beside(beside, NOISE); GUIDES];
-        for (place, guide) in guides.iter_mut().enumerate() {
-            *guide = self.guides.beside(beside, place);
+        let mut features = [self.features.beside(beside, NOISE); FEATURES];
+        for (place, guide) in features.iter_mut().enumerate() {
+            *guide = self.features.beside(beside, place);
         }
         for place in 0..COLUMNS {
             let at = OWN - COLUMNS / 2 * STEP + place * STEP;
             let x = place as f32 * STEP as f32 - (COLUMNS / 2 * STEP) as f32;
-            let noise: f32x8<S> = lanes(simd, guides[NOISE], at);
+            let noise: f32x8<S> = lanes(simd, features[NOISE], at);
             let expected = (own[NOISE] + noise) * *guide_noise;
             let inverse = simd.splat_f32x8(1.0) / expected.max(f32::MIN_POSITIVE);
             let far = *narrow * (x * x + y * y);
@@ -98,7 +98,7 @@ impl<const STEP: usize, const COLUMNS: usize> Fit<'_, STEP, COLUMNS> {
             for (half, weights) in weights.iter_mut().enumerate() {
                 let mut squares = [zero; 3];
                 for (channel, square) in squares.iter_mut().enumerate() {
-                    let guide: f32x8<S> = lanes(simd, guides[3 * half + channel], at);
+                    let guide: f32x8<S> = lanes(simd, features[3 * half + channel], at);
                     let difference = guide - own[3 * half + channel];
                     *square = difference * difference;
                 }
@@ -161,16 +161,16 @@ mod tests {
         let grid = random_grid(Instructions::new());
         let level = Level { width: 9.0, near: 0.5, guide_steps: 0, chance: 0.0 };
         let (estimates, nearness) = (random_strips(&grid, 1), random_strips(&grid, 2));
-        let guides: Strips<GUIDES> = random_strips(&grid, 3);
+        let features: Strips<FEATURES> = random_strips(&grid, 3);
         let fit: Fit<'_, 3, 9> =
-            Fit { level: &level, estimates: &estimates, nearness: &nearness, guides: &guides };
+            Fit { level: &level, estimates: &estimates, nearness: &nearness, features: &features };
         let found = grid.compute(&fit);
         let (mut texels, mut largest) = (0, 0.0f64);
         for row in 0..grid.rows.len() {
             let width = grid.rows[row].stride - MARGIN - (LANES - 1);
             let surface = |row: usize, column: usize| grid.ground[grid.rows[row].start + MARGIN + column];
             for column in (0..width).filter(|&column| surface(row, column) != NONE) {
-                let own = grid.get(&guides, row, column).map(f64::from);
+                let own = grid.get(&features, row, column).map(f64::from);
                 let near = f64::from(grid.get(&nearness, row, column)[0]);
                 let mut points: [Vec<[f64; 4]>; VALUES] = Default::default();
                 for (down, right) in
@@ -185,7 +185,7 @@ mod tests {
                         continue;
                     }
                     let (x, y) = (right as f64, down as f64);
-                    let other = grid.get(&guides, beside, place).map(f64::from);
+                    let other = grid.get(&features, beside, place).map(f64::from);
                     let values = grid.get(&estimates, beside, place).map(f64::from);
                     for k in 0..VALUES {
                         let half = k / (3 * HALF);

@@ -1,6 +1,6 @@
 //! Cuts out of convex polygons what triangles hide of them from where is looked: the pyramid over each triangle's edges and beyond its
 //! plane (Nishita and Nakamae, "Half-Tone Representation of 3-D Objects Illuminated by Area Sources", 1983), or the prism where is looked
-//! from infinitely far. Not what is done with the pieces that are left: `visible_part` and `lit_part`.
+//! from infinitely far. Not what is done with the pieces that are left: `visible_part` and `shadow_clipping`.
 
 use glam::DVec3;
 

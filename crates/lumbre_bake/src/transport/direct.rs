@@ -6,14 +6,14 @@ use std::f32::consts::PI;
 use glam::{DVec3, Vec3};
 use lumbre_optics::LightKind;
 
-use super::between::{BeforePart, Between};
 use super::cut_out::Pieces;
 use super::emitter_tree::{EXACT_EMITTERS, EmitterTree, TERM_ERROR};
 use super::emitters::{Emitter, emitters, lamps};
 use super::light_cut::{FEW_LIGHTS, LightCut};
 use super::light_tree::{LightTree, has_place};
+use super::receiver_quadrature::ReceiverQuadrature;
 use super::share_variance::{share_variance, uneven_variance};
-use super::unoccluded::Unoccluded;
+use super::visibility::{PartOccluders, Visibility};
 use super::visible_part::visible_part;
 use crate::checkpoint::record::fields;
 use crate::sampling::{Sequence, hash, triangle_point};
@@ -183,7 +183,7 @@ impl<'a> Sources<'a> {
         let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
         let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
         let cut = self.cut(&anchor, reach, &[]);
-        let mut direct = self.own(&cut, &Between::UNKNOWN, sequence, samples, point);
+        let mut direct = self.own(&cut, &Visibility::UNKNOWN, sequence, samples, point);
         self.rest(&cut.rest, sequence, SAMPLES_OF_REST * samples, point, &mut direct);
         direct
     }
@@ -193,17 +193,17 @@ impl<'a> Sources<'a> {
     pub fn own(
         &self,
         cut: &LightCut,
-        between: &Between<'_>,
+        visibility: &Visibility<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
     ) -> Direct {
         let mut direct = Direct::default();
         if !cut.lamps.is_empty() {
-            let light = self.emitted(&cut.lamps, between, sequence, samples, point, &mut direct);
+            let light = self.emitted(&cut.lamps, visibility, sequence, samples, point, &mut direct);
             direct.baked += light;
         }
-        self.punctual(&cut.lights, between, sequence, samples, point, &mut direct);
+        self.punctual(&cut.lights, visibility, sequence, samples, point, &mut direct);
         direct
     }
 
@@ -212,7 +212,7 @@ impl<'a> Sources<'a> {
     fn emitted(
         &self,
         parts: &[u32],
-        between: &Between<'_>,
+        visibility: &Visibility<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -228,16 +228,17 @@ impl<'a> Sources<'a> {
             let own = allotted(samples, weight / brightest);
             let set = if place == 0 { 0 } else { FIRST_SET + place as u32 };
             let unoccluded = || {
-                Unoccluded::mean(|x, y| {
+                ReceiverQuadrature::mean(|x, y| {
                     point(x, y).map(|receiver| self.emitter_tree.unoccluded(&self.emitters, part, &receiver))
                 })
             };
-            let known = between.parts.iter().find(|between| between.part == part).and_then(|between| {
-                match between.emitters.is_empty() {
-                    true => Some(unoccluded()),
-                    false => self.seen_past(between, sequence, (own, set), point, direct),
-                }
-            });
+            let known =
+                visibility.parts.iter().find(|occluders| occluders.part == part).and_then(|occluders| {
+                    match occluders.emitters.is_empty() {
+                        true => Some(unoccluded()),
+                        false => self.seen_past(occluders, sequence, (own, set), point, direct),
+                    }
+                });
             // What one term for many emitters leaves.
             let by_terms = if self.emitter_tree.emitters(part) > EXACT_EMITTERS { TERM_ERROR } else { 0.0 };
             if let Some((light, variance)) = known {
@@ -265,7 +266,7 @@ impl<'a> Sources<'a> {
     /// `None` if some point sees it in too many pieces.
     fn seen_past(
         &self,
-        between: &BeforePart,
+        occluders: &PartOccluders,
         sequence: Sequence,
         (samples, set): (u32, u32),
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -281,7 +282,7 @@ impl<'a> Sources<'a> {
             let Some(receiver) = point(x, y) else { continue };
             let (position, normal) = (receiver.position.as_dvec3(), receiver.normal.as_dvec3());
             let (mut light, mut cut) = (Vec3::ZERO, false);
-            for (emitter, blockers) in &between.emitters {
+            for (emitter, blockers) in &occluders.emitters {
                 let emitter = &self.emitters[*emitter as usize];
                 let visible = visible_part(position, normal, &emitter.corners_f64, blockers, &mut room)?;
                 light += emitter.radiance * (std::f64::consts::PI * visible.factor) as f32;
@@ -295,7 +296,7 @@ impl<'a> Sources<'a> {
             sums[group] += light;
             counts[group] += 1;
         }
-        direct.seen.add(between.part, seen, hidden);
+        direct.seen.add(occluders.part, seen, hidden);
         direct.sampled = true;
         let count = counts.iter().sum::<u32>();
         if count == 0 {

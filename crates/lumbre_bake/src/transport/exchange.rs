@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::coarser::size_error;
 use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
-use super::guide::Guide;
 use super::patches::{Patch, Patches};
+use super::sampling_guide::SamplingGuide;
 use super::solver;
 use crate::chunks::in_chunks;
 use crate::options::Solver;
@@ -31,7 +31,7 @@ pub(crate) struct Exchange {
     /// Below this distance patches are too coarse to read, canonical units.
     pub near: f32,
     /// Where each patch's light by bounces comes from.
-    pub guide: Guide,
+    pub guide: SamplingGuide,
     /// What leaves each patch without emission, W/m².
     pub exitance: Vec<Vec3>,
 }
@@ -129,7 +129,8 @@ impl Exchange {
         let leaves = |(index, patch): (usize, &Patch)| patch.reflectance * (direct[index] + indirect[index]);
         let exitance: Vec<Vec3> = patches.list.iter().enumerate().map(leaves).collect();
         let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
-        let guide = watch.during(0.8, || Guide::new(scene, &patches, side, &factors, &radiosity, &sky))?;
+        let guide =
+            watch.during(0.8, || SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky))?;
         let near = 2.0 * side;
         Ok(Some((Self { patches, direct, indirect, indirect_error, near, guide, exitance }, factors)))
     }
@@ -157,7 +158,7 @@ impl Exchange {
         let zeros = vec![0.0; patches.list.len()];
         let exact = vec![Vec2::ZERO; patches.list.len()];
         let factors = FormFactors::none(&patches);
-        let guide = Guide::new(scene, &patches, side, &factors, &zeros, &none);
+        let guide = SamplingGuide::new(scene, &patches, side, &factors, &zeros, &none);
         let exchange = Self {
             direct: none.clone(),
             indirect: none.clone(),

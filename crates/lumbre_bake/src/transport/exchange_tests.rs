@@ -39,7 +39,7 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     };
     let objects = collect(world).unwrap();
     let points =
-        objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+        objects.iter().flat_map(|o| &o.primitives).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
     let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
     let scene = BakeScene::new(&objects, &layout, space, &Stop::default(), &mut Vec::new()).unwrap();

@@ -12,7 +12,7 @@ use super::form_factors::FormFactors;
 use super::patches::Patches;
 use crate::options::FormFactorMethod;
 use crate::progress::{Progress, Watch};
-use crate::scene::{BakeScene, Canonical, Object, Part, lay_out};
+use crate::scene::{BakeScene, Canonical, Object, PlacedPrimitive, lay_out};
 use crate::stop::Stop;
 use crate::{BakeOptions, Density};
 
@@ -38,7 +38,7 @@ pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
         .iter()
         .map(|triangles| Object {
             name: "object".into(),
-            parts: vec![Part {
+            primitives: vec![PlacedPrimitive {
                 entity: world.spawn_empty().id(),
                 mesh: mesh(triangles),
                 material: Material::default(),
@@ -47,7 +47,7 @@ pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
             }],
         })
         .collect();
-    let points = objects.iter().flat_map(|o| &o.parts[0].mesh.positions).map(|p| p.as_dvec3());
+    let points = objects.iter().flat_map(|o| &o.primitives[0].mesh.positions).map(|p| p.as_dvec3());
     let space = Canonical::of(points);
     let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
     let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();

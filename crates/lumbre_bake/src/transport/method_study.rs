@@ -50,7 +50,7 @@ pub fn form_factor_errors(
     options.check()?;
     let objects = collect(world)?;
     let points =
-        objects.iter().flat_map(|o| &o.parts).flat_map(|part| world_points(&part.transform, &part.mesh));
+        objects.iter().flat_map(|o| &o.primitives).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
     let mut warnings = Vec::new();
     let layout = lay_out(&objects, space, options, &mut warnings)?;

@@ -1,7 +1,6 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
-pub(crate) mod between;
 pub(crate) mod box_tree;
 mod coarser;
 pub(crate) mod components;
@@ -20,12 +19,10 @@ mod exchange_tests;
 mod form_factor_tests;
 pub(crate) mod form_factors;
 mod global_lines;
-pub(crate) mod guide;
 #[cfg(test)]
 mod lambert_integral;
 pub(crate) mod light_cut;
 mod light_tree;
-pub(crate) mod lit_part;
 mod mean_of_points;
 pub(crate) mod method_study;
 mod near_pairs;
@@ -34,10 +31,13 @@ mod patch_tests;
 pub(crate) mod patches;
 pub(crate) mod polygon;
 pub(crate) mod punctual;
+mod punctual_irradiance;
+mod receiver_quadrature;
+pub(crate) mod sampling_guide;
+pub(crate) mod shadow_clipping;
 pub(crate) mod shaft;
 mod share_variance;
 pub(crate) mod shared_samples;
 pub(crate) mod solver;
-mod unoccluded;
-mod unshadowed;
+pub(crate) mod visibility;
 mod visible_part;

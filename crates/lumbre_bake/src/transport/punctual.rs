@@ -5,13 +5,13 @@
 use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, LightKind};
 
-use super::between::Between;
 use super::cut_out::{GAP, Pieces};
 use super::direct::{Direct, GROUPS, Receiver, Sources, group_of, variance_of_mean};
-use super::lit_part::{Shown, Way};
+use super::punctual_irradiance::{PunctualIrradiance, of_center, punctual_irradiance};
+use super::receiver_quadrature::ReceiverQuadrature;
+use super::shadow_clipping::{LightVisibility, ReceiverShape};
 use super::share_variance::share_variance;
-use super::unoccluded::Unoccluded;
-use super::unshadowed::{Unshadowed, of_center, unshadowed};
+use super::visibility::Visibility;
 use crate::sampling::{Sequence, cosine_direction, frame};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -25,7 +25,7 @@ const LARGEST_SINE: f64 = 0.99;
 const HALF_A_ROW: f32 = 0.125;
 
 /// One light as one sample meets it, per unit of its colour: irradiance.
-pub(super) struct Part {
+pub(super) struct LightSample {
     /// Of the light's centre, where the receiver faces it.
     center: f32,
     /// Of a point of its disc; not above 0 where that is under the receiver's horizon.
@@ -46,7 +46,7 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, part: &Part, group: usize) {
+    fn add(&mut self, part: &LightSample, group: usize) {
         self.center[group] += part.center;
         self.disc[group] += part.disc;
         self.sets |= part.disc <= 0.0;
@@ -86,37 +86,37 @@ impl Sources<'_> {
     pub(super) fn punctual(
         &self,
         lights: &[u32],
-        between: &Between<'_>,
+        visibility: &Visibility<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) {
         for &index in lights {
-            self.one(index, between, sequence, samples, point, direct);
+            self.one(index, visibility, sequence, samples, point, direct);
         }
     }
 
     fn one(
         &self,
         index: u32,
-        between: &Between<'_>,
+        visibility: &Visibility<'_>,
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) {
         let placed = &self.lights[index as usize];
-        let way = between.way(index);
-        let (mean, variance) = match way {
-            Some(Way::Dark) => return,
-            Some(Way::Hidden) => {
+        let known = visibility.of_light(index);
+        let (mean, variance) = match known {
+            Some(LightVisibility::Dark) => return,
+            Some(LightVisibility::Hidden) => {
                 direct.seen.add(FIRST_ID + index, 0, 1);
                 return;
             }
-            Some(way) if !placed.is_sized() => self.past_shadows(index, way, between, point, direct),
-            way => {
-                let clear = matches!(way, Some(Way::Clear));
+            Some(known) if !placed.is_sized() => self.past_shadows(index, known, visibility, point, direct),
+            known => {
+                let clear = matches!(known, Some(LightVisibility::Clear));
                 self.sampled(index, clear, sequence, samples, point, direct)
             }
         };
@@ -162,22 +162,24 @@ impl Sources<'_> {
     fn past_shadows(
         &self,
         index: u32,
-        way: &Way,
-        between: &Between<'_>,
+        known: &LightVisibility,
+        visibility: &Visibility<'_>,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
         let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
-        let open = || Unoccluded::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
-        let (Way::Shadows(origin, shadows), Some(shown)) = (way, &between.shown) else {
+        let open =
+            || ReceiverQuadrature::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
+        let (LightVisibility::Shadows(origin, shadows), Some(shape)) = (known, &visibility.receiver_shape)
+        else {
             direct.seen.add(FIRST_ID + index, 1, 0);
             let (open, variance) = open();
             return (open.x, variance);
         };
         let Some(middle) = point(0.5, 0.5) else { return (0.0, 0.0) };
         let (mut sum, mut lit, mut room) = (0.0, 0.0, Pieces::new());
-        let exact = origin.lit(shown, shadows, &mut room, |place: DVec3, share| {
+        let exact = origin.lit(shape, shadows, &mut room, |place: DVec3, share| {
             sum += share * f64::from(arriving(&Receiver { position: place.as_vec3(), ..middle }));
             lit += share;
         });
@@ -189,8 +191,8 @@ impl Sources<'_> {
         let (open, variance) = open();
         // Pieces have one point each, all of the receiver several.
         let whole = arriving(&middle);
-        let mean = match shown {
-            Shown::Parallelogram(_) if whole > 0.0 => open.x * (sum / f64::from(whole)) as f32,
+        let mean = match shape {
+            ReceiverShape::Parallelogram(_) if whole > 0.0 => open.x * (sum / f64::from(whole)) as f32,
             _ => sum as f32,
         };
         // Of points in four rows or more, an edge is off by half a row at most.
@@ -211,9 +213,10 @@ pub(super) fn part(
     receiver: &Receiver,
     (u, v): (f32, f32),
     clear: bool,
-) -> Option<Part> {
+) -> Option<LightSample> {
     let light = &placed.light;
-    let Unshadowed { axis, distance, strength } = unshadowed(scene, placed, receiver.position)?;
+    let PunctualIrradiance { axis, distance, strength } =
+        punctual_irradiance(scene, placed, receiver.position)?;
     let directional = light.kind == LightKind::Directional;
     let sine =
         if directional { (0.5 * f64::from(light.angle)).sin() } else { f64::from(light.radius) / distance };
@@ -240,7 +243,7 @@ pub(super) fn part(
         return None;
     }
     if weight <= 0.0 || direction.dot(facet) <= 0.0 {
-        return Some(Part { center, disc: disc.min(0.0), visible: false });
+        return Some(LightSample { center, disc: disc.min(0.0), visible: false });
     }
     let blocked = if clear {
         false
@@ -255,5 +258,5 @@ pub(super) fn part(
         let target = if sine > 0.0 { position + direction * reach } else { placed.position };
         scene.blocked(receiver.origin, scene.space.position(target))
     };
-    Some(Part { center, disc, visible: !blocked })
+    Some(LightSample { center, disc, visible: !blocked })
 }

@@ -1,6 +1,6 @@
 //! What may stand between a flat piece of surface and what shines on it: the triangles that reach into the convex hull of both (Haines and
 //! Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991). Where none does, no shadow ray is needed. What is named may still
-//! stand beside; what is not named does not matter. Not how much they hide: that is `visible_part` and `lit_part`.
+//! stand beside; what is not named does not matter. Not how much they hide: that is `visible_part` and `shadow_clipping`.
 
 use glam::DVec3;
 

@@ -32,14 +32,14 @@ mod tests {
     use super::*;
     use crate::sampling::{Sequence, cosine_direction};
 
-    /// Of many scrambles, the mean squared error of the share that a chord cuts off the disc, and the mean of what is stated for it.
+    /// Of many replicates, the mean squared error of the share that a chord cuts off the disc, and the mean of what is stated for it.
     fn of_chord(height: f32, samples: u32) -> (f64, f64, usize) {
         let exact =
             f64::from((height.acos() - height * (1.0 - height * height).sqrt()) / std::f32::consts::PI);
         let (mut squares, mut stated, mut none) = (0.0, 0.0, 0);
-        const SCRAMBLES: u32 = 2000;
-        for scramble in 0..SCRAMBLES {
-            let sequence = Sequence::new(7, 1, scramble);
+        const REPLICATES: u32 = 2000;
+        for replicate in 0..REPLICATES {
+            let sequence = Sequence::new(7, 1, replicate);
             let mut groups = [0.0f32; GROUPS];
             for sample in 0..samples {
                 let [u, v, ..] = sequence.point(sample, 0);
@@ -54,7 +54,7 @@ mod tests {
             stated += f64::from(share_variance(shares, mean, samples));
             none += usize::from(variance_of_mean(shares) == 0.0);
         }
-        (squares / f64::from(SCRAMBLES), stated / f64::from(SCRAMBLES), none)
+        (squares / f64::from(REPLICATES), stated / f64::from(REPLICATES), none)
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::direct::Receiver;
 use crate::scene::{BakeScene, PlacedLight};
 
 /// What arrives at a point from a light, whatever lies between.
-pub(super) struct Unshadowed {
+pub(super) struct PunctualIrradiance {
     /// Towards its centre.
     pub axis: DVec3,
     /// Metres; infinite for directional lights.
@@ -19,7 +19,11 @@ pub(super) struct Unshadowed {
 }
 
 /// `None` where nothing arrives.
-pub(super) fn unshadowed(scene: &BakeScene, placed: &PlacedLight, position: Vec3) -> Option<Unshadowed> {
+pub(super) fn punctual_irradiance(
+    scene: &BakeScene,
+    placed: &PlacedLight,
+    position: Vec3,
+) -> Option<PunctualIrradiance> {
     let light = &placed.light;
     let position = scene.space.world(position);
     let arriving = evaluate_light(light, placed.position, placed.axis, position);
@@ -27,12 +31,14 @@ pub(super) fn unshadowed(scene: &BakeScene, placed: &PlacedLight, position: Vec3
     let distance = if directional { f64::INFINITY } else { placed.position.distance(position) };
     let weakened = if directional { arriving.attenuation } else { attenuation(light, distance) };
     let strength = PI * weakened * arriving.spot;
-    (strength > 0.0).then_some(Unshadowed { axis: arriving.direction, distance, strength })
+    (strength > 0.0).then_some(PunctualIrradiance { axis: arriving.direction, distance, strength })
 }
 
 /// Irradiance by a light without size, per unit of its colour, whatever lies between.
 pub(super) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Receiver) -> f32 {
-    let Some(Unshadowed { axis, strength, .. }) = unshadowed(scene, placed, receiver.position) else {
+    let Some(PunctualIrradiance { axis, strength, .. }) =
+        punctual_irradiance(scene, placed, receiver.position)
+    else {
         return 0.0;
     };
     if axis.dot(receiver.geometric_normal.as_dvec3()) <= 0.0 {

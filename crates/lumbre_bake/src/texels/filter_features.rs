@@ -2,7 +2,7 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::gather::SCRAMBLES;
+use super::gather::REPLICATES;
 use super::lanes::{Kernel, Strips, lanes};
 use super::neighbours::Block;
 use super::plane::{HALF, VALUES};
@@ -11,7 +11,7 @@ use super::smooth::Smoothed;
 /// Reach over which a texel's noise is averaged, in steps.
 pub(crate) const NOISE_STEPS: usize = 2;
 
-/// Variance of the scrambles' mean, sum of the channels.
+/// Variance of the replicates' mean, sum of the channels.
 pub(crate) struct Variances<'a>(pub &'a Smoothed);
 
 impl Kernel<1> for Variances<'_> {
@@ -21,7 +21,7 @@ impl Kernel<1> for Variances<'_> {
     }
 }
 
-/// The channels of all scrambles of the texels themselves.
+/// The channels of all replicates of the texels themselves.
 #[inline(always)]
 pub(crate) fn own_values<const N: usize, S: Simd>(
     block: &Block<'_, S>,
@@ -40,9 +40,9 @@ pub(crate) fn sum_of_variances<S: Simd>(simd: S, values: &[f32x8<S>; VALUES]) ->
     let mut sum = simd.splat_f32x8(0.0);
     for channel in 0..3 {
         let [a, b, c, d] = [values[channel], values[3 + channel], values[6 + channel], values[9 + channel]];
-        let mean = (a + b + c + d) / SCRAMBLES as f32;
+        let mean = (a + b + c + d) / REPLICATES as f32;
         let [a, b, c, d] = [a - mean, b - mean, c - mean, d - mean];
-        sum += (a * a + b * b + c * c + d * d) / (SCRAMBLES * (SCRAMBLES - 1)) as f32;
+        sum += (a * a + b * b + c * c + d * d) / (REPLICATES * (REPLICATES - 1)) as f32;
     }
     sum
 }
@@ -50,19 +50,19 @@ pub(crate) fn sum_of_variances<S: Simd>(simd: S, values: &[f32x8<S>; VALUES]) ->
 /// A texel's noise: its own spread of four is itself noise, the neighbourhood's mean is not. And what tells edges: the means of both halves
 /// over the texels next to it. Each half's weights come from the other half: noise that shaped the weights would pull the mean towards
 /// what is most frequent, and light is lost (Rousselle, Knaus, Zwicker, "Adaptive Rendering with Non-Local Means", 2012).
-pub(crate) struct Guides<'a, const STEP: usize> {
+pub(crate) struct Features<'a, const STEP: usize> {
     /// Reach of the means that tell edges, in steps.
     pub steps: usize,
     pub estimates: &'a Smoothed,
     pub variances: &'a Strips<1>,
 }
 /// The channels for the weights of each half, and the noise.
-pub(crate) const GUIDES: usize = 2 * 3 + 1;
+pub(crate) const FEATURES: usize = 2 * 3 + 1;
 pub(crate) const NOISE: usize = 2 * 3;
 
-impl<const STEP: usize> Kernel<GUIDES> for Guides<'_, STEP> {
+impl<const STEP: usize> Kernel<FEATURES> for Features<'_, STEP> {
     #[inline(always)]
-    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; GUIDES]) -> [f32x8<S>; GUIDES] {
+    fn at<S: Simd>(&self, block: &Block<'_, S>, _: &[f32x8<S>; FEATURES]) -> [f32x8<S>; FEATURES] {
         let simd = block.simd;
         let (sums, count) = block.sums(
             self.steps,
@@ -81,10 +81,10 @@ impl<const STEP: usize> Kernel<GUIDES> for Guides<'_, STEP> {
             },
         );
         let scale = simd.splat_f32x8(1.0) / (count * HALF as f32).max(1.0);
-        let mut guides = [block.mean(self.variances, 0, NOISE_STEPS, STEP); GUIDES];
-        for (guide, sum) in guides.iter_mut().zip(sums) {
+        let mut features = [block.mean(self.variances, 0, NOISE_STEPS, STEP); FEATURES];
+        for (guide, sum) in features.iter_mut().zip(sums) {
             *guide = sum * scale;
         }
-        guides
+        features
     }
 }

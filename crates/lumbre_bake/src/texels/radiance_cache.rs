@@ -5,11 +5,11 @@ use glam::{Vec2, Vec3};
 use super::divided_light::DividedLight;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
-use crate::transport::guide::Guide;
 use crate::transport::patches::Patches;
+use crate::transport::sampling_guide::SamplingGuide;
 
 /// The light that leaves surfaces, as the gather reads it.
-pub(crate) struct Outgoing<'a> {
+pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
@@ -28,12 +28,12 @@ pub(crate) struct Outgoing<'a> {
     /// Hits nearer than this get a real bounce more, canonical units.
     pub near: f32,
     /// Where each patch's light comes from.
-    pub guide: &'a Guide,
-    /// Samples of each scramble in the first round.
+    pub guide: &'a SamplingGuide,
+    /// Samples of each replicate in the first round.
     pub run: u32,
 }
 
-impl Outgoing<'_> {
+impl RadianceCache<'_> {
     /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };

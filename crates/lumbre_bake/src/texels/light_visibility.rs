@@ -7,30 +7,30 @@ use crate::scene::{BakeScene, PlacedLight};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::cut_out::{Pieces, Shadow};
 use crate::transport::direct::Sources;
-use crate::transport::lit_part::{Origin, Way};
+use crate::transport::shadow_clipping::{LightVisibility, Origin};
 use crate::transport::shaft::{Area, Shaft, WIDEST};
 
 /// What is known of the ways of some lights, by ascending number, to an area of a flat surface. `texel_side` is that of its texels.
-pub(super) fn ways(
+pub(super) fn visibilities(
     sources: &Sources<'_>,
     lights: &[u32],
     area: &Area,
     texel_side: f32,
     tree: &BoxTree,
-) -> Vec<(u32, Way)> {
+) -> Vec<(u32, LightVisibility)> {
     let of_light = |&index: &u32| {
         if sources.scene.stop.is_set() {
             return None;
         }
         let placed = &sources.lights[index as usize];
-        let way = match is_out_of_range(sources.scene, placed, area) {
-            true => Way::Dark,
+        let visibility = match is_out_of_range(sources.scene, placed, area) {
+            true => LightVisibility::Dark,
             false if is_even(sources.scene, placed, area, texel_side) => {
-                way(sources.scene, placed, area, tree)?
+                visibility(sources.scene, placed, area, tree)?
             }
             false => return None,
         };
-        Some((index, way))
+        Some((index, visibility))
     };
     lights.iter().filter_map(of_light).collect()
 }
@@ -83,7 +83,12 @@ const NEAR: f64 = 2.0;
 const AFAR: f64 = (1 << 14) as f64;
 
 /// `None` where rays have to tell.
-fn way(scene: &BakeScene, placed: &PlacedLight, area: &Area, tree: &BoxTree) -> Option<Way> {
+fn visibility(
+    scene: &BakeScene,
+    placed: &PlacedLight,
+    area: &Area,
+    tree: &BoxTree,
+) -> Option<LightVisibility> {
     let light = &placed.light;
     let (shaft, origin) = match light.kind {
         LightKind::Directional => {
@@ -102,10 +107,10 @@ fn way(scene: &BakeScene, placed: &PlacedLight, area: &Area, tree: &BoxTree) -> 
             }
         }
     };
-    let Some(shaft) = shaft else { return Some(Way::Dark) };
+    let Some(shaft) = shaft else { return Some(LightVisibility::Dark) };
     let blockers = shaft.triangles(scene, tree, MOST_BLOCKERS)?;
     if blockers.is_empty() {
-        return Some(Way::Clear);
+        return Some(LightVisibility::Clear);
     }
     let origin = origin?;
     let corners = |&index: &u32| scene.triangles[index as usize].corners.map(|corner| corner.as_dvec3());
@@ -113,11 +118,11 @@ fn way(scene: &BakeScene, placed: &PlacedLight, area: &Area, tree: &BoxTree) -> 
         blockers.iter().map(corners).filter_map(|corners: [DVec3; 3]| origin.shadow(corners)).collect();
     let mut room = Pieces::new();
     if shadows.is_empty() {
-        Some(Way::Clear)
+        Some(LightVisibility::Clear)
     } else if origin.hides_all(area.corners, &shadows, &mut room) {
-        Some(Way::Hidden)
+        Some(LightVisibility::Hidden)
     } else {
-        Some(Way::Shadows(origin, shadows))
+        Some(LightVisibility::Shadows(origin, shadows))
     }
 }
 

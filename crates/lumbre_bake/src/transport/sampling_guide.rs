@@ -10,7 +10,7 @@ use crate::scene::BakeScene;
 
 /// For each region, those that light it by bounces, with a probability in proportion to the irradiance they bring.
 #[derive(Clone, Debug)]
-pub(crate) struct Guide {
+pub(crate) struct SamplingGuide {
     /// Cut as patches are, but larger.
     pub regions: Patches,
     rows: Rows,
@@ -24,7 +24,7 @@ const STEPS: f32 = 8.0;
 /// Patches along a region's side.
 const REGION: f32 = 4.0;
 
-impl Guide {
+impl SamplingGuide {
     /// From the patches (of `side` canonical units), their exchange, what leaves each of them and what the sky brings it (W/m²).
     pub fn new(
         scene: &BakeScene,
@@ -93,23 +93,23 @@ impl Guide {
     }
 
     /// Where in the list of those that light `region` to look for the one at `u` in [0, 1).
-    pub fn near(&self, region: u32, u: f32) -> Part {
+    pub fn near(&self, region: u32, u: f32) -> RowPart {
         self.rows.near(region, u)
     }
 
     /// Of those that light a region, the one at `u`, of which `part` is [near](Self::near); the place within its interval, stretched to
     /// [0, 1); its probability.
-    pub fn pick(&self, part: &Part, u: f32) -> Option<(u32, f32, f32)> {
+    pub fn pick(&self, part: &RowPart, u: f32) -> Option<(u32, f32, f32)> {
         self.rows.pick(part, u)
     }
 
     /// Where in the list of those that light `region` to look for `other`.
-    pub fn near_region(&self, region: u32, other: u32) -> Part {
+    pub fn near_region(&self, region: u32, other: u32) -> RowPart {
         self.rows.near_column(region, other)
     }
 
     /// The probability that [`pick`](Self::pick) takes `other`, of which `part` is [near](Self::near_region).
-    pub fn probability(&self, part: &Part, other: u32) -> f32 {
+    pub fn probability(&self, part: &RowPart, other: u32) -> f32 {
         self.rows.probability(part, other)
     }
 }
@@ -148,7 +148,7 @@ struct Entry {
 
 /// A part of a row, and what stands in its middle: read before it is needed, together with those of other samples.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Part {
+pub(crate) struct RowPart {
     /// Where the row begins in the list of all entries, and how many it has; the rest counts from there.
     begin: usize,
     count: u32,
@@ -158,7 +158,7 @@ pub(crate) struct Part {
     entry: Entry,
 }
 
-impl Part {
+impl RowPart {
     /// Of no row.
     pub const NONE: Self =
         Self { begin: 0, count: 0, first: 0, last: 0, middle: 0, entry: Entry { column: 0, end: 1.0 } };
@@ -196,14 +196,14 @@ impl Rows {
         }
     }
 
-    fn part(&self, index: &[u32], row: u32, part: usize) -> Part {
+    fn part(&self, index: &[u32], row: u32, part: usize) -> RowPart {
         let at = row as usize * (PARTS + 1) + part.min(PARTS - 1);
         let Head { start: begin, count, .. } = self.heads[row as usize];
         let (first, last) = (index[at], index[at + 1]);
         let middle = first.midpoint(last);
         let entry =
             self.entries.get(begin + middle as usize).copied().unwrap_or(Entry { column: 0, end: 1.0 });
-        Part { begin, count, first, last, middle, entry }
+        RowPart { begin, count, first, last, middle, entry }
     }
 
     fn share(&self, row: u32) -> Option<f32> {
@@ -211,16 +211,16 @@ impl Rows {
         (head.count > 0).then_some(head.share)
     }
 
-    fn near(&self, row: u32, u: f32) -> Part {
+    fn near(&self, row: u32, u: f32) -> RowPart {
         self.part(&self.cumulative_index, row, (u * PARTS as f32) as usize)
     }
 
-    fn near_column(&self, row: u32, column: u32) -> Part {
+    fn near_column(&self, row: u32, column: u32) -> RowPart {
         self.part(&self.column_index, row, (column >> self.part_bits) as usize)
     }
 
     /// The first entry of a part that is not `before`, or the end of the part; and the end of the one before it.
-    fn find(&self, part: &Part, before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
+    fn find(&self, part: &RowPart, before: impl Fn(&Entry) -> bool) -> (Option<&Entry>, f32) {
         let range = if part.first < part.last && before(&part.entry) {
             part.middle + 1..part.last
         } else {
@@ -232,7 +232,7 @@ impl Rows {
         (self.entries.get(part.begin + at).filter(|_| at < part.count as usize), start)
     }
 
-    fn pick(&self, part: &Part, u: f32) -> Option<(u32, f32, f32)> {
+    fn pick(&self, part: &RowPart, u: f32) -> Option<(u32, f32, f32)> {
         let (entry, start) = self.find(part, |entry| entry.end <= u);
         let &Entry { column, end } = entry?;
         let probability = end - start;
@@ -240,7 +240,7 @@ impl Rows {
             .then(|| (column, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
     }
 
-    fn probability(&self, part: &Part, column: u32) -> f32 {
+    fn probability(&self, part: &RowPart, column: u32) -> f32 {
         if part.first == part.last {
             return 0.0;
         }

@@ -1,31 +1,31 @@
 //! What is known of the ways from a receiver to the sources. Not how it is found: that is `shaft`; not the light: that is `direct`.
 
-use super::lit_part::{Shown, Way};
+use super::shadow_clipping::{LightVisibility, ReceiverShape};
 use super::shaft::Corners;
 
 /// What is known of the ways from a receiver to the sources: of those that are not named rays have to tell.
-pub(crate) struct Between<'a> {
+pub(crate) struct Visibility<'a> {
     /// Parts of the emissive surfaces.
-    pub parts: Vec<BeforePart>,
+    pub parts: Vec<PartOccluders>,
     /// Lights, by their numbers and in their order.
-    pub lights: &'a [(u32, Way)],
+    pub lights: &'a [(u32, LightVisibility)],
     /// What the receiver shows, where shadows of lights may fall on it.
-    pub shown: Option<Shown>,
+    pub receiver_shape: Option<ReceiverShape>,
 }
 
 /// The triangles that may stand between a receiver and the emitters of one part of the sources: no others do.
-pub(crate) struct BeforePart {
+pub(crate) struct PartOccluders {
     pub part: u32,
     /// Those that shine on it; none where nothing stands before any of them.
     pub emitters: Vec<(u32, Vec<Corners>)>,
 }
 
-impl Between<'_> {
+impl Visibility<'_> {
     /// Nothing is known.
-    pub const UNKNOWN: Self = Self { parts: Vec::new(), lights: &[], shown: None };
+    pub const UNKNOWN: Self = Self { parts: Vec::new(), lights: &[], receiver_shape: None };
 
     /// What is known of a light, by its number.
-    pub fn way(&self, light: u32) -> Option<&Way> {
+    pub fn of_light(&self, light: u32) -> Option<&LightVisibility> {
         let place = self.lights.binary_search_by_key(&light, |(light, _)| *light).ok()?;
         Some(&self.lights[place].1)
     }

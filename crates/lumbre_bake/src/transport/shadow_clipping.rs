@@ -15,7 +15,7 @@ pub(crate) enum Origin {
 
 /// What a receiver shows of a plane.
 #[derive(Clone, Debug)]
-pub(crate) enum Shown {
+pub(crate) enum ReceiverShape {
     /// Corners, one after the other.
     Parallelogram([DVec3; 4]),
     /// Each as much as any other.
@@ -24,7 +24,7 @@ pub(crate) enum Shown {
 
 /// What is known of a light without size on its way to a receiver.
 #[derive(Clone, Debug)]
-pub(crate) enum Way {
+pub(crate) enum LightVisibility {
     /// Nothing stands between; also to a light with a size.
     Clear,
     /// It does not shine here.
@@ -59,20 +59,20 @@ impl Origin {
     /// whether the shares are exact, and not those of points.
     pub fn lit(
         self,
-        shown: &Shown,
+        shape: &ReceiverShape,
         shadows: &[Shadow],
         room: &mut Pieces,
         mut visit: impl FnMut(DVec3, f64),
     ) -> bool {
         let zero = self.zero();
         let is_lit = |point: DVec3| !shadows.iter().any(|shadow| shadow.hides(point - zero));
-        match shown {
-            Shown::Points(points) => {
+        match shape {
+            ReceiverShape::Points(points) => {
                 let share = 1.0 / points.len() as f64;
                 points.iter().filter(|point| is_lit(**point)).for_each(|&point| visit(point, share));
                 false
             }
-            Shown::Parallelogram(corners) => {
+            ReceiverShape::Parallelogram(corners) => {
                 let corners = corners.map(|corner| corner - zero);
                 if room.begin(&corners).is_none() || !left(room, shadows) {
                     let share = 1.0 / f64::from(FINE * FINE);
@@ -137,5 +137,5 @@ fn middle(corners: &[DVec3]) -> (f64, DVec3) {
 }
 
 #[cfg(test)]
-#[path = "lit_part_tests.rs"]
+#[path = "shadow_clipping_tests.rs"]
 mod tests;

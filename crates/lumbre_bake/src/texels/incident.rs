@@ -5,16 +5,16 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::outgoing::Outgoing;
+use super::radiance_cache::RadianceCache;
 use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::SurfaceHit;
 use crate::scene::material::Side;
 use crate::transport::direct::Receiver;
-use crate::transport::guide::Part;
+use crate::transport::sampling_guide::RowPart;
 
 /// A receiver that asks for a sample of its light by bounces.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct GatherRequest {
     pub receiver: Receiver,
     /// Its region of the guide; without one cosine rays only.
     pub region: Option<u32>,
@@ -23,7 +23,7 @@ pub(super) struct Asked {
     pub v: f32,
 }
 
-impl Asked {
+impl GatherRequest {
     /// Fills the lists' empty places.
     pub const NOWHERE: Self = Self {
         receiver: Receiver {
@@ -40,7 +40,7 @@ impl Asked {
 
 /// A surface that a sample has met.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Met {
+pub(super) struct Hit {
     pub triangle: u32,
     pub side: Side,
     pub at: (f32, f32),
@@ -56,7 +56,7 @@ pub(super) struct Met {
     pub distance: f32,
 }
 
-impl Met {
+impl Hit {
     /// Nothing is read yet.
     const UNREAD: Self = Self {
         triangle: 0,
@@ -74,17 +74,17 @@ impl Met {
 
 /// What a sample has found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Arriving {
+pub(super) struct IncidentSample {
     /// A surface that reflects.
-    pub met: Option<Met>,
+    pub hit: Option<Hit>,
     /// Or else what arrives all the same, times π as all light is here: the sky's, or none. Weighted.
     pub light: Vec3,
     pub weight: f32,
 }
 
-impl Arriving {
+impl IncidentSample {
     /// No light and no weight: what the guide named is not to be seen.
-    pub const NOTHING: Self = Self { met: None, light: Vec3::ZERO, weight: 0.0 };
+    pub const NOTHING: Self = Self { hit: None, light: Vec3::ZERO, weight: 0.0 };
 }
 
 /// Where a sample looks.
@@ -93,30 +93,30 @@ pub(super) enum Aim {
     /// In a direction about the receiver's normal.
     Around(Vec3),
     /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
-    At(u32, f32, Met, Vec3),
+    At(u32, f32, Hit, Vec3),
     Nowhere,
 }
 
 /// A sample under way.
 #[derive(Clone, Copy)]
-pub(super) struct Way {
+pub(super) struct SamplePath {
     aim: Aim,
     /// Of the samples, what the guide places; none if it knows nothing of the receiver.
     share: Option<f32>,
     /// Part of the guide's row that is asked next.
-    part: Part,
+    part: RowPart,
     /// Region and texel met, where they count, and the texel's direct light.
     region: Option<u32>,
     texel: usize,
     direct: Vec3,
 }
 
-impl Way {
+impl SamplePath {
     /// Nothing is known.
     pub const NONE: Self = Self {
         aim: Aim::Nowhere,
         share: None,
-        part: Part::NONE,
+        part: RowPart::NONE,
         region: None,
         texel: usize::MAX,
         direct: Vec3::ZERO,
@@ -141,65 +141,70 @@ fn about(receiver: &Receiver, u: f32, v: f32) -> Vec3 {
     direction
 }
 
-impl Outgoing<'_> {
+impl RadianceCache<'_> {
     /// For each receiver a point that its light by bounces comes from: some of the samples, if the guide knows the receiver's region, are
     /// points of regions that it names, the others are what cosine rays meet; weighed by the balance heuristic (Veach and Guibas, "Optimally
     /// Combining Sampling Techniques for Monte Carlo Rendering", 1995, section 3.3).
-    pub(super) fn arriving(&self, asked: &[Asked], ways: &mut [Way], found: &mut [Arriving]) {
+    pub(super) fn incident(
+        &self,
+        requests: &[GatherRequest],
+        paths: &mut [SamplePath],
+        found: &mut [IncidentSample],
+    ) {
         // One thing for all samples before the next: the loops that read from afar do little else.
-        let (ways, found) = (&mut ways[..asked.len()], &mut found[..asked.len()]);
-        for (way, asked) in ways.iter_mut().zip(asked) {
-            way.share = asked.region.and_then(|region| self.guide.share(region));
-            if let (Some(region), Some(share)) = (asked.region, way.share)
-                && asked.u < share
+        let (paths, found) = (&mut paths[..requests.len()], &mut found[..requests.len()]);
+        for (path, request) in paths.iter_mut().zip(requests) {
+            path.share = request.region.and_then(|region| self.guide.share(region));
+            if let (Some(region), Some(share)) = (request.region, path.share)
+                && request.u < share
             {
-                way.part = self.guide.near(region, asked.u / share);
+                path.part = self.guide.near(region, request.u / share);
             }
         }
-        for (way, asked) in ways.iter_mut().zip(asked) {
-            self.aim(asked, way);
+        for (path, request) in paths.iter_mut().zip(requests) {
+            self.aim(request, path);
         }
-        for ((way, asked), found) in ways.iter().zip(asked).zip(found.iter_mut()) {
-            self.follow(asked, way, found);
+        for ((path, request), found) in paths.iter().zip(requests).zip(found.iter_mut()) {
+            self.follow(request, path, found);
         }
-        for (way, found) in ways.iter_mut().zip(found.iter_mut()) {
-            way.texel = usize::MAX;
-            let Some(met) = &mut found.met else { continue };
-            let Some(patch) = self.patches.at(met.triangle, met.side, met.at) else {
-                *found = Arriving::NOTHING;
+        for (path, found) in paths.iter_mut().zip(found.iter_mut()) {
+            path.texel = usize::MAX;
+            let Some(hit) = &mut found.hit else { continue };
+            let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
+                *found = IncidentSample::NOTHING;
                 continue;
             };
-            way.region = match way.aim {
+            path.region = match path.aim {
                 Aim::At(region, ..) => Some(region),
-                _ if way.share.is_some() => self.guide.regions.at(met.triangle, met.side, met.at),
+                _ if path.share.is_some() => self.guide.regions.at(hit.triangle, hit.side, hit.at),
                 _ => None,
             };
-            met.patch = patch;
-            met.reflectance = self.reflectance(met.triangle, met.side, met.at);
-            way.texel = self.texel_at(met.triangle, met.side, met.at);
+            hit.patch = patch;
+            hit.reflectance = self.reflectance(hit.triangle, hit.side, hit.at);
+            path.texel = self.texel_at(hit.triangle, hit.side, hit.at);
         }
-        for way in ways.iter_mut() {
-            way.direct = self.direct.get(way.texel).copied().unwrap_or(Vec3::NAN);
+        for path in paths.iter_mut() {
+            path.direct = self.direct.get(path.texel).copied().unwrap_or(Vec3::NAN);
         }
-        for ((way, asked), found) in ways.iter_mut().zip(asked).zip(found.iter_mut()) {
-            let Some(met) = &mut found.met else { continue };
-            met.indirect = self.patch_indirect[met.patch as usize];
-            met.error = self.patch_error[met.patch as usize];
-            if let (Aim::Around(_), Some(own), Some(region)) = (&way.aim, asked.region, way.region) {
-                way.part = self.guide.near_region(own, region);
+        for ((path, request), found) in paths.iter_mut().zip(requests).zip(found.iter_mut()) {
+            let Some(hit) = &mut found.hit else { continue };
+            hit.indirect = self.patch_indirect[hit.patch as usize];
+            hit.error = self.patch_error[hit.patch as usize];
+            if let (Aim::Around(_), Some(own), Some(region)) = (&path.aim, request.region, path.region) {
+                path.part = self.guide.near_region(own, region);
             }
         }
-        for ((way, asked), found) in ways.iter().zip(asked).zip(found) {
-            let Some(met) = &mut found.met else { continue };
-            met.direct = if way.direct.x.is_nan() {
-                self.direct_of_part(met.triangle, met.side, met.at, met.patch)
+        for ((path, request), found) in paths.iter().zip(requests).zip(found) {
+            let Some(hit) = &mut found.hit else { continue };
+            hit.direct = if path.direct.x.is_nan() {
+                self.direct_of_part(hit.triangle, hit.side, hit.at, hit.patch)
             } else {
-                way.direct
+                path.direct
             };
-            if let Some(share) = way.share {
-                match self.weight(asked, way, share, met) {
+            if let Some(share) = path.share {
+                match self.weight(request, path, share, hit) {
                     Some(weight) => found.weight = weight,
-                    None => *found = Arriving::NOTHING,
+                    None => *found = IncidentSample::NOTHING,
                 }
             }
         }
@@ -207,13 +212,13 @@ impl Outgoing<'_> {
 
     /// Where to look.
     #[inline]
-    fn aim(&self, asked: &Asked, way: &mut Way) {
-        let &Asked { ref receiver, u, v, .. } = asked;
-        way.aim = match way.share {
+    fn aim(&self, request: &GatherRequest, path: &mut SamplePath) {
+        let &GatherRequest { ref receiver, u, v, .. } = request;
+        path.aim = match path.share {
             None => Aim::Around(about(receiver, u, v)),
             Some(share) if u >= share => Aim::Around(about(receiver, (u - share) / (1.0 - share), v)),
             Some(share) => {
-                let picked = self.guide.pick(&way.part, u / share);
+                let picked = self.guide.pick(&path.part, u / share);
                 let point = picked
                     .and_then(|(region, u, probability)| self.point_of(receiver, region, probability, u, v));
                 point.unwrap_or(Aim::Nowhere)
@@ -223,23 +228,23 @@ impl Outgoing<'_> {
 
     /// What is there, its light not read yet.
     #[inline]
-    fn follow(&self, asked: &Asked, way: &Way, found: &mut Arriving) {
-        *found = Arriving::NOTHING;
-        let origin = asked.receiver.origin;
-        match &way.aim {
+    fn follow(&self, request: &GatherRequest, path: &SamplePath, found: &mut IncidentSample) {
+        *found = IncidentSample::NOTHING;
+        let origin = request.receiver.origin;
+        match &path.aim {
             Aim::Nowhere => {}
-            Aim::At(_, _, met, end) => {
+            Aim::At(_, _, hit, end) => {
                 if !self.scene.blocked(origin, *end) {
-                    found.met = Some(*met);
+                    found.hit = Some(*hit);
                     found.weight = 1.0;
                 }
             }
             &Aim::Around(direction) => {
                 // The sky is found by these alone.
-                let rest = 1.0 - way.share.unwrap_or(0.0);
+                let rest = 1.0 - path.share.unwrap_or(0.0);
                 match self.scene.first_hit(origin, direction) {
                     SurfaceHit::Lit { triangle, side, at, distance } => {
-                        found.met = Some(Met { triangle, side, at, direction, distance, ..Met::UNREAD });
+                        found.hit = Some(Hit { triangle, side, at, direction, distance, ..Hit::UNREAD });
                         found.weight = 1.0;
                     }
                     SurfaceHit::None => (found.light, found.weight) = (self.sky / rest, 1.0 / rest),
@@ -251,17 +256,17 @@ impl Outgoing<'_> {
 
     /// The weight of a sample of which the guide places a share.
     #[inline]
-    fn weight(&self, asked: &Asked, way: &Way, share: f32, met: &Met) -> Option<f32> {
-        let region = way.region?;
-        let probability = match way.aim {
+    fn weight(&self, request: &GatherRequest, path: &SamplePath, share: f32, hit: &Hit) -> Option<f32> {
+        let region = path.region?;
+        let probability = match path.aim {
             Aim::At(_, probability, ..) => probability,
-            _ => self.guide.probability(&way.part, region),
+            _ => self.guide.probability(&path.part, region),
         };
         // Densities over the surfaces' area.
         let by_guide = probability / self.guide.regions.list[region as usize].area;
-        let normal = self.scene.triangles[met.triangle as usize].side_normal(met.side);
-        let cosine = -met.direction.dot(normal);
-        let by_cosine = kernel(&asked.receiver, met.direction) * cosine / (met.distance * met.distance);
+        let normal = self.scene.triangles[hit.triangle as usize].side_normal(hit.side);
+        let cosine = -hit.direction.dot(normal);
+        let by_cosine = kernel(&request.receiver, hit.direction) * cosine / (hit.distance * hit.distance);
         let weight = by_cosine / ((1.0 - share) * by_cosine + share * by_guide);
         (cosine > 0.0 && weight.is_finite()).then_some(weight)
     }
@@ -283,16 +288,16 @@ impl Outgoing<'_> {
             return None;
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
-        let met = Met { triangle, side, at, direction, distance, ..Met::UNREAD };
-        Some(Aim::At(index, probability, met, end))
+        let hit = Hit { triangle, side, at, direction, distance, ..Hit::UNREAD };
+        Some(Aim::At(index, probability, hit, end))
     }
 
     /// The receiver at a surface that was met.
-    pub(super) fn receiver_at(&self, met: &Met) -> Receiver {
-        let surface = &self.scene.triangles[met.triangle as usize];
-        let position = surface.position(met.at.0, met.at.1);
-        let origin = self.scene.off_surface(met.triangle, met.side, position);
-        let normal = surface.side_normal(met.side);
+    pub(super) fn receiver_at(&self, hit: &Hit) -> Receiver {
+        let surface = &self.scene.triangles[hit.triangle as usize];
+        let position = surface.position(hit.at.0, hit.at.1);
+        let origin = self.scene.off_surface(hit.triangle, hit.side, position);
+        let normal = surface.side_normal(hit.side);
         Receiver { position, origin, geometric_normal: normal, normal }
     }
 }

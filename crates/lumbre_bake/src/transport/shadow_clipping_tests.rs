@@ -10,10 +10,10 @@ fn floor() -> [DVec3; 4] {
 }
 
 /// Share that is lit, and the mean place of what is, times that share.
-fn lit(origin: Origin, shown: &Shown, blockers: &[[DVec3; 3]]) -> (f64, DVec3) {
+fn lit(origin: Origin, shape: &ReceiverShape, blockers: &[[DVec3; 3]]) -> (f64, DVec3) {
     let shadows: Vec<Shadow> = blockers.iter().filter_map(|&corners| origin.shadow(corners)).collect();
     let (mut share, mut moment) = (0.0, DVec3::ZERO);
-    origin.lit(shown, &shadows, &mut Pieces::new(), |place, own| {
+    origin.lit(shape, &shadows, &mut Pieces::new(), |place, own| {
         share += own;
         moment += place * own;
     });
@@ -34,7 +34,7 @@ fn a_square_sheet_throws_a_square_shadow() {
         (Origin::Direction(DVec3::Y), 0.3),
         (Origin::Point(DVec3::NEG_Y), 0.0),
     ] {
-        let (share, moment) = lit(origin, &Shown::Parallelogram(floor()), &square(0.15, 0.5));
+        let (share, moment) = lit(origin, &ReceiverShape::Parallelogram(floor()), &square(0.15, 0.5));
         assert!((share - (1.0 - side * side)).abs() < 1e-12, "{origin:?} {share}");
         // The floor's middle is 0.05 beside the shadow's.
         assert!((moment - DVec3::X * 0.05).length() < 1e-12, "{origin:?} {moment}");
@@ -44,7 +44,7 @@ fn a_square_sheet_throws_a_square_shadow() {
         square(0.4, 0.5).into_iter().filter_map(|corners| all.shadow(corners)).collect();
     assert!(all.hides_all(floor(), &shadows, &mut Pieces::new()));
     assert!(!all.hides_all(floor(), &shadows[..1], &mut Pieces::new()));
-    assert_eq!(lit(all, &Shown::Parallelogram(floor()), &square(0.4, 0.5)).0, 0.0);
+    assert_eq!(lit(all, &ReceiverShape::Parallelogram(floor()), &square(0.4, 0.5)).0, 0.0);
 }
 
 /// Random triangles: what is lit is what a fine grid of segments to the light finds lit, whether cut or by points.
@@ -84,12 +84,12 @@ fn a_crowd_of_triangles_leaves_what_segments_find_lit() {
             .map(|place| a + (b - a) * at(place % SIDE) + (d - a) * at(place / SIDE))
             .collect();
         let expected = points.iter().filter(|point| is_lit(**point)).count() as f64 / points.len() as f64;
-        let (whole, _) = lit(origin, &Shown::Parallelogram(floor()), &blockers);
+        let (whole, _) = lit(origin, &ReceiverShape::Parallelogram(floor()), &blockers);
         // An edge right across meets 128 cells of 128², each wrong by a half at most and by chance: √128 / 128² / √12, here four edges and
         // 5 sigma, 2e-3. Sixty triangles make more pieces than are kept: a grid of 8 by 8 points, so 1/64 for each of some edges.
         let bound = if count == 4 { 2e-3 } else { 0.05 };
         assert!((whole - expected).abs() < bound, "{crowd}: {whole} {expected}");
-        let (by_points, _) = lit(origin, &Shown::Points(points), &blockers);
+        let (by_points, _) = lit(origin, &ReceiverShape::Points(points), &blockers);
         assert!((by_points - expected).abs() < 1e-9, "{crowd}: {by_points} {expected}");
         partly += u32::from(expected > 0.02 && expected < 0.98);
     }
@@ -100,10 +100,10 @@ fn a_crowd_of_triangles_leaves_what_segments_find_lit() {
 fn scales_do_not_matter() {
     let blockers = square(0.2, 0.4);
     let origin = DVec3::new(0.3, 1.0, 0.1);
-    let (one, _) = lit(Origin::Point(origin), &Shown::Parallelogram(floor()), &blockers);
+    let (one, _) = lit(Origin::Point(origin), &ReceiverShape::Parallelogram(floor()), &blockers);
     let large = |corners: [DVec3; 3]| corners.map(|corner| corner * 1024.0);
-    let shown = Shown::Parallelogram(floor().map(|corner| corner * 1024.0));
-    let (other, _) = lit(Origin::Point(origin * 1024.0), &shown, &blockers.map(large));
+    let shape = ReceiverShape::Parallelogram(floor().map(|corner| corner * 1024.0));
+    let (other, _) = lit(Origin::Point(origin * 1024.0), &shape, &blockers.map(large));
     assert!(one > 0.1 && one < 0.9 && one.to_bits() == other.to_bits(), "{one} {other}");
 }
 
@@ -112,7 +112,7 @@ fn points_on_an_edge_that_triangles_share_are_hidden() {
     let along: Vec<DVec3> =
         (0..101).map(|i| DVec3::new(0.002, 0.0, 0.002) * f64::from(i) - DVec3::new(0.1, 0.0, 0.1)).collect();
     for origin in [Origin::Point(DVec3::Y), Origin::Direction(DVec3::Y)] {
-        let (share, _) = lit(origin, &Shown::Points(along.clone()), &square(0.11, 0.5));
+        let (share, _) = lit(origin, &ReceiverShape::Points(along.clone()), &square(0.11, 0.5));
         assert_eq!(share, 0.0, "{origin:?}");
     }
 }

@@ -1,11 +1,11 @@
 //! The mean over a receiver of light that nothing hides, by a few of its points, and what that leaves open. Not the light at a point: that is
-//! `emitter_tree`'s and `unshadowed`'s.
+//! `emitter_tree`'s and `punctual_irradiance`'s.
 
 use glam::Vec3;
 
 /// Exact unoccluded light at evenly spread points of a receiver, in pairs about its middle, so that what is left is of second order
 /// in its size.
-pub(super) struct Unoccluded {
+pub(super) struct ReceiverQuadrature {
     sum: Vec3,
     least: f32,
     most: f32,
@@ -19,7 +19,7 @@ const MANY: [u32; 16] = [5, 3, 15, 11, 7, 1, 13, 9, 6, 2, 14, 8, 4, 0, 12, 10];
 /// Light that differs by this part of its mean over the first points calls for more: at a lamp's edge it changes within a texel.
 const UNEVEN: f32 = 0.05;
 
-impl Unoccluded {
+impl ReceiverQuadrature {
     fn at<const N: usize>(points: [u32; N], light: impl Fn(f32, f32) -> Option<Vec3>) -> (Self, f32) {
         let mut found = Self { sum: Vec3::ZERO, least: f32::INFINITY, most: 0.0 };
         let mut count = 0.0;
