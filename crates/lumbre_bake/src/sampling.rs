@@ -7,6 +7,71 @@ use std::sync::LazyLock;
 use glam::Vec3;
 use sobol_burley::parts::{self, Int4, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
+/// What samples are drawn for: each has scrambles of its own, so that no two stages sample alike. Where something is sampled several times, which
+/// of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stream {
+    /// Cosine rays of a patch.
+    FormFactors,
+    /// Where on a texel it is asked whether it is hidden, and what is seen from there.
+    HiddenTexel,
+    HiddenView,
+    /// Shadow rays of a texel to sources that have samples of their own.
+    DirectLight,
+    /// Shadow rays of a patch, in two halves.
+    PatchLight(u32),
+    /// Lines through the whole scene, in two halves.
+    GlobalLines(u32),
+    /// Lines between two patches that are near each other.
+    NearPairs,
+    /// Rays of the final gather, by replicate.
+    Gather(u32),
+    /// Where the map's resolution is judged, and the light there.
+    ResolutionPoints,
+    ResolutionLight,
+    /// Rays of a probe, by replicate; and those of its sides to emissive faces.
+    ProbeSphere(u32),
+    ProbeSide(u32),
+    /// What may have changed since a former bake, of patches and of blocks of texels.
+    ChangedPatches,
+    ChangedTexels,
+    /// Shadow rays of the parts of a divided texel.
+    DividedTexel,
+    /// Walks that find the light around.
+    LocalLight,
+    /// Shadow rays to sources that share samples, by replicate.
+    SharedLight(u32),
+    #[cfg(test)]
+    Test(u32),
+}
+
+impl Stream {
+    /// The number that scrambles are made from, one for each stream.
+    pub fn number(self) -> u32 {
+        match self {
+            Self::FormFactors => 1,
+            Self::HiddenTexel => 2,
+            Self::HiddenView => 3,
+            Self::DirectLight => 4,
+            Self::PatchLight(half) => 5 + half,
+            Self::GlobalLines(half) => 12 + half,
+            Self::NearPairs => 14,
+            Self::Gather(replicate) => 16 + replicate,
+            Self::ResolutionPoints => 40,
+            Self::ResolutionLight => 41,
+            Self::ProbeSphere(replicate) => 48 + replicate,
+            Self::ProbeSide(side) => 52 + side,
+            Self::ChangedPatches => 60,
+            Self::ChangedTexels => 61,
+            Self::DividedTexel => 64,
+            Self::LocalLight => 80,
+            Self::SharedLight(replicate) => 96 + replicate,
+            #[cfg(test)]
+            Self::Test(number) => number,
+        }
+    }
+}
+
 /// A sequence of 4D points in [0, 1)⁴, of its own scramble.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sequence {
@@ -18,8 +83,8 @@ const LENGTH: u32 = 1 << 16;
 
 impl Sequence {
     /// One scramble for every (seed, what it is for, which one).
-    pub fn new(seed: u32, purpose: u32, index: u32) -> Self {
-        Self { seed: hash(hash(hash(seed) ^ purpose.wrapping_mul(0x9e37_79b9)) ^ index) }
+    pub fn new(seed: u32, stream: Stream, index: u32) -> Self {
+        Self { seed: hash(hash(hash(seed) ^ stream.number().wrapping_mul(0x9e37_79b9)) ^ index) }
     }
 
     /// Another scramble for each `which`.
@@ -176,6 +241,36 @@ mod tests {
     use super::*;
 
     #[test]
+    fn no_two_streams_share_a_number() {
+        let each = |count: u32, stream: fn(u32) -> Stream| (0..count).map(move |which| stream(which));
+        let once = [
+            Stream::FormFactors,
+            Stream::HiddenTexel,
+            Stream::HiddenView,
+            Stream::DirectLight,
+            Stream::NearPairs,
+            Stream::ResolutionPoints,
+            Stream::ResolutionLight,
+            Stream::ChangedPatches,
+            Stream::ChangedTexels,
+            Stream::DividedTexel,
+            Stream::LocalLight,
+        ];
+        // Two halves, four replicates, six sides of a probe.
+        let several = each(2, Stream::PatchLight)
+            .chain(each(2, Stream::GlobalLines))
+            .chain(each(4, Stream::Gather))
+            .chain(each(4, Stream::ProbeSphere))
+            .chain(each(6, Stream::ProbeSide))
+            .chain(each(4, Stream::SharedLight));
+        let mut numbers: Vec<u32> = once.into_iter().chain(several).map(Stream::number).collect();
+        let count = numbers.len();
+        numbers.sort_unstable();
+        numbers.dedup();
+        assert_eq!(numbers.len(), count);
+    }
+
+    #[test]
     fn points_are_those_of_the_crate() {
         for (seed, set) in [(0, 0), (7, 1), (u32::MAX, 7), (0x1234_5678, 8), (9, 60)] {
             for index in (0..LENGTH).step_by(7) {
@@ -188,7 +283,7 @@ mod tests {
     #[test]
     fn cosine_directions_have_the_moments_of_the_cosine() {
         // ∫ cos θ · cos θ / π = 2/3 and ∫ x² cos θ / π = 1/4, over 2^14 Sobol points: error ~ 1/N.
-        let sequence = Sequence::new(1, 2, 3);
+        let sequence = Sequence::new(1, Stream::Test(2), 3);
         let n = 1 << 14;
         let (mut z, mut xx) = (0.0, 0.0);
         for i in 0..n {
@@ -214,7 +309,7 @@ mod tests {
 
     #[test]
     fn triangle_points_lie_inside_and_have_the_centroid_as_mean() {
-        let sequence = Sequence::new(0, 0, 7);
+        let sequence = Sequence::new(0, Stream::Test(0), 7);
         let n = 1 << 12;
         let (mut a, mut b) = (0.0, 0.0);
         for i in 0..n {

@@ -7,7 +7,7 @@ use glam::Vec3;
 use lumbre_scene::AmbientCube;
 
 use super::ProbeEffort;
-use crate::sampling::{Sequence, sphere_direction};
+use crate::sampling::{Sequence, Stream, sphere_direction};
 use crate::scene::{BakeScene, SurfaceHit};
 use crate::texels::gather::{REPLICATES, RadianceCache};
 use crate::transport::direct::{Direct, Receiver, Sources};
@@ -17,9 +17,6 @@ const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, V
 
 /// A probe that sees backs of single-sided faces or insides of solids with this share of its rays is inside geometry.
 const INSIDE: f32 = 0.25;
-
-/// Sequences of the probes: apart from those of texels and patches.
-const PURPOSE: u32 = 48;
 
 /// So many times more samples where the first ones told nothing.
 const AGAIN: u32 = 16;
@@ -53,7 +50,7 @@ impl ProbeLight<'_> {
         let mut seen = ProbeSample::default();
         let mut backs = 0u32;
         for (replicate, run) in runs.iter_mut().enumerate() {
-            let sequence = Sequence::new(seed, PURPOSE + replicate as u32, index);
+            let sequence = Sequence::new(seed, Stream::ProbeSphere(replicate as u32), index);
             backs += self.bounces(position, sequence, run);
             seen.rays += u64::from(self.effort.sphere);
         }
@@ -67,7 +64,7 @@ impl ProbeLight<'_> {
             *light = runs.iter().map(|run| run[side]).sum::<Vec3>() / count;
             let squares: Vec3 = runs.iter().map(|run| (run[side] - *light).powf(2.0)).sum();
             let of_mean = squares / (count * (count - 1.0));
-            let sequence = Sequence::new(seed, PURPOSE + (REPLICATES + side) as u32, index);
+            let sequence = Sequence::new(seed, Stream::ProbeSide(side as u32), index);
             let direct = self.shining(position, normal, sequence);
             *light += direct.baked / PI;
             seen.rays += u64::from(direct.rays);

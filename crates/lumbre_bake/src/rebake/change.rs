@@ -15,7 +15,7 @@ use super::estimate::{Estimate, Range, cap, in_cap};
 use super::relit::ShadowVolumes;
 use crate::chunks::in_chunks;
 use crate::progress::Watch;
-use crate::sampling::{Sequence, cosine_about, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texels::blocks::Blocks;
@@ -33,8 +33,6 @@ use crate::{BakeError, BakeOptions};
 const RAYS: u32 = 32;
 /// Texels along the side of a block.
 const BLOCK: u32 = 4;
-/// What the seed is hashed with.
-const PURPOSE: u32 = 50;
 /// What is nearer to a box than this share of its size has changed for certain.
 const BESIDE: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
@@ -128,7 +126,7 @@ impl<'a> Change<'a> {
             if is_new(patch) || patch.reflectance == Vec3::ZERO {
                 return (Vec3::ZERO, Vec3::ZERO);
             }
-            let sequence = Sequence::new(options.seed, PURPOSE, index as u32);
+            let sequence = Sequence::new(options.seed, Stream::ChangedPatches, index as u32);
             let triangle = &self.scene.triangles[patch.triangle as usize];
             let point = |x: f32, y: f32| {
                 let (u, v) = patches.point(patch, triangle_point(x, y));
@@ -213,7 +211,7 @@ impl<'a> Change<'a> {
             if members.is_empty() {
                 return 0.0f32;
             }
-            let sequence = Sequence::new(options.seed, PURPOSE + 1, block as u32);
+            let sequence = Sequence::new(options.seed, Stream::ChangedTexels, block as u32);
             // Each is asked in both ways in turn.
             let point = |ray: u32, x, y| {
                 let texel = members[ray as usize / 2 % members.len()];

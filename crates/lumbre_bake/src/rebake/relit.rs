@@ -164,13 +164,13 @@ fn hull_distance(a: Sphere, b: Sphere, point: Vec3) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::Sequence;
+    use crate::sampling::{Sequence, Stream};
 
     #[test]
     fn the_hull_is_that_of_all_spheres_between() {
         // Against a search along the axis: the least of 4096 spheres is a bound from above, by at most the step.
         for case in 0..200u32 {
-            let sequence = Sequence::new(3, 1, case);
+            let sequence = Sequence::new(3, Stream::Test(1), case);
             let mut at = 0;
             let mut vector = || {
                 at += 1;

@@ -8,16 +8,13 @@ use rayon::prelude::*;
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::straddling::Straddling;
-use crate::sampling::Sequence;
+use crate::sampling::{Sequence, Stream};
 use crate::transport::direct::Sources;
 
 /// Lines through one texel that count: as many as a part's sides have bits.
 const MOST_LINES: usize = 32;
 /// Lines whose ends are this near to another's, in texels, divide nothing that it does not.
 const SAME_LINE: f32 = 1.0 / 16.0;
-
-/// Sequences of these texels' shadow samples.
-const PURPOSE: u32 = 64;
 
 /// One side of each line through a texel.
 #[derive(Clone, Debug)]
@@ -138,7 +135,7 @@ fn divide(
     by_side.sort_by_key(|(sides, _)| *sides);
     let mut rays = 0;
     let parts = by_side.chunk_by(|a, b| a.0 == b.0).map(|own| {
-        let sequence = Sequence::new(seed, PURPOSE, texel.index).of(own[0].0);
+        let sequence = Sequence::new(seed, Stream::DividedTexel, texel.index).of(own[0].0);
         let direct = sources.irradiance(sequence, samples, &|x, _| {
             let index = ((x * own.len() as f32) as usize).min(own.len() - 1);
             Some(receiver(sources.scene, &own[index].1))

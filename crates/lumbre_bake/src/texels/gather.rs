@@ -11,6 +11,7 @@ use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
 pub(crate) use super::radiance_cache::RadianceCache;
 use super::tile_sequence::TileSequence;
 use crate::checkpoint::record::fields;
+use crate::sampling::Stream;
 use crate::scene::material::Side;
 
 /// Independent replicates per texel: their spread is the texel's error.
@@ -214,8 +215,9 @@ impl RadianceCache<'_> {
         seed: u32,
     ) {
         let from = gathered.samples;
-        let sequences: [TileSequence; REPLICATES] =
-            std::array::from_fn(|replicate| TileSequence::new(seed, 16 + replicate as u32, texel, self.run));
+        let sequences: [TileSequence; REPLICATES] = std::array::from_fn(|replicate| {
+            TileSequence::new(seed, Stream::Gather(replicate as u32), texel, self.run)
+        });
         let numbers =
             (0..REPLICATES).flat_map(|replicate| (from..samples).map(move |sample| (replicate, sample)));
         batches.samples.count = 0;

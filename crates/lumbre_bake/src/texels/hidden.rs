@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::tiles::{Tiles, area, positions_of};
-use crate::sampling::{Sequence, cosine_about};
+use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::shaft::is_free_before;
@@ -109,7 +109,7 @@ enum Probe {
 }
 
 fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
-    let [x, y, u, v] = Sequence::new(SEED, 2, texel.index).point(ray, 0);
+    let [x, y, u, v] = Sequence::new(SEED, Stream::HiddenTexel, texel.index).point(ray, 0);
     let Some(point) = texel.point(scene, x, y) else { return Probe::Clear };
     let receiver = receiver(scene, &point);
     let direction = cosine_about(receiver.geometric_normal, u, v);
@@ -147,7 +147,7 @@ fn judge(scene: &BakeScene, texel: &mut Texel, mixed: bool) -> (usize, u64) {
     else {
         return (0, 0);
     };
-    let sequence = Sequence::new(SEED, 3, texel.index);
+    let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index);
     let pressed = pressed(scene, texel);
     let mut rays = 0;
     let mut is_open = |index: usize| {

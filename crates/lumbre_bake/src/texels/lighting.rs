@@ -11,7 +11,7 @@ use super::shared_light::SharedLight;
 use super::surroundings::Surroundings;
 use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
-use crate::sampling::Sequence;
+use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
 use crate::transport::direct::{Direct, Seen, Sources};
 use crate::{BakeError, BakeOptions};
@@ -43,7 +43,7 @@ pub(crate) fn direct_light(
         if texel.is_hidden() {
             return Direct::default();
         }
-        let sequence = Sequence::new(options.seed, 4, texel.index);
+        let sequence = Sequence::new(options.seed, Stream::DirectLight, texel.index);
         sources.own(cuts.of(place), &shafts.visibility(place, texel), sequence, samples, &|x, y| {
             texel.point(scene, x, y).map(|point| receiver(scene, &point))
         })

@@ -12,7 +12,7 @@ use super::footprint::{Texel, receiver};
 use crate::BakeError;
 use crate::chunks::in_chunks_anew;
 use crate::progress::Watch;
-use crate::sampling::{Sequence, cosine_about};
+use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::material::Side;
 use crate::scene::{LightmapLayout, SurfaceHit};
 use crate::transport::direct::{Direct, Receiver, Sources};
@@ -27,8 +27,9 @@ const VIEW: usize = 2;
 const NEAREST: f32 = 8.0;
 /// Least local light, in shares of the whole level's mean: four stops, about as far as an automatic exposure follows.
 const FLOOR: f64 = 1.0 / 16.0;
-/// Sequences of the walks.
-const PURPOSE: u32 = 80;
+
+/// Of the walks: the light around is a yardstick, the same for every seed.
+const SEED: u32 = 0;
 
 /// The light around each covered texel, irradiance, mean of the channels.
 #[derive(Clone, Debug, Default)]
@@ -136,7 +137,7 @@ impl LocalLight {
 impl Level<'_> {
     fn walk(&self, texels: &[Texel], members: &[u32], block: u32, number: u32) -> Walk {
         let scene = self.sources.scene;
-        let sequence = Sequence::new(PURPOSE, block, 0);
+        let sequence = Sequence::new(SEED, Stream::LocalLight, block);
         let mut walk = Walk::default();
         let [choice, x, y, _] = sequence.point(number, 0);
         let member = members[((choice * members.len() as f32) as usize).min(members.len() - 1)];

@@ -11,7 +11,7 @@ use crate::checkpoint::record::fields;
 use crate::chunks::in_chunks;
 use crate::progress::Watch;
 use crate::report::ResolutionReport;
-use crate::sampling::{Sequence, cosine_about, hash, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::transport::direct::{Receiver, Sources};
 use crate::{BakeError, BakeOptions};
@@ -26,8 +26,6 @@ const SHADOW_RAYS: u32 = 16;
 const GATHER_RAYS: u32 = 32;
 /// Rays that tell whether a point lies inside other geometry.
 const JUDGES: u32 = 8;
-/// What the seed is hashed with.
-const PURPOSE: u32 = 40;
 
 /// A point, baked on its own.
 #[derive(Clone, Copy, Debug, Default)]
@@ -88,7 +86,7 @@ impl Light<'_> {
         let of_gather = if self.cache.is_some() { GATHER_RAYS * REPLICATES as u32 } else { 0 };
         let cost = u64::from(JUDGES + 2 * SHADOW_RAYS + of_gather);
         let count = ((rays / SHARE).max(LEAST_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
-        let sequence = Sequence::new(options.seed, PURPOSE, 0);
+        let sequence = Sequence::new(options.seed, Stream::ResolutionPoints, 0);
         let points = in_chunks(count, watch, |index| {
             let [choice, u, v, _] = sequence.point(index as u32, 0);
             let place = f64::from(choice) * running;
@@ -102,7 +100,7 @@ impl Light<'_> {
         let mut point = DensePoint { triangle, at, ..DensePoint::default() };
         let footprint = FootprintPoint { triangle, at, offset: Vec2::splat(0.5) };
         let receiver = receiver(self.scene, &footprint);
-        let own = Sequence::new(seed, PURPOSE + 1, index);
+        let own = Sequence::new(seed, Stream::ResolutionLight, index);
         point.rays += u64::from(JUDGES);
         point.counts = self.is_open(&receiver, own);
         if !point.counts {
@@ -118,7 +116,7 @@ impl Light<'_> {
         let footprint = Footprint::Points(vec![footprint]);
         let texel = Texel { index, object: index, x: 0, y: 0, triangle, footprint };
         let mut gathered = Gathered::default();
-        cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ PURPOSE));
+        cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ Stream::ResolutionPoints.number()));
         let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);
         point.indirect = [0.5 * (a + b), 0.5 * (c + d)];
         (point.checks, point.differences) = (gathered.checks, gathered.differences);

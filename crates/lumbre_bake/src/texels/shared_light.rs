@@ -17,7 +17,7 @@ use super::tile_sequence::TileSequence;
 use crate::checkpoint::record::fields;
 use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
-use crate::sampling::hash;
+use crate::sampling::{Stream, hash};
 use crate::transport::direct::{Direct, Sources};
 use crate::transport::light_cut::Rest;
 use crate::{BakeError, BakeOptions};
@@ -39,8 +39,6 @@ pub(crate) struct Shared {
 
 fields!(Shared { sums: [Vec3; REPLICATES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
 
-/// Purposes of the replicates' sequences begin here.
-const PURPOSE: u32 = 96;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
 /// The most by which a round lowers what is left: the first estimates are rough, and a goal out of reach would take all that can be had.
@@ -64,7 +62,7 @@ impl Shared {
     /// Adds samples up to `samples` of each replicate.
     fn add(&mut self, sources: &Sources<'_>, rest: &Rest, texel: &Texel, run: u32, samples: u32, seed: u32) {
         for (replicate, sum) in self.sums.iter_mut().enumerate() {
-            let sequence = TileSequence::new(seed, PURPOSE + replicate as u32, texel, run);
+            let sequence = TileSequence::new(seed, Stream::SharedLight(replicate as u32), texel, run);
             for sample in self.samples..samples {
                 let [x, y, ..] = sequence.first(sample);
                 let Some(point) = texel.point(sources.scene, x, y) else { continue };
@@ -125,7 +123,14 @@ impl<'a> SharedLight<'a> {
     fn add(&self, place: usize, own: &mut Shared, samples: u32) {
         let (texel, rest) = (&self.texels[place], &self.cuts.of(place).rest);
         if !texel.is_hidden() && !rest.is_empty() {
-            own.add(self.sources, rest, texel, self.first, samples, hash(self.options.seed ^ PURPOSE));
+            own.add(
+                self.sources,
+                rest,
+                texel,
+                self.first,
+                samples,
+                hash(self.options.seed ^ Stream::SharedLight(0).number()),
+            );
         }
     }
 

@@ -5,7 +5,7 @@
 //! Not the points themselves: that is `sampling`.
 
 use super::footprint::Texel;
-use crate::sampling::{Sequence, SequenceSet};
+use crate::sampling::{Sequence, SequenceSet, Stream};
 
 /// Texels along a tile's side, and in it.
 const SIDE: u32 = 8;
@@ -24,11 +24,11 @@ pub(crate) struct TileSequence {
 }
 
 impl TileSequence {
-    /// `purpose` replicates; every texel takes `run` points at first, and later as many again as it has.
-    pub fn new(seed: u32, purpose: u32, texel: &Texel, run: u32) -> Self {
+    /// One scramble for every stream and tile; every texel takes `run` points at first, and later as many again as it has.
+    pub fn new(seed: u32, stream: Stream, texel: &Texel, run: u32) -> Self {
         // Maps are at most 8192 texels wide: 10 bits of tiles.
         let tile = ((texel.y / SIDE) << 10) | (texel.x / SIDE);
-        let sequence = Sequence::new(seed, purpose, tile).of(texel.object);
+        let sequence = Sequence::new(seed, stream, tile).of(texel.object);
         let place = morton(texel.x % SIDE, texel.y % SIDE);
         Self { sequence, first_set: sequence.set(0), place, run: run.max(1) }
     }
@@ -74,7 +74,7 @@ mod tests {
     fn every_point_belongs_to_one_texel_of_a_tile() {
         let mut taken = vec![false; 64 * 32];
         for (x, y) in (0..8).flat_map(|y| (0..8).map(move |x| (x, y))) {
-            let own = TileSequence::new(0, 0, &texel(x, y), 8);
+            let own = TileSequence::new(0, Stream::Test(0), &texel(x, y), 8);
             for sample in 0..32 {
                 let index = own.index(sample) as usize;
                 assert!(!std::mem::replace(&mut taken[index], true), "{x} {y} {sample}");
@@ -88,7 +88,7 @@ mod tests {
         // 4 x 4 texels with 4 points each: 64 points, one in each of 8 x 8 squares of any two of the first two dimensions.
         let mut cells = [0u32; 64];
         for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x + 4, y))) {
-            let own = TileSequence::new(5, 1, &texel(x, y), 4);
+            let own = TileSequence::new(5, Stream::Test(1), &texel(x, y), 4);
             for sample in 0..4 {
                 let [u, v, ..] = own.first(sample);
                 cells[(u * 8.0) as usize + 8 * (v * 8.0) as usize] += 1;

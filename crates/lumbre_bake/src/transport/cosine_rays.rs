@@ -6,7 +6,7 @@ use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::progress::Watch;
-use crate::sampling::{Sequence, cosine_about, triangle_point};
+use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
 
 /// Least and most rays of a patch. The sequence has 65,536 points.
@@ -45,7 +45,7 @@ pub(super) fn of_patch(scene: &BakeScene, patches: &Patches, index: u32, count: 
     let triangle = &scene.triangles[patch.triangle as usize];
     let normal = triangle.side_normal(patch.side);
     let [p, q, r] = patches.corners(scene, patch);
-    let sequence = Sequence::new(seed, 1, index);
+    let sequence = Sequence::new(seed, Stream::FormFactors, index);
     let mut met = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
     let (mut inside, mut missed) = ([0; 2], [0; 2]);
     for ray in 0..count {

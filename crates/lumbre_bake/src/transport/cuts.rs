@@ -268,7 +268,7 @@ fn clip_segment(polygon: &[DVec2], [p, q]: [DVec2; 2]) -> Option<[DVec2; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{Sequence, triangle_point};
+    use crate::sampling::{Sequence, Stream, triangle_point};
 
     const CELL: [DVec2; 3] = [DVec2::ZERO, DVec2::new(2.0, 0.0), DVec2::new(0.0, 2.0)];
 
@@ -303,7 +303,7 @@ mod tests {
             assert!(cell.count >= 3 && cuts.pieces.len() == cell.count as usize);
             let sum: f64 = cuts.pieces.iter().map(|&piece| share(piece)).sum();
             assert!((sum - 1.0).abs() < 1e-6, "{sum}");
-            let sequence = Sequence::new(1, 2, 3);
+            let sequence = Sequence::new(1, Stream::Test(2), 3);
             for sample in 0..2000 {
                 let [x, y, ..] = sequence.point(sample, 0);
                 let (u, v) = triangle_point(x, y);

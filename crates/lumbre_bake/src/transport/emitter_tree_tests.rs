@@ -3,7 +3,7 @@
 use lumbre_mesh::shapes;
 
 use super::*;
-use crate::sampling::Sequence;
+use crate::sampling::{Sequence, Stream};
 use crate::scene::material::Side;
 
 fn emitter(corners: [Vec3; 3], radiance: Vec3) -> Emitter {
@@ -59,7 +59,7 @@ fn one_term_far_away_is_as_good_as_the_sum() {
     let tree = EmitterTree::new(&emitters, &lamps);
     let (mut worst, mut squares) = (0.0f64, 0.0);
     for i in 0..400 {
-        let [x, y, z, w] = Sequence::new(3, 0, 0).point(i, 0);
+        let [x, y, z, w] = Sequence::new(3, Stream::Test(0), 0).point(i, 0);
         let position = Vec3::new(3.0 * x - 1.5, 1.6 * y - 0.2, 3.0 * z - 1.5);
         let normal = if w < 0.7 { Vec3::Y } else { Vec3::new(0.6, 0.0, -0.8) };
         let at = receiver(position, normal);
@@ -106,7 +106,7 @@ fn no_weight_is_zero_and_near_balls_fill_the_sky() {
     let (emitters, lamps) = scene();
     let tree = EmitterTree::new(&emitters, &lamps);
     for i in 0..200 {
-        let [x, y, z, w] = Sequence::new(5, 0, 0).point(i, 0);
+        let [x, y, z, w] = Sequence::new(5, Stream::Test(0), 0).point(i, 0);
         let at = receiver(Vec3::new(3.0 * x - 1.5, 2.0 * y - 0.4, 3.0 * z - 1.5), Vec3::Y);
         for part in 0..emitters.len() as u32 {
             assert!(tree.weight(part, &at, 0.1 * w) > 0.0);
@@ -126,7 +126,7 @@ fn samples_have_the_light_of_all_as_their_mean() {
         let at = receiver(position, Vec3::Y);
         let (n, mut sum) = (1 << 14, DVec3::ZERO);
         for i in 0..n {
-            let [u, a, b, _] = Sequence::new(1, 0, 0).point(i, 0);
+            let [u, a, b, _] = Sequence::new(1, Stream::Test(0), 0).point(i, 0);
             let (chosen, _, probability) = tree.pick(0, &at, u);
             let e = &emitters[chosen];
             let (s, t) = crate::sampling::triangle_point(a, b);

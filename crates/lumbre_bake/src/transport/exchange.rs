@@ -13,7 +13,7 @@ use super::solver;
 use crate::chunks::in_chunks;
 use crate::options::Solver;
 use crate::progress::Watch;
-use crate::sampling::{Sequence, triangle_point};
+use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
 use crate::{BakeError, BakeOptions, BakeReport};
@@ -90,13 +90,13 @@ impl Exchange {
 
         watch.stage("radiosity", report)?;
         let mut direct_halves = [Vec::new(), Vec::new()];
-        for (purpose, of_half) in [5, 6].into_iter().zip(&mut direct_halves) {
-            let half: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |index| {
-                let sequence = Sequence::new(options.seed, purpose, index as u32);
+        for (half, of_half) in (0..).zip(&mut direct_halves) {
+            let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |index| {
+                let sequence = Sequence::new(options.seed, Stream::PatchLight(half), index as u32);
                 patch_direct(scene, sources, &patches, index, factors.open[index], sequence)
             })?;
-            report.rays += half.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-            *of_half = half.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
+            report.rays += found.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+            *of_half = found.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
         }
         let [even, odd] = &direct_halves;
         let direct: Vec<Vec3> = even.iter().zip(odd).map(|(even, odd)| 0.5 * (*even + *odd)).collect();

@@ -14,14 +14,12 @@ use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
-use crate::sampling::{Sequence, cosine_direction, frame, sphere_direction};
+use crate::sampling::{Sequence, Stream, cosine_direction, frame, sphere_direction};
 use crate::scene::BakeScene;
 use crate::scene::crossings::Face;
 
 /// Lines of one value of the list that is computed in chunks.
 const BATCH: u32 = 64;
-/// What the seed is hashed with, one number for each half.
-const PURPOSE: u32 = 12;
 
 /// What stands at an end of a line's part, where it is no patch.
 const NOTHING: u32 = u32::MAX;
@@ -71,7 +69,7 @@ impl Lines {
         });
         let center = 0.5 * (low + high);
         let radius = corners().map(|corner| (corner - center).length()).fold(0.0, f32::max);
-        let halves = [0, 1].map(|half| Sequence::new(seed, PURPOSE + half, 0));
+        let halves = [0, 1].map(|half| Sequence::new(seed, Stream::GlobalLines(half), 0));
         Self { center, radius, halves }
     }
 

@@ -13,7 +13,7 @@ use super::patches::Patches;
 use super::solver::gather;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
-use crate::sampling::Sequence;
+use crate::sampling::{Sequence, Stream};
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
 use crate::stop::Stop;
 use crate::{BakeError, BakeOptions};
@@ -72,7 +72,7 @@ pub fn form_factor_errors(
     }
     let direct: Vec<Vec3> = (0..patches.list.len())
         .map(|index| {
-            let sequence = Sequence::new(options.seed, 5, index as u32);
+            let sequence = Sequence::new(options.seed, Stream::PatchLight(0), index as u32);
             patch_direct(&scene, &sources, &patches, index, references[0].open[index], sequence).0
         })
         .collect();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::contour::exchange_area;
 use super::form_factors::{Cast, FormFactors};
 use super::patches::Patches;
-use crate::sampling::{Sequence, triangle_point};
+use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
 
 /// Exact exchange areas, row by row.
@@ -38,8 +38,6 @@ const SIGHT_LINES: u32 = 8;
 const DOUBT: f64 = 4.0;
 /// Of a patch's size, how far another's corner may lie behind its plane: the rounding of f32 coordinates.
 const BEHIND: f64 = 1e-5;
-/// What the seed is hashed with.
-const PURPOSE: u32 = 14;
 
 /// A patch's shape.
 struct Shape {
@@ -144,7 +142,7 @@ fn about(one: &Shape, two: &Shape) -> Option<f64> {
 
 /// Whether all of some lines between points spread over both patches are free.
 fn nothing_between(scene: &BakeScene, patches: &Patches, (i, j): (u32, u32), seed: u32) -> bool {
-    let sequence = Sequence::new(seed, PURPOSE, i).of(j);
+    let sequence = Sequence::new(seed, Stream::NearPairs, i).of(j);
     (0..SIGHT_LINES).all(|line| {
         let [a, b, c, d] = sequence.point(line, 0);
         let [from, to] = [(i, a, b), (j, c, d)].map(|(index, x, y)| {

@@ -9,7 +9,7 @@ use lumbre_scene::{Image, MaterialTextures, Sampler, TextureReference};
 
 use super::form_factor_tests::{scene, square};
 use super::patches::Patches;
-use crate::sampling::{Sequence, triangle_point};
+use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
 
@@ -24,7 +24,7 @@ fn check(objects: &[&[[Vec3; 3]]], side: f32, apart: impl Fn(Vec3) -> u32) {
     let place = |position: Vec3| apart(scene.space.world(position).as_vec3());
     let mut crossed = 0.0;
     for (index, patch) in patches.list.iter().enumerate() {
-        let sequence = Sequence::new(1, 2, index as u32);
+        let sequence = Sequence::new(1, Stream::Test(2), index as u32);
         let mut places = Vec::new();
         for sample in 0..64 {
             let [x, y, ..] = sequence.point(sample, 0);

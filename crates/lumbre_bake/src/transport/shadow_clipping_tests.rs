@@ -1,7 +1,7 @@
 //! The lit part against segments to the light, and in closed form.
 
 use super::*;
-use crate::sampling::Sequence;
+use crate::sampling::{Sequence, Stream};
 
 const FLOOR: [[f64; 3]; 4] = [[-0.5, 0.0, -0.5], [0.5, 0.0, -0.5], [0.6, 0.0, 0.5], [-0.4, 0.0, 0.5]];
 
@@ -50,7 +50,7 @@ fn a_square_sheet_throws_a_square_shadow() {
 /// Random triangles: what is lit is what a fine grid of segments to the light finds lit, whether cut or by points.
 #[test]
 fn a_crowd_of_triangles_leaves_what_segments_find_lit() {
-    let sequence = Sequence::new(3, 79, 0);
+    let sequence = Sequence::new(3, Stream::Test(79), 0);
     let mut partly = 0;
     for crowd in 0..40 {
         let corner = |triangle: u32, corner: u32| {

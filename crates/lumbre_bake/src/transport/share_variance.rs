@@ -30,7 +30,7 @@ const EDGE: f32 = 0.19;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{Sequence, cosine_direction};
+    use crate::sampling::{Sequence, Stream, cosine_direction};
 
     /// Of many replicates, the mean squared error of the share that a chord cuts off the disc, and the mean of what is stated for it.
     fn of_chord(height: f32, samples: u32) -> (f64, f64, usize) {
@@ -39,7 +39,7 @@ mod tests {
         let (mut squares, mut stated, mut none) = (0.0, 0.0, 0);
         const REPLICATES: u32 = 2000;
         for replicate in 0..REPLICATES {
-            let sequence = Sequence::new(7, 1, replicate);
+            let sequence = Sequence::new(7, Stream::Test(1), replicate);
             let mut groups = [0.0f32; GROUPS];
             for sample in 0..samples {
                 let [u, v, ..] = sequence.point(sample, 0);

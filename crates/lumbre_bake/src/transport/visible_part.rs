@@ -50,7 +50,7 @@ pub(crate) fn visible_part(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{Sequence, triangle_point};
+    use crate::sampling::{Sequence, Stream, triangle_point};
     use crate::transport::polygon::point_to_triangle;
 
     fn factor(point: DVec3, emitter: &Corners, blockers: &[Corners]) -> Visible {
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn a_crowd_of_triangles_hides_what_segments_find_hidden() {
         let emitter = lamp(2.0);
-        let sequence = Sequence::new(3, 77, 0);
+        let sequence = Sequence::new(3, Stream::Test(77), 0);
         let mut some_hidden = 0;
         for crowd in 0..20 {
             let corner = |triangle: u32, corner: u32| {
@@ -144,7 +144,7 @@ mod tests {
     fn what_meets_leaves_no_gap() {
         // A screen before all of the lamp, cut into triangles that share corners, and one of a grid of f32 corners that meet in T's.
         let emitter = lamp(2.0);
-        let sequence = Sequence::new(11, 78, 0);
+        let sequence = Sequence::new(11, Stream::Test(78), 0);
         for index in 0..500 {
             let [x, y, z, angle] = sequence.point(index, 0).map(f64::from);
             let turn = DVec3::new((6.3 * angle).cos(), 0.1 * (y - 0.5), (6.3 * angle).sin()).normalize();
