@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn no_two_streams_share_a_number() {
-        let each = |count: u32, stream: fn(u32) -> Stream| (0..count).map(move |which| stream(which));
+        let each = |count: u32, stream: fn(u32) -> Stream| (0..count).map(stream);
         let once = [
             Stream::FormFactors,
             Stream::HiddenTexel,
