@@ -12,7 +12,7 @@ use crate::memory;
 use crate::notes::{finish, name_what_is_missing, note_direct_error, note_mean, note_whole};
 use crate::pages::Pages;
 use crate::probes;
-use crate::progress::Watch;
+use crate::progress::{Stage, Watch};
 use crate::rebake::change::Change;
 use crate::rebake::{Changes, Found, Samples, Usable, rebake_report};
 use crate::scene::{BakeScene, Canonical, WantedProbes, collect, density_of, lights, sky, world_points};
@@ -128,7 +128,7 @@ fn run(
 ) -> Result<(BakeReport, Option<Samples>), BakeError> {
     let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
     let mut watch = Watch::new(progress, options.time);
-    watch.stage("layout", &mut report)?;
+    watch.stage(Stage::Layout, &mut report)?;
     let objects = Arc::new(watch.during(0.0, || collect(world))??);
     let (placed, sky) = (lights(world), sky(world));
     let wanted = WantedProbes::of(world, &objects);
@@ -165,7 +165,7 @@ fn run(
     let density = density.unwrap_or_else(|| density_of(&objects, space, options));
     let layout = preparing::layout(&objects, space, density, options, &mut watch, &mut report.warnings)?;
 
-    watch.stage("hierarchy", &mut report)?;
+    watch.stage(Stage::Hierarchy, &mut report)?;
     let (mut scene, layout) = preparing::scene(&objects, layout, space, &mut watch, &mut report.warnings)?;
     scene.dark_outside = watch.during(0.8, || Sources::new(&scene, placed.clone(), sky).are_inside())?;
     let sources = watch.during(0.9, || Sources::new(&scene, placed, sky))?;
@@ -188,7 +188,7 @@ fn run(
     };
     memory::check_texels(&scene, &layout, for_samples, options)?;
 
-    watch.stage("direct light", &mut report)?;
+    watch.stage(Stage::DirectLight, &mut report)?;
     let (mut texels, charts, crossed) =
         watch.during(0.0, || (footprints(&scene, &layout), charts(&scene), crossed(&scene, &layout)))?;
     let touched: Vec<usize> = straddling(&layout, &texels, &crossed)
@@ -235,7 +235,7 @@ fn run(
             (None, volume, dense_points(&light, options, &mut watch, &mut report)?)
         }
         Some(exchange) => {
-            watch.stage("final gather", &mut report)?;
+            watch.stage(Stage::FinalGather, &mut report)?;
             let straddling = straddling(&layout, &texels, &crossed);
             let [_, samples, _] = options.effort().direct;
             let (divided, rays) = watch
@@ -282,7 +282,7 @@ fn run(
         }
     };
 
-    watch.stage("texels", &mut report)?;
+    watch.stage(Stage::Texels, &mut report)?;
     let (values, bounced): (Vec<Vec3>, Bounced) = match indirect {
         Some(bounced) => {
             let sum = baked.iter().zip(&bounced.light).map(|(direct, indirect)| *direct + *indirect);
@@ -328,7 +328,7 @@ fn run(
     let (mut filled, errors) =
         watch.during(0.2, || fill(&layout, &texels, &charts, known, options.gap, &scene.stop))?;
     watch.advance(1.0)?;
-    watch.stage("seams", &mut report)?;
+    watch.stage(Stage::Seams, &mut report)?;
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
     let maps =
         Maps { scene: &scene, layout: &layout, texels: &texels, charts: &charts, variances: &errors, mean };
@@ -357,7 +357,7 @@ fn dense_points(
         report.skipped.push(format!("resolution error: {why}"));
         return Ok(Vec::new());
     }
-    watch.stage("resolution", report)?;
+    watch.stage(Stage::Resolution, report)?;
     let points = light.at_points(report.rays, options, watch)?;
     report.rays += points.iter().map(|point| point.rays).sum::<u64>();
     Ok(points)

@@ -28,20 +28,61 @@ pub(crate) type Callback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + '
 /// How often the caller is asked while something takes long.
 const TICK: Duration = Duration::from_millis(50);
 
-/// The stages in their order, with their usual share of the time, and the share of a time limit by which each takes no more samples: so that
-/// every stage has done something roughly before one does it well.
-const STAGES: [(&str, f32, f64); 10] = [
-    ("layout", 0.03, 1.0),
-    ("hierarchy", 0.02, 1.0),
-    ("direct light", 0.2, 0.4),
-    ("form factors", 0.1, 0.5),
-    ("radiosity", 0.05, 0.5),
-    ("final gather", 0.48, 0.85),
-    ("probes", 0.05, 0.9),
-    ("resolution", 0.02, 0.95),
-    ("texels", 0.03, 1.0),
-    ("seams", 0.02, 1.0),
-];
+/// The stages, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    Layout,
+    Hierarchy,
+    DirectLight,
+    FormFactors,
+    Radiosity,
+    FinalGather,
+    Probes,
+    Resolution,
+    Texels,
+    Seams,
+}
+
+/// What is known of a stage before it begins.
+struct StageShare {
+    /// In words.
+    name: &'static str,
+    /// Its usual share of the time.
+    of_time: f32,
+    /// The share of a time limit by which it takes no more samples: so that every stage has done something roughly before one does it well.
+    of_limit: f64,
+}
+
+impl Stage {
+    const ALL: [Self; 10] = [
+        Self::Layout,
+        Self::Hierarchy,
+        Self::DirectLight,
+        Self::FormFactors,
+        Self::Radiosity,
+        Self::FinalGather,
+        Self::Probes,
+        Self::Resolution,
+        Self::Texels,
+        Self::Seams,
+    ];
+
+    fn share(self) -> StageShare {
+        let (name, of_time, of_limit) = match self {
+            Self::Layout => ("layout", 0.03, 1.0),
+            Self::Hierarchy => ("hierarchy", 0.02, 1.0),
+            Self::DirectLight => ("direct light", 0.2, 0.4),
+            Self::FormFactors => ("form factors", 0.1, 0.5),
+            Self::Radiosity => ("radiosity", 0.05, 0.5),
+            Self::FinalGather => ("final gather", 0.48, 0.85),
+            Self::Probes => ("probes", 0.05, 0.9),
+            Self::Resolution => ("resolution", 0.02, 0.95),
+            Self::Texels => ("texels", 0.03, 1.0),
+            Self::Seams => ("seams", 0.02, 1.0),
+        };
+        StageShare { name, of_time, of_limit }
+    }
+}
 
 /// The time that a bake has taken and may take.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +110,7 @@ pub(crate) struct Watch<'a> {
     callback: &'a mut Callback<'a>,
     clock: Clock,
     is_cut_short: bool,
-    stage: Option<(&'static str, Instant)>,
+    stage: Option<(Stage, Instant)>,
     /// From where to where in the running stage the work that reports now leads.
     part: (f32, f32),
     error: Option<f64>,
@@ -106,8 +147,8 @@ impl<'a> Watch<'a> {
 
     /// The time as it is, to be asked from other threads: the running stage's share of it.
     pub fn clock(&self) -> Clock {
-        let (index, _) = self.running();
-        Clock { limit: self.clock.limit.map(|limit| limit.mul_f64(STAGES[index].2)), ..self.clock }
+        let share = self.running().share().of_limit;
+        Clock { limit: self.clock.limit.map(|limit| limit.mul_f64(share)), ..self.clock }
     }
 
     /// Seconds since the bake began.
@@ -116,7 +157,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Ends the stage before and begins another.
-    pub fn stage(&mut self, stage: &'static str, report: &mut BakeReport) -> Result<(), BakeError> {
+    pub fn stage(&mut self, stage: Stage, report: &mut BakeReport) -> Result<(), BakeError> {
         self.end_stage(report);
         self.stage = Some((stage, Instant::now()));
         self.part = (0.0, 1.0);
@@ -132,7 +173,10 @@ impl<'a> Watch<'a> {
     /// Notes the time of the running stage.
     pub fn end_stage(&mut self, report: &mut BakeReport) {
         if let Some((stage, begun)) = self.stage.take() {
-            report.stages.push(StageTime { stage: stage.to_owned(), seconds: begun.elapsed().as_secs_f64() });
+            report.stages.push(StageTime {
+                stage: stage.share().name.to_owned(),
+                seconds: begun.elapsed().as_secs_f64(),
+            });
         }
     }
 
@@ -220,30 +264,31 @@ impl<'a> Watch<'a> {
 
     fn cancelled<T>(&mut self) -> Result<T, BakeError> {
         self.tape.flush();
-        Err(BakeError::Cancelled { stage: self.running().1 })
+        Err(BakeError::Cancelled { stage: self.running().share().name })
     }
 
     fn progress(&self, stage_fraction: f32) -> Progress {
-        let (index, stage) = self.running();
-        let before: f32 = STAGES[..index].iter().map(|(_, share, _)| share).sum();
+        let stage = self.running();
+        let StageShare { name, of_time, .. } = stage.share();
+        let before: f32 =
+            Stage::ALL.iter().take_while(|other| **other != stage).map(|other| other.share().of_time).sum();
         let (from, to) = self.part;
         let stage_fraction = from + (to - from) * stage_fraction.clamp(0.0, 1.0);
-        let fraction = (before + STAGES[index].1 * stage_fraction).min(1.0);
-        Progress { stage, stage_fraction, fraction, error: self.error }
+        let fraction = (before + of_time * stage_fraction).min(1.0);
+        Progress { stage: name, stage_fraction, fraction, error: self.error }
     }
 
     fn unless_stopped(&mut self) -> Result<(), BakeError> {
         if self.stop.is_set() { self.cancelled() } else { Ok(()) }
     }
 
-    /// The running stage and its place in the order.
-    fn running(&self) -> (usize, &'static str) {
-        let stage = self.stage.map_or("layout", |(stage, _)| stage);
-        (STAGES.iter().position(|(name, ..)| *name == stage).unwrap_or(STAGES.len() - 1), stage)
+    /// The running stage; the first one before any has begun.
+    fn running(&self) -> Stage {
+        self.stage.map_or(Stage::Layout, |(stage, _)| stage)
     }
 
     fn place(&self, start: usize, of: usize) -> Place {
-        Place { stage: self.running().0 as u8, of, start }
+        Place { stage: self.running() as u8, of, start }
     }
 
     /// The values from `start` on, if an interrupted bake has computed them. None of them: it had no more time for the rest.

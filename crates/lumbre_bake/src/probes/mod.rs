@@ -18,7 +18,7 @@ pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
 use crate::chunks::in_chunks_anew;
-use crate::progress::Watch;
+use crate::progress::{Stage, Watch};
 use crate::scene::{BakeScene, WantedProbes};
 use crate::texels::gather::RadianceCache;
 use crate::transport::direct::Sources;
@@ -55,7 +55,7 @@ pub(crate) fn bake(
             .push("probes: nothing bounces, and no face shines that is not lit in real time".into());
         return Ok(None);
     }
-    watch.stage("probes", report)?;
+    watch.stage(Stage::Probes, report)?;
     let grid = Grid::new(scene, &wanted.moving, options.probe_spacing, &mut report.warnings);
     let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(options.quality) };
     let seen: Vec<ProbeSample> = in_chunks_anew(grid.count(), watch, |index| {

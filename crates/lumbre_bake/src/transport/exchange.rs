@@ -12,7 +12,7 @@ use super::sampling_guide::SamplingGuide;
 use super::solver;
 use crate::chunks::in_chunks;
 use crate::options::Solver;
-use crate::progress::Watch;
+use crate::progress::{Stage, Watch};
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
 use crate::scene::material::Side;
@@ -66,7 +66,7 @@ impl Exchange {
         report: &mut BakeReport,
     ) -> Result<Option<(Self, FormFactors)>, BakeError> {
         let side = resolution.patch_side;
-        watch.stage("form factors", report)?;
+        watch.stage(Stage::FormFactors, report)?;
         let patches = watch.during(0.0, || Patches::new(scene, side))?;
         report.patches = patches.list.len();
         report.warnings.extend(patches.warnings.iter().cloned());
@@ -88,7 +88,7 @@ impl Exchange {
         report.exact_form_factors = 2 * factors.exact;
         report.energy_lost = factors.energy_lost;
 
-        watch.stage("radiosity", report)?;
+        watch.stage(Stage::Radiosity, report)?;
         let mut direct_halves = [Vec::new(), Vec::new()];
         for (half, of_half) in (0..).zip(&mut direct_halves) {
             let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |index| {
