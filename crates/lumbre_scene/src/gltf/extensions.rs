@@ -165,8 +165,9 @@ pub(crate) struct IrradianceVolumeExtension {
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ObjectExtension {
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub dynamic: bool,
+    /// `false` says of a mesh with a skeleton that it stands still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dynamic: Option<bool>,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub hidden: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
