@@ -9,7 +9,7 @@ use lumbre::render::{Display, Gpu, Measure, Offscreen, OffscreenFormat, Renderer
 use serde::Serialize;
 
 use crate::arguments::Render;
-use crate::loading::{extension, frame_options, load};
+use crate::loading::{exposure, extension, frame_options, load};
 use crate::output::write_file;
 
 /// What `--timings` writes.
@@ -56,15 +56,16 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         "exr" => true,
         other => bail!("{}: .{other} is not written, only .png and .exr", asked.output.display()),
     };
-    let mut world = load(&asked.input)?;
+    let mut loaded = load(&asked.input, &asked.reading)?;
     let (width, height) = asked.size;
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
     let aspect = f64::from(width) / f64::from(height);
-    let mut options = frame_options(&mut world, &asked.frame, display, aspect)?;
+    let mut options = frame_options(&mut loaded.world, &asked.frame, display, aspect, &asked.input)?;
     if asked.timings.is_some() {
         options.measure = Measure::TimeAndInvocations;
     }
     let gpu = Gpu::headless()?;
+    options.exposure = exposure(asked.frame.exposure, &mut loaded, &gpu, &options, aspect, &asked.input)?;
     let mut renderer = Renderer::new(&gpu);
     let format = if floats { OffscreenFormat::LinearFloat } else { OffscreenFormat::Rgba8 };
     let target = Offscreen::new(&gpu, width, height, format)?;
@@ -72,7 +73,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
     for _ in 0..asked.frames {
         let start = Instant::now();
         let report = renderer
-            .render(&mut world, &target.target(), &options)
+            .render(&mut loaded.world, &target.target(), &options)
             .with_context(|| format!("{} could not be drawn", asked.input.display()))?;
         let measured = renderer.wait()?.cloned();
         let wall_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -3,6 +3,7 @@
 //! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and what is
 //! decoded counts against one limit for the whole file.
 
+use super::compressed_views::DecodedViews;
 use super::document::{Accessor, Document, Sparse, element};
 use super::error::LoadProblem;
 use super::limits::Budget;
@@ -18,6 +19,8 @@ const FLOAT: u32 = 5126;
 pub(crate) struct Buffers<'a> {
     pub document: &'a Document,
     pub bytes: Vec<std::borrow::Cow<'a, [u8]>>,
+    /// Views that were compressed.
+    pub decoded: std::borrow::Cow<'a, DecodedViews>,
 }
 
 /// Elements in a buffer view, `count` of them, already known to lie inside it.
@@ -99,11 +102,8 @@ impl<'a> Buffers<'a> {
         place: impl FnOnce() -> String,
     ) -> Result<(&[u8], Option<u64>), LoadProblem> {
         let view = element(&self.document.buffer_views, "bufferViews", index, place)?;
-        if view.extensions.contains_key("EXT_meshopt_compression") {
-            return Err(LoadProblem::RequiredExtension {
-                name: "EXT_meshopt_compression".to_owned(),
-                supported: super::SUPPORTED_EXTENSIONS.join(", "),
-            });
+        if let Some(decoded) = self.decoded.get(&index) {
+            return Ok((decoded, view.byte_stride));
         }
         let buffer = element(&self.bytes, "buffers", view.buffer, || format!("bufferViews[{index}].buffer"))?;
         let end = view.byte_offset.checked_add(view.byte_length);

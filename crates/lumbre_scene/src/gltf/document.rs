@@ -111,6 +111,8 @@ pub(crate) struct BufferView {
 pub(crate) struct Buffer {
     pub uri: Option<String>,
     pub byte_length: u64,
+    #[serde(default)]
+    pub extensions: Extensions,
 }
 
 #[derive(Deserialize, Debug, Default)]

@@ -143,6 +143,14 @@ pub enum LoadProblem {
         /// Bytes that the buffer has.
         length: u64,
     },
+    /// Compressed data cannot be decoded.
+    #[error("{place}: {problem}; compress the file again, or export it without compression")]
+    Compressed {
+        /// The buffer view.
+        place: String,
+        /// What is wrong with the data.
+        problem: &'static str,
+    },
     /// A URI that is not followed, or that holds no data.
     #[error("{place}: the URI {uri:?} {problem}")]
     Uri {

@@ -183,6 +183,28 @@ pub(crate) struct CameraExtension {
     pub active: bool,
 }
 
+/// EXT_meshopt_compression of a buffer view: where the compressed data are, and what they stand for.
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct MeshoptView {
+    pub buffer: usize,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: u64,
+    pub count: u64,
+    pub mode: String,
+    pub filter: Option<String>,
+}
+
+/// EXT_meshopt_compression of a buffer.
+#[derive(Deserialize, Debug, Default)]
+pub(crate) struct MeshoptBuffer {
+    /// The buffer has no data of its own: views into it are compressed.
+    #[serde(default)]
+    pub fallback: bool,
+}
+
 /// KHR_materials_emissive_strength.
 #[derive(Deserialize, Debug, Default)]
 #[serde(rename_all = "camelCase")]

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use bevy_ecs::prelude::*;
 
 use super::accessor::Buffers;
-use super::container;
 use super::document::{self, Document, shortened};
 use super::error::{LoadError, LoadProblem, Note, Notes};
-use super::limits::{Budget, LoadLimits};
+use super::limits::LoadLimits;
 use super::options::LoadOptions;
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
 use super::uri::{self, Base};
+use super::{compressed_views, container};
 use crate::{
     ActiveCamera, DynamicObject, EmissiveLight, Extras, Hidden, MaterialTextures, Mesh, StaticObject,
     update_transforms,
@@ -100,7 +100,12 @@ fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared
     let document = Document::from_root(document::parse(container.json)?, &mut notes)?;
     check_extensions(&document)?;
     let contents = contents(&document, container.binary, base, &mut notes)?;
-    let buffers = Buffers { document: &document, bytes: contents };
+    let decoded = Cow::Owned(compressed_views::decode(
+        &document,
+        &contents,
+        &mut options.limits.budget(bytes.len(), &contents),
+    )?);
+    let buffers = Buffers { document: &document, bytes: contents, decoded };
     let prepared = decode(&buffers, bytes.len() as u64, base, options.limits, &mut notes)?;
     Ok((prepared, notes))
 }
@@ -128,6 +133,11 @@ pub(crate) fn contents<'a>(
         let place = format!("buffers[{index}]");
         let content = match (&buffer.uri, binary) {
             (Some(uri), _) => Cow::Owned(uri::fetch(uri, base, &place)?),
+            // Views into it are decoded from other buffers.
+            (None, _) if compressed_views::is_fallback(document, index)? => {
+                contents.push(Cow::Borrowed(&[][..]));
+                continue;
+            }
             (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),
             (None, _) => {
                 let problem =
@@ -168,11 +178,8 @@ pub(crate) fn decode(
     notes: &mut Notes,
 ) -> Result<Prepared, LoadProblem> {
     let document = buffers.document;
-    let total =
-        buffers.bytes.iter().fold(file_bytes, |total, content| total.saturating_add(content.len() as u64));
-    let decoded_bytes =
-        limits.decoded_bytes.unwrap_or_else(|| total.saturating_mul(64).saturating_add(64 << 20));
-    let mut prepared = prepare(document, buffers, base, limits, Budget::new(decoded_bytes), notes)?;
+    let budget = limits.budget(file_bytes as usize, &buffers.bytes);
+    let mut prepared = prepare(document, buffers, base, limits, budget, notes)?;
     prepared.files = files_beside(document, base);
     Ok(prepared)
 }

@@ -5,6 +5,7 @@
 
 mod accessor;
 mod beside;
+mod compressed_views;
 mod container;
 mod document;
 mod error;
@@ -28,6 +29,7 @@ mod import_mesh;
 mod import_scene;
 mod lightmapped;
 mod limits;
+mod meshopt;
 mod options;
 mod patch;
 mod prepared;
@@ -47,6 +49,7 @@ pub use source::SourceFile;
 
 /// Extensions that a file may require.
 pub const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_meshopt_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",

@@ -7,13 +7,14 @@ use bevy_ecs::prelude::*;
 use serde_json::{Map, Value};
 
 use super::accessor::Buffers;
-use super::container;
+use super::compressed_views::DecodedViews;
 use super::document::{self, Document};
 use super::error::{LoadError, LoadProblem, Notes};
 use super::import::{LoadReport, check_extensions, contents, decode, spawn};
 use super::options::LoadOptions;
 use super::patch::{Former, take_back};
 use super::uri::{self, Base};
+use super::{compressed_views, container};
 
 /// A glTF file as its artist made it: the JSON, the buffers and chunks of others, untouched. What an earlier bake added to the file is
 /// taken back when it is read.
@@ -23,6 +24,8 @@ pub struct SourceFile {
     pub(crate) document: Document,
     /// The bytes of every buffer.
     pub(crate) contents: Vec<Vec<u8>>,
+    /// Buffer views that were compressed.
+    decoded: DecodedViews,
     /// Type and bytes of chunks that glTF does not know.
     pub(crate) chunks: Vec<(u32, Vec<u8>)>,
     /// The folder that it lies in.
@@ -68,11 +71,28 @@ impl SourceFile {
             Base { folder: Some(&folder), root: options.root.as_deref() },
             &mut notes,
         )?;
+        let decoded = compressed_views::decode(
+            &document,
+            &contents,
+            &mut options.limits.budget(bytes.len(), &contents),
+        )?;
         let contents = contents.into_iter().map(Cow::into_owned).collect();
         let chunks = container.others.into_iter().map(|(kind, bytes)| (kind, bytes.to_vec())).collect();
         let (name, file_bytes) = (name.to_owned(), bytes.len() as u64);
         let (nodes, options) = (Vec::new(), options.clone());
-        Ok(Self { root, document, contents, chunks, folder, nodes, name, file_bytes, notes, options })
+        Ok(Self {
+            root,
+            document,
+            contents,
+            chunks,
+            decoded,
+            folder,
+            nodes,
+            name,
+            file_bytes,
+            notes,
+            options,
+        })
     }
 
     /// Loads it into a World, as [`load`](super::load()) does. [`save_baked`](super::save_baked) then knows its entities.
@@ -97,6 +117,6 @@ impl SourceFile {
     /// The buffers, to be read through the document.
     pub(crate) fn buffers(&self) -> Buffers<'_> {
         let bytes = self.contents.iter().map(|content| Cow::Borrowed(content.as_slice())).collect();
-        Buffers { document: &self.document, bytes }
+        Buffers { document: &self.document, bytes, decoded: Cow::Borrowed(&self.decoded) }
     }
 }
