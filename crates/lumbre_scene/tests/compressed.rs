@@ -4,7 +4,6 @@
 
 mod support;
 
-use bevy_ecs::prelude::*;
 use lumbre_scene::*;
 use serde_json::json;
 use support::{File, load_bytes};

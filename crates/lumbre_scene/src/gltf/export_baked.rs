@@ -268,7 +268,7 @@ impl Baked<'_> {
                 "LUMBRE_lights_phong"
             ];
             if self.patch.get(&at).is_some() {
-                self.patch.set(&[at, place!["bake"]].concat(), "static".into());
+                self.patch.set(&[&at[..], &place!["bake"]].concat(), "static".into());
             } else if let Ok(written) = serde_json::to_value(phong(light, light.spot)) {
                 self.patch.set(&at, written);
             }

@@ -25,10 +25,13 @@ pub(crate) struct Primitives<'a> {
     pub data: NewData,
     pub notes: Notes,
     /// Attributes, targets and indices by the primitive, its vertices and its triangles.
-    known: HashMap<(usize, usize, Vertices, Vec<u32>), Map<String, Value>>,
+    known: HashMap<Chosen, Map<String, Value>>,
     /// Materials with other texture coordinates, by the material and where its sets went.
     materials: HashMap<(usize, Moves), usize>,
 }
+
+/// A primitive by its mesh and index, its vertices, and its triangles.
+type Chosen = (usize, usize, Vertices, Vec<u32>);
 
 /// What became of the sets of texture coordinates: pairs of the set before and after.
 type Moves = Vec<(u64, u64)>;

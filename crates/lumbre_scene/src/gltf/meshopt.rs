@@ -76,7 +76,7 @@ pub(crate) fn decode(
 ) -> Result<Vec<u8>, &'static str> {
     let indices = matches!(stride, 2 | 4);
     match mode {
-        Mode::Attributes if stride == 0 || stride % 4 != 0 || stride > 256 => {
+        Mode::Attributes if stride == 0 || !stride.is_multiple_of(4) || stride > 256 => {
             Err("its byteStride has to be a multiple of 4 up to 256")
         }
         Mode::Attributes => {
@@ -86,7 +86,7 @@ pub(crate) fn decode(
         }
         _ if !indices => Err("its byteStride has to be 2 or 4 for indices"),
         _ if filter != Filter::None => Err("it has a filter, which only attributes may have"),
-        Mode::Triangles if count % 3 != 0 => Err("its count of indices is no multiple of 3"),
+        Mode::Triangles if !count.is_multiple_of(3) => Err("its count of indices is no multiple of 3"),
         Mode::Triangles => Ok(as_bytes(&triangles(count, source)?, stride)),
         Mode::Indices => Ok(as_bytes(&sequence(count, source)?, stride)),
     }
@@ -116,7 +116,7 @@ fn vertices(count: usize, stride: usize, source: &[u8]) -> Result<Vec<u8>, &'sta
     let mut last = last.to_vec();
     let mut reader = Reader { bytes: body, at: 1 };
     let mut data = Vec::with_capacity(count * stride);
-    let most = (BLOCK_BYTES / stride & !(GROUP - 1)).min(BLOCK_ELEMENTS);
+    let most = ((BLOCK_BYTES / stride) & !(GROUP - 1)).min(BLOCK_ELEMENTS);
     let mut deltas = vec![[0u8; BLOCK_ELEMENTS]; stride];
     while data.len() < count * stride {
         let elements = (count - data.len() / stride).min(most);

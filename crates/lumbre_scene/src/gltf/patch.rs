@@ -38,9 +38,9 @@ impl From<&str> for Key {
 /// The way to a value from the root.
 pub(crate) type Place = Vec<Key>;
 
-/// A [`Place`] of names and indices.
+/// A place of names and indices.
 macro_rules! place {
-    ($($key:expr),+ $(,)?) => { vec![$($crate::gltf::patch::Key::from($key)),+] };
+    ($($key:expr),+ $(,)?) => { [$($crate::gltf::patch::Key::from($key)),+] };
 }
 pub(crate) use place;
 
