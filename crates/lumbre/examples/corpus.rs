@@ -12,7 +12,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Context;
-use bevy_ecs::prelude::*;
+use bevy_ecs::entity::Entity;
+use bevy_ecs::query::{Has, With};
+use bevy_ecs::world::World;
 use lumbre::render::{FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer, meter};
 use lumbre::scene::{
     ActiveCamera, Camera, LoadOptions, add_default_light, default_camera, is_without_light, load_with,

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use bevy_ecs::prelude::*;
+use bevy_ecs::query::{With, Without};
+use bevy_ecs::world::World;
 use glam::Vec3;
 use lumbre::bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
