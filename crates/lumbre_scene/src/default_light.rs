@@ -6,7 +6,8 @@ use glam::{DQuat, EulerRot, Vec3};
 use lumbre_optics::{BakeMode, Light, Material};
 
 use crate::{
-    ChildOf, EmissiveLight, Hidden, Lightmap, Mesh, Name, SceneSettings, Transform, update_transforms,
+    ChildOf, EmissiveLight, Hidden, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, Transform,
+    update_transforms,
 };
 
 /// Radiance of a white surface that faces the key light.
@@ -35,8 +36,14 @@ pub fn is_without_light(world: &mut World) -> bool {
     {
         return false;
     }
-    let takes_light = |material: &Material| !material.unlit && !shines(material.front.emission);
-    world.query_filtered::<&Material, (With<Mesh>, Without<Hidden>)>().iter(world).any(takes_light)
+    // What glows as a whole shows itself; a texture may glow in few places.
+    let takes_light = |(material, textures): (&Material, Option<&MaterialTextures>)| {
+        let glows = shines(material.front.emission) && textures.is_none_or(|own| own.emissive.is_none());
+        !material.unlit && !glows
+    };
+    let mut shown =
+        world.query_filtered::<(&Material, Option<&MaterialTextures>), (With<Mesh>, Without<Hidden>)>();
+    shown.iter(world).any(takes_light)
 }
 
 /// Hangs a key light, from above the viewer's left shoulder, and a fill light from the right on a camera. Global transforms are up to date
@@ -61,7 +68,7 @@ mod tests {
     use lumbre_mesh::TriangleMesh;
 
     use super::*;
-    use crate::{Camera, GlobalTransform, LightmapEncoding, LightmapImage};
+    use crate::{Camera, GlobalTransform, Image, LightmapEncoding, LightmapImage, Sampler, TextureReference};
 
     fn world(material: Material) -> World {
         let mut world = World::new();
@@ -79,6 +86,17 @@ mod tests {
         let mut glowing = Material::default();
         glowing.front.emission = Vec3::ONE;
         assert!(!is_without_light(&mut world(glowing.clone())), "all that is shown shows itself");
+        let mut display = world(glowing.clone());
+        let shown = display.query_filtered::<Entity, With<Mesh>>().single(&display).unwrap();
+        let image = Image { name: String::new(), width: 1, height: 1, rgba: vec![255; 4] };
+        let (sampler, scale) = (Sampler::default(), glam::Vec2::ONE);
+        let offset = glam::Vec2::ZERO;
+        let texture =
+            TextureReference { image: Arc::new(image), sampler, tex_coord: 0, offset, rotation: 0.0, scale };
+        display
+            .entity_mut(shown)
+            .insert(MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() });
+        assert!(is_without_light(&mut display), "a texture may glow in few places");
         let mut beside = grey();
         let emitter = beside.spawn((Mesh(Arc::new(TriangleMesh::default())), glowing)).id();
         assert!(is_without_light(&mut beside), "emission lights nothing else");

@@ -33,7 +33,9 @@ fn bake(world: &mut World) {
             if reads_second {
                 source.uv0 = source.uv1.clone();
             }
-            Arc::new(unwrap(&source, &source.positions, 8.0, UnwrapOptions::default()).unwrap().mesh)
+            Arc::new(
+                unwrap(&source, &source.positions, density(&source), UnwrapOptions::default()).unwrap().mesh,
+            )
         });
         if reads_second {
             let mut textures = textures.unwrap();
@@ -49,6 +51,13 @@ fn bake(world: &mut World) {
         };
         world.entity_mut(entity).insert((Mesh(new.clone()), Lightmap { image: Arc::new(image) }));
     }
+}
+
+/// Texels per metre for some sixteen across a mesh of any size.
+fn density(mesh: &TriangleMesh) -> f64 {
+    let size =
+        mesh.positions.iter().map(|position| f64::from(position.abs().max_element())).fold(0.0, f64::max);
+    if size > 0.0 { 8.0 / size } else { 1.0 }
 }
 
 /// A cube of eight vertices, which six charts split, with attributes by `change`.
@@ -517,6 +526,8 @@ fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
         }
         ["meshes", _, "primitives", _, "targets", _, _] => new("accessors", &at(after, place)),
         ["meshes", _, "primitives", _, "material"] => new("materials", &at(after, place)),
+        // What was compressed has no place for the lightmap's coordinates.
+        ["meshes", _, "primitives", _, "extensions", "KHR_draco_mesh_compression"] => true,
         ["meshes", _, "primitives", _, "extensions", "KHR_materials_variants", "mappings", _, "material"] => {
             new("materials", &at(after, place))
         }
