@@ -139,16 +139,15 @@ fn draw(gpu: &Gpu, file: &Path, folder: &Path, asked: &Asked) -> anyhow::Result<
 /// Whether pixels are all black or all white, as far as anybody sees; those of the black background do not count as a part of a white picture.
 fn judged(pixels: &[u8], triangles: usize) -> &'static str {
     let pixels: Vec<&[u8]> = pixels.chunks_exact(4).collect();
-    let share = |part: usize, whole: usize| part * 1000 >= ALIKE * whole;
-    let dark = |pixel: &&&[u8]| pixel[..3].iter().all(|&channel| channel < 8);
-    let white = |pixel: &&&[u8]| pixel[..3].iter().all(|&channel| channel > 247);
-    let black = pixels.iter().filter(dark).count();
-    let shown: Vec<&&[u8]> = pixels.iter().filter(|pixel| !dark(pixel)).collect();
+    let is_dark = |pixel: &[u8]| pixel[..3].iter().all(|&channel| channel < 8);
+    let is_white = |pixel: &[u8]| pixel[..3].iter().all(|&channel| channel > 247);
+    let shown: Vec<&[u8]> = pixels.iter().copied().filter(|pixel| !is_dark(pixel)).collect();
+    let black = pixels.len() - shown.len();
     if triangles == 0 {
         "empty"
-    } else if black == pixels.len() || share(black, pixels.len()) && shown.len() < 60 {
+    } else if black == pixels.len() || black * 1000 >= ALIKE * pixels.len() && shown.len() < 60 {
         "black"
-    } else if shown.iter().filter(|pixel| white(&**pixel)).count() * 10 >= shown.len() * 9 {
+    } else if shown.iter().filter(|pixel| is_white(pixel)).count() * 10 >= shown.len() * 9 {
         "white"
     } else {
         "picture"
