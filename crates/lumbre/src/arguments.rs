@@ -55,10 +55,38 @@ Examples:
     Explain(Explain),
 }
 
+/// How files are read.
+#[derive(Args, Clone, Debug, Default)]
+pub struct Reading {
+    /// Refuses files with faults that can be repaired, instead of repairing them with a note.
+    #[arg(long)]
+    pub strict: bool,
+    /// Lets a .gltf name files outside of its own folder, below DIR.
+    #[arg(long, value_name = "DIR")]
+    pub root: Option<PathBuf>,
+}
+
+/// How bright pictures are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exposure {
+    /// As metered from the frame.
+    Auto,
+    /// A factor on radiance.
+    Factor(f32),
+}
+
 #[derive(Args, Debug)]
 pub struct Play {
     /// A level; without one the demo level, baked first if it is not baked.
     pub level: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Factor on radiance, an exposure value like 12EV, or auto; without this auto for lights in candela or lux that would be white.
+    #[arg(long, value_name = "auto|EV|X", value_parser = exposure)]
+    pub exposure: Option<Exposure>,
+    /// Leaves a level without lights dark, instead of lighting it from the camera.
+    #[arg(long)]
+    pub no_default_light: bool,
     /// Draws a tour to PNG frames even if there is a display.
     #[arg(long)]
     pub headless: bool,
@@ -103,8 +131,16 @@ pub struct Bake {
     /// The baked level; its lightmaps go beside it.
     #[arg(short, long, value_name = "OUT.glb")]
     pub output: PathBuf,
-    /// Relative RMSE that the lightmap may have by its own estimate.
-    #[arg(long, default_value_t = 0.01, value_parser = positive)]
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Lets the output replace the input, which is then only in the baked file.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Radiance of an even sky, W/(m² sr): one number, or red, green and blue; in place of the level's own.
+    #[arg(long, value_name = "X|R,G,B", value_parser = sky)]
+    pub sky: Option<glam::Vec3>,
+    /// Relative RMSE that the lightmap may have by its own estimate, like 0.01 or 1%.
+    #[arg(long, default_value = "0.01", value_parser = share)]
     pub error: f64,
     /// Seconds after which no more samples are taken; the map is complete all the same.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
@@ -121,7 +157,7 @@ pub struct Bake {
     /// Seconds between writes of the checkpoint: what a crash costs.
     #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = seconds)]
     pub checkpoint_every: Duration,
-    /// Memory that the bake may take beside the level, like 512MiB or 4GiB; it makes do with fewer patches and rays.
+    /// Memory that the bake may take beside the level, like 512MiB or 2GB; it makes do with fewer patches and rays.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub memory: Option<u64>,
     /// How much work may go into it.
@@ -222,6 +258,8 @@ pub enum BakeQuality {
 pub struct Render {
     /// The scene: .glb or .gltf, baked or not.
     pub input: PathBuf,
+    #[command(flatten)]
+    pub reading: Reading,
     /// The frame: .png (eight bits) or .exr (floats).
     #[arg(short, long, value_name = "OUT.png|OUT.exr")]
     pub output: PathBuf,
@@ -242,6 +280,8 @@ pub struct Render {
 pub struct Explain {
     /// The scene: .glb or .gltf, baked or not.
     pub input: PathBuf,
+    #[command(flatten)]
+    pub reading: Reading,
     /// For people, for programs, for Graphviz.
     #[arg(long, value_enum, default_value_t = ExplainFormat::Text)]
     pub format: ExplainFormat,
@@ -286,15 +326,42 @@ pub struct Frame {
     /// Four samples per pixel.
     #[arg(long)]
     pub msaa: bool,
-    /// Factor on radiance before it is shown, instead of the camera's.
-    #[arg(long, value_name = "X", value_parser = factor)]
-    pub exposure: Option<f32>,
+    /// Factor on radiance, an exposure value like 12EV, or auto, instead of the camera's; without this auto in a PNG of lights in candela or lux that
+    /// would be white.
+    #[arg(long, value_name = "auto|EV|X", value_parser = exposure)]
+    pub exposure: Option<Exposure>,
+    /// Leaves a scene without lights dark, instead of lighting it from the camera.
+    #[arg(long)]
+    pub no_default_light: bool,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("a number greater than 0 is wanted".into()),
+    }
+}
+
+/// A number, or so many hundredths.
+fn share(text: &str) -> Result<f64, String> {
+    match text.trim_end().strip_suffix('%') {
+        Some(percent) => Ok(positive(percent.trim_end())? / 100.0),
+        None => positive(text).map_err(|_| "a number greater than 0 is wanted, like 0.01 or 1%".into()),
+    }
+}
+
+fn sky(text: &str) -> Result<glam::Vec3, String> {
+    let channels: Result<Vec<f32>, _> =
+        text.split(',').map(|channel| channel.trim().parse::<f32>()).collect();
+    let color = match channels.as_deref() {
+        Ok([all]) => glam::Vec3::splat(*all),
+        Ok([red, green, blue]) => glam::Vec3::new(*red, *green, *blue),
+        _ => glam::Vec3::NAN,
+    };
+    if color.is_finite() && color.min_element() >= 0.0 {
+        Ok(color)
+    } else {
+        Err("one number that is at least 0 is wanted, or three like 0.4,0.6,1".into())
     }
 }
 
@@ -310,7 +377,11 @@ fn bytes(text: &str) -> Result<u64, String> {
         "mib" => 1 << 20,
         "gib" => 1 << 30,
         "tib" => 1 << 40,
-        _ => return Err("bytes are wanted, or KiB, MiB, GiB, TiB of them, like 4GiB".into()),
+        "kb" => 1_000,
+        "mb" => 1_000_000,
+        "gb" => 1_000_000_000,
+        "tb" => 1_000_000_000_000,
+        _ => return Err("bytes are wanted, or KB, MB, GB, TB, KiB, MiB, GiB, TiB of them, like 2GB".into()),
     };
     let bytes = positive(digits.trim_end())? * unit as f64;
     // Beyond this f64 counts no single bytes, and no machine has them.
@@ -321,11 +392,22 @@ fn bytes(text: &str) -> Result<u64, String> {
     }
 }
 
-fn factor(text: &str) -> Result<f32, String> {
-    match positive(text)? as f32 {
-        value if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("a number that 32 bits hold is wanted".into()),
+/// `auto`, a factor like 0.5, or an exposure value at ISO 100 like 12EV, whose factor is 1 / (1.2 · 2^EV).
+fn exposure(text: &str) -> Result<Exposure, String> {
+    let wanted =
+        || "auto is wanted, a factor greater than 0 like 0.5, or an exposure value like 12EV".to_owned();
+    if text.eq_ignore_ascii_case("auto") {
+        return Ok(Exposure::Auto);
     }
+    let lower = text.to_ascii_lowercase();
+    let factor = match lower.strip_suffix("ev") {
+        Some(value) => {
+            let value: f64 = value.trim_end().parse().map_err(|_| wanted())?;
+            1.0 / (1.2 * value.exp2())
+        }
+        None => positive(text).map_err(|_| wanted())?,
+    } as f32;
+    if factor > 0.0 && factor.is_finite() { Ok(Exposure::Factor(factor)) } else { Err(wanted()) }
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {
@@ -383,11 +465,41 @@ mod tests {
             ("1.5 GiB", 3 << 29),
             ("1000000", 1_000_000),
             ("64kib", 65_536),
+            ("2GB", 2_000_000_000),
+            ("1.5 kb", 1500),
         ] {
             assert_eq!(bytes(text), Ok(expected), "{text}");
         }
-        for text in ["", "GiB", "-1GiB", "4GB", "0", "0.1", "inf", "NaN", "1e300TiB", "4 GiB 3"] {
+        for text in ["", "GiB", "-1GiB", "4GX", "0", "0.1", "inf", "NaN", "1e300TiB", "4 GiB 3"] {
             assert!(bytes(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn errors_are_numbers_or_percentages() {
+        assert_eq!((share("0.02"), share("2%"), share("0.5 %")), (Ok(0.02), Ok(0.02), Ok(0.005)));
+        for text in ["", "%", "-1%", "0%", "1%%", "nan%", "2 percent"] {
+            assert!(share(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn exposures_are_factors_or_exposure_values() {
+        assert_eq!(exposure("auto"), Ok(Exposure::Auto));
+        assert_eq!(exposure("0.25"), Ok(Exposure::Factor(0.25)));
+        assert_eq!(exposure("0EV"), Ok(Exposure::Factor(1.0 / 1.2)));
+        assert_eq!(exposure("-1 ev"), Ok(Exposure::Factor(2.0 / 1.2)));
+        for text in ["", "EV", "-1", "0", "inf", "nan", "1e300EV", "-1e300EV", "nanEV"] {
+            assert!(exposure(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_sky_is_one_number_or_three() {
+        assert_eq!(sky("0.5"), Ok(glam::Vec3::splat(0.5)));
+        assert_eq!(sky("0.5, 1,2"), Ok(glam::Vec3::new(0.5, 1.0, 2.0)));
+        for text in ["", "1,2", "-1", "nan", "1,2,3,4", "blue"] {
+            assert!(sky(text).is_err(), "{text}");
         }
     }
 }

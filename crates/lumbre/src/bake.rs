@@ -7,30 +7,40 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use bevy_ecs::query::{With, Without};
 use bevy_ecs::world::World;
+use glam::Vec3;
 use lumbre::bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
     SamplesError, Solver, content_hash, rebake,
 };
-use lumbre::scene::{LightmapEncoding, SaveOptions, Supercompression, save_with};
+use lumbre::optics::{BakeMode, Light, LightKind, Material};
+use lumbre::scene::{
+    DynamicObject, Hidden, LightmapEncoding, SaveOptions, SceneSettings, StaticObject, Supercompression,
+    save_baked,
+};
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
 use crate::bake_record::{Asked, BakeRecord, hash_of_files};
 use crate::interruption::Interruption;
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
-use crate::loading::{extension, load_with_files};
+use crate::loading::{Loaded, extension, load_source};
 use crate::progress::Shown;
 
 /// Runs the command.
 pub fn run(asked: &Bake) -> anyhow::Result<()> {
-    check_output(&asked.output)?;
-    let (mut world, beside) = load_with_files(&asked.input)?;
+    check_output(asked)?;
+    let (source, Loaded { mut world, report: loaded }) = load_source(&asked.input, &asked.reading)?;
+    if let Some(sky) = asked.sky {
+        world.resource_mut::<SceneSettings>().sky = sky;
+    }
+    check_light(&mut world, asked)?;
     let options = options(asked);
     let files = save_options(asked);
     let what = Asked {
         content: content_hash(&mut world, &options)?.to_string(),
         files: format!("{files:?}"),
-        input: hash_of_files(std::iter::once(&asked.input).chain(&beside))
+        input: hash_of_files(std::iter::once(&asked.input).chain(&loaded.files))
             .with_context(|| format!("{} cannot be read", asked.input.display()))?,
         time: options.time.as_ref().map(Duration::as_secs_f64),
     };
@@ -49,7 +59,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     let interruption = Interruption::handle();
     let (report, samples) =
         interruptible(&interruption, &mut world, &options, former.as_ref(), &checkpoint, asked)?;
-    let saved = save_with(&mut world, &asked.output, &files)
+    let saved = save_baked(&mut world, &source, &asked.output, &files)
         .with_context(|| format!("what was baked is kept: {}", how_to_continue(&checkpoint.path)))?;
     for note in saved.notes {
         eprintln!("lumbre: note: {}: {note}", asked.output.display());
@@ -221,8 +231,51 @@ fn print(report: &BakeReport, files: &[FileLine], json: bool) -> anyhow::Result<
     Ok(())
 }
 
+/// A level in which nothing shines would cost the time of a bake and be black.
+fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
+    let shines = |color: Vec3| color.max_element() > 0.0;
+    let baked = |light: &Light| {
+        let kept = light.bake != BakeMode::Dynamic && light.kind != LightKind::Ambient;
+        light.enabled && kept && shines(light.diffuse)
+    };
+    let emits = |material: &Material| {
+        let back = material.back.as_ref().filter(|_| material.double_sided);
+        !material.unlit && (shines(material.front.emission) || back.is_some_and(|back| shines(back.emission)))
+    };
+    let lit = shines(world.resource::<SceneSettings>().sky)
+        || world.query::<&Light>().iter(world).any(baked)
+        || world
+            .query_filtered::<&Material, (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>()
+            .iter(world)
+            .any(emits);
+    if lit {
+        return Ok(());
+    }
+    let (input, output) = (asked.input.display(), asked.output.display());
+    bail!(
+        "{input}: there is nothing to bake: it has no light that is baked, no emission and no sky; \
+         `lumbre bake {input} -o {output} --sky 1` bakes it under an even white sky"
+    )
+}
+
+/// Whether two paths lead to one file, through links or not.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    match (std::fs::canonicalize(one), std::fs::canonicalize(other)) {
+        (Ok(one), Ok(other)) => one == other,
+        // What is not there is nobody's.
+        _ => false,
+    }
+}
+
 /// What would be wrong with the output is said before the work, not after it.
-fn check_output(path: &Path) -> anyhow::Result<()> {
+fn check_output(asked: &Bake) -> anyhow::Result<()> {
+    let path = &asked.output;
+    if !asked.overwrite && is_same_file(&asked.input, path) {
+        bail!(
+            "{}: this is the level itself, which the baked one would replace; name another output, or allow it with --overwrite",
+            path.display()
+        );
+    }
     let extension = extension(path)?;
     if !["glb", "gltf"].contains(&extension.as_str()) {
         bail!("{}: .{extension} is not written, only .glb and .gltf", path.display());
@@ -278,7 +331,10 @@ fn summary(report: &BakeReport) -> String {
         ));
     }
     for lumbre::bake::ErrorAtTime { seconds, error } in &report.curve {
-        text.push_str(&format!("  after {seconds:8.2} s the error was {:.2} %\n", 100.0 * error));
+        let line = format!("  after {seconds:8.2} s the error was {:.2} %\n", 100.0 * error);
+        if !text.ends_with(&line) {
+            text.push_str(&line);
+        }
     }
     for stage in &report.stages {
         text.push_str(&format!("  {:24} {:7.2} s\n", stage.stage, stage.seconds));

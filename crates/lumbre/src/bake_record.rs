@@ -103,7 +103,9 @@ impl BakeRecord {
     ) -> anyhow::Result<()> {
         let mut files = Vec::with_capacity(written.len());
         for path in written {
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            // Copies of textures lie in folders of their own.
+            let own = output.parent().and_then(|folder| path.strip_prefix(folder).ok());
+            let name = own.unwrap_or(path).to_string_lossy().into_owned();
             files.push(FileRecord {
                 name,
                 bytes: std::fs::metadata(path)?.len(),

@@ -9,11 +9,11 @@ use crate::loading::{frame_options, load};
 
 /// Runs the command.
 pub fn run(asked: &Explain) -> anyhow::Result<()> {
-    let mut world = load(&asked.input)?;
+    let mut world = load(&asked.input, &asked.reading)?.world;
     let (width, height) = (1280, 720);
     let display = asked.frame.display.unwrap_or(Display::Srgb);
     let aspect = f64::from(width) / f64::from(height);
-    let options = frame_options(&mut world, &asked.frame, display, aspect)?;
+    let options = frame_options(&mut world, &asked.frame, display, aspect, &asked.input)?;
     let explanation = explain(&mut world, &options, width, height)?;
     let text = match asked.format {
         ExplainFormat::Text => explanation.to_text(),

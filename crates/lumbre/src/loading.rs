@@ -1,43 +1,111 @@
 //! From a file to a World with a camera, and from the command line's words to a frame's options.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::bail;
 use bevy_ecs::prelude::*;
-use lumbre::render::{Display, FrameOptions};
-use lumbre::scene::{self, ActiveCamera, Camera, GlobalTransform, Name};
+use lumbre::render::{Display, FrameOptions, Gpu, meter};
+use lumbre::scene::{self, ActiveCamera, Camera, GlobalTransform, LoadOptions, LoadReport, Name, SourceFile};
 
-use crate::arguments::Frame;
+use crate::arguments::{Exposure, Frame, Reading};
 
 /// The nodes of the loaded file, in its order: `--camera INDEX` counts by it.
 #[derive(Resource)]
 struct FileOrder(Vec<Entity>);
 
-/// Loads a scene; what the importer has to remark goes to standard error.
-pub fn load(path: &Path) -> anyhow::Result<World> {
-    Ok(load_with_files(path)?.0)
+/// A World and what was found while it was loaded.
+pub struct Loaded {
+    pub world: World,
+    pub report: LoadReport,
 }
 
-/// [`load`], and the files beside the one that is named.
-pub fn load_with_files(path: &Path) -> anyhow::Result<(World, Vec<PathBuf>)> {
+/// Loads a scene; what the importer has to remark goes to standard error.
+pub fn load(path: &Path, reading: &Reading) -> anyhow::Result<Loaded> {
     let mut world = World::new();
-    let report = scene::load(&mut world, path)?;
+    let report = scene::load_with(&mut world, path, &load_options(reading))?;
+    Ok(loaded(world, report, path))
+}
+
+/// [`load`], and the file itself, to be written again with light.
+pub fn load_source(path: &Path, reading: &Reading) -> anyhow::Result<(SourceFile, Loaded)> {
+    let mut world = World::new();
+    let mut source = SourceFile::read(path, &load_options(reading))?;
+    let report = source.load_into(&mut world)?;
+    Ok((source, loaded(world, report, path)))
+}
+
+fn load_options(reading: &Reading) -> LoadOptions {
+    LoadOptions { lenient: !reading.strict, root: reading.root.clone(), ..LoadOptions::default() }
+}
+
+fn loaded(mut world: World, report: LoadReport, path: &Path) -> Loaded {
     for note in &report.notes {
         eprintln!("lumbre: note: {}: {note}", path.display());
     }
-    world.insert_resource(FileOrder(report.nodes));
-    Ok((world, report.files))
+    world.insert_resource(FileOrder(report.nodes.clone()));
+    Loaded { world, report }
 }
 
-/// The options that the command line asks for. A scene without a camera gets one.
+/// Lights a World from a camera, with a note, if it would be black otherwise.
+pub fn light_by_default(world: &mut World, camera: Entity, path: &Path) {
+    if scene::is_without_light(world) {
+        eprintln!(
+            "lumbre: note: {}: has no light that a frame shows; lit by a key and a fill light at the camera (--no-default-light leaves it dark)",
+            path.display()
+        );
+        scene::add_default_light(world, camera);
+    }
+}
+
+/// Share of a frame that has to be white for want of an exposure before one is metered unasked.
+const CLIPPED: f64 = 0.02;
+
+/// The exposure that is asked for, or that a file with lights in candela or lux needs; a metered one is stated on standard error. `None`
+/// leaves that of the camera.
+pub fn exposure(
+    asked: Option<Exposure>,
+    loaded: &mut Loaded,
+    gpu: &Gpu,
+    options: &FrameOptions,
+    aspect: f64,
+    path: &Path,
+) -> anyhow::Result<Option<f32>> {
+    let physical = loaded.report.photometric_lights > 0 && !loaded.report.states_exposure;
+    match asked {
+        Some(Exposure::Factor(factor)) => return Ok(Some(factor)),
+        Some(Exposure::Auto) => {}
+        None if physical && options.display == Display::Srgb => {}
+        None => return Ok(None),
+    }
+    let metering = meter(gpu, &mut loaded.world, options, aspect)?;
+    let Some(metering) = metering.filter(|found| asked.is_some() || found.clipped > CLIPPED) else {
+        return Ok(None);
+    };
+    eprintln!(
+        "lumbre: note: {}: exposure {:.3e} ({:.1} EV), metered: the log-average luminance is {:.4} (--exposure X or EV for another)",
+        path.display(),
+        metering.exposure,
+        metering.exposure_value(),
+        metering.luminance
+    );
+    Ok(Some(metering.exposure))
+}
+
+/// The options that the command line asks for; an exposure that has to be metered aside. A scene without a camera gets one, and one without
+/// light a default light.
 pub fn frame_options(
     world: &mut World,
     frame: &Frame,
     display: Display,
     aspect: f64,
+    path: &Path,
 ) -> anyhow::Result<FrameOptions> {
+    let camera = camera(world, frame.camera.as_deref(), aspect)?;
+    if !frame.no_default_light {
+        light_by_default(world, camera, path);
+    }
     Ok(FrameOptions {
-        camera: Some(camera(world, frame.camera.as_deref(), aspect)?),
+        camera: Some(camera),
         shading: frame.shading,
         reflection: frame.reflection,
         flat_rule: frame.flat_rule,
@@ -45,7 +113,10 @@ pub fn frame_options(
         lightmaps: !frame.no_lightmaps,
         multisample: frame.msaa,
         display,
-        exposure: frame.exposure,
+        exposure: match frame.exposure {
+            Some(Exposure::Factor(factor)) => Some(factor),
+            Some(Exposure::Auto) | None => None,
+        },
         full_precision: display != Display::Srgb,
         ..FrameOptions::default()
     })

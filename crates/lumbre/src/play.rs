@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use lumbre::bake::{BakeOptions, Probes, bake};
-use lumbre::demo;
-use lumbre::scene;
+use lumbre::demo::{self, Game};
+use lumbre::render::{FrameOptions, Gpu};
+use lumbre::scene::{self, Camera};
 
-use crate::arguments::Play;
-use crate::loading::load;
+use crate::arguments::{Exposure, Play, Reading};
+use crate::loading::{Loaded, exposure, light_by_default, load, load_source};
 use crate::progress::Shown;
 
 /// Runs the command.
@@ -19,8 +20,9 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
         Some(level) => level.clone(),
         None => demo_level()?,
     };
+    let game = game(&level, asked)?;
     if asked.headless || !demo::has_display() {
-        let paths = demo::tour(&level, &asked.frames_dir, asked.frames, asked.size)?;
+        let paths = demo::tour_of(game, &asked.frames_dir, asked.frames, asked.size)?;
         let mut out = std::io::stdout().lock();
         for path in paths {
             writeln!(out, "{}", path.display())?;
@@ -35,7 +37,40 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
         quit_after: asked.quit_after,
         ..demo::PlayOptions::default()
     };
-    demo::run(&level, options)
+    demo::run_game(game, options)
+}
+
+/// The level with the player in it, lit and exposed so that something can be seen.
+fn game(level: &Path, asked: &Play) -> anyhow::Result<Game> {
+    let Loaded { world, report } = load(level, &asked.reading)?;
+    let mut game = Game::new(world).with_context(|| level.display().to_string())?;
+    let camera = game.camera();
+    if !asked.no_default_light {
+        light_by_default(&mut game.world, camera, level);
+    }
+    let physical = report.photometric_lights > 0 && !report.states_exposure;
+    let exposure = match asked.exposure {
+        Some(Exposure::Factor(factor)) => Some(factor),
+        None if !physical => None,
+        _ => {
+            let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
+            let mut seen = Loaded { world: std::mem::take(&mut game.world), report };
+            let metered = exposure(
+                asked.exposure,
+                &mut seen,
+                &Gpu::headless()?,
+                &FrameOptions::default(),
+                aspect,
+                level,
+            );
+            game.world = seen.world;
+            metered?
+        }
+    };
+    if let (Some(exposure), Some(mut lens)) = (exposure, game.world.get_mut::<Camera>(camera)) {
+        lens.exposure = exposure;
+    }
+    Ok(game)
 }
 
 /// The baked demo level; baked now if it is not there or older than the level.
@@ -47,7 +82,7 @@ fn demo_level() -> anyhow::Result<PathBuf> {
         return Ok(baked);
     }
     eprintln!("lumbre: baking {} (once)", source.display());
-    let mut world = load(&source)?;
+    let (file, Loaded { mut world, .. }) = load_source(&source, &Reading::default())?;
     let mut shown = Shown::new(false);
     // Frames do not read probes.
     let options = BakeOptions { error: 0.02, probes: Probes::Never, ..BakeOptions::default() };
@@ -56,7 +91,7 @@ fn demo_level() -> anyhow::Result<PathBuf> {
         ControlFlow::Continue(())
     })?;
     shown.finish();
-    scene::save(&mut world, &baked)?;
+    scene::save_baked(&mut world, &file, &baked, &scene::SaveOptions::default())?;
     Ok(baked)
 }
 

@@ -9,7 +9,7 @@ use lumbre::render::{Display, Gpu, Measure, Offscreen, OffscreenFormat, Renderer
 use serde::Serialize;
 
 use crate::arguments::Render;
-use crate::loading::{extension, frame_options, load};
+use crate::loading::{exposure, extension, frame_options, load};
 use crate::output::write_file;
 
 /// What `--timings` writes.
@@ -56,15 +56,16 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         "exr" => true,
         other => bail!("{}: .{other} is not written, only .png and .exr", asked.output.display()),
     };
-    let mut world = load(&asked.input)?;
+    let mut loaded = load(&asked.input, &asked.reading)?;
     let (width, height) = asked.size;
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
     let aspect = f64::from(width) / f64::from(height);
-    let mut options = frame_options(&mut world, &asked.frame, display, aspect)?;
+    let mut options = frame_options(&mut loaded.world, &asked.frame, display, aspect, &asked.input)?;
     if asked.timings.is_some() {
         options.measure = Measure::TimeAndInvocations;
     }
     let gpu = Gpu::headless()?;
+    options.exposure = exposure(asked.frame.exposure, &mut loaded, &gpu, &options, aspect, &asked.input)?;
     let mut renderer = Renderer::new(&gpu);
     let format = if floats { OffscreenFormat::LinearFloat } else { OffscreenFormat::Rgba8 };
     let target = Offscreen::new(&gpu, width, height, format)?;
@@ -72,13 +73,19 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
     for _ in 0..asked.frames {
         let start = Instant::now();
         let report = renderer
-            .render(&mut world, &target.target(), &options)
+            .render(&mut loaded.world, &target.target(), &options)
             .with_context(|| format!("{} could not be drawn", asked.input.display()))?;
         let measured = renderer.wait()?.cloned();
         let wall_ms = start.elapsed().as_secs_f64() * 1e3;
         frames.push(frame_times(wall_ms, report.statistics, measured));
     }
-    write_frame(&asked.output, &gpu, &target, floats)?;
+    let shows_something = write_frame(&asked.output, &gpu, &target, floats)?;
+    if !shows_something && loaded.report.triangles > 0 {
+        eprintln!(
+            "lumbre: note: {}: the frame is black: no light reaches what the camera sees; try another --camera or --exposure",
+            asked.input.display()
+        );
+    }
     if let Some(path) = &asked.timings {
         let timings = Timings { device: gpu.describe(), width, height, frames };
         write_file(path, |path| Ok(std::fs::write(path, serde_json::to_string_pretty(&timings)? + "\n")?))?;
@@ -110,19 +117,24 @@ fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::Fra
     }
 }
 
-fn write_frame(path: &Path, gpu: &Gpu, target: &Offscreen, floats: bool) -> anyhow::Result<()> {
+/// Writes the frame; whether any of its pixels is not black.
+fn write_frame(path: &Path, gpu: &Gpu, target: &Offscreen, floats: bool) -> anyhow::Result<bool> {
     let (width, height) = target.size();
+    let shows_something;
     let image = if floats {
         let values: Vec<f32> =
             target.read_linear(gpu)?.iter().flat_map(|pixel| pixel.truncate().to_array()).collect();
+        shows_something = values.iter().any(|&value| value > 0.0);
         image::Rgb32FImage::from_raw(width, height, values).map(image::DynamicImage::ImageRgb32F)
     } else {
         let mut bytes = target.read_rgba8(gpu)?;
         // A picture of a scene is opaque, whatever blending left in the alpha channel.
         bytes.chunks_exact_mut(4).for_each(|pixel| pixel[3] = 255);
+        shows_something = bytes.chunks_exact(4).any(|pixel| pixel[..3] != [0; 3]);
         image::RgbaImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgba8)
     };
     let image = image.context("the frame has another size than was asked for")?;
     let path: PathBuf = path.to_owned();
-    write_file(&path, |path| Ok(image.save(path)?))
+    write_file(&path, |path| Ok(image.save(path)?))?;
+    Ok(shows_something)
 }

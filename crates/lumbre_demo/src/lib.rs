@@ -54,7 +54,7 @@ pub use recording::{Event, Playback, Recording, RecordingError, STEPS_PER_SECOND
 pub use torch::{torch_light, torch_place};
 pub use tour::{TOUR_CAMERA, Tour};
 #[cfg(feature = "window")]
-pub use tour_frames::tour;
+pub use tour_frames::{tour, tour_of};
 pub use view_settings::ViewSettings;
 #[cfg(feature = "window")]
-pub use window::{PlayOptions, Trial, has_display, run};
+pub use window::{PlayOptions, Trial, has_display, run, run_game};

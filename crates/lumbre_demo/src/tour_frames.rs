@@ -18,9 +18,16 @@ const BETWEEN: Duration = Duration::from_millis(200);
 /// # Errors
 /// The level cannot be loaded, there is no device, or a picture cannot be drawn or written.
 pub fn tour(level: &Path, out_dir: &Path, frames: u32, size: (u32, u32)) -> Result<Vec<PathBuf>> {
+    tour_of(Game::load(level)?, out_dir, frames, size)
+}
+
+/// [`tour`] of a level that is loaded already.
+///
+/// # Errors
+/// There is no device, or a picture cannot be drawn or written.
+pub fn tour_of(mut game: Game, out_dir: &Path, frames: u32, size: (u32, u32)) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(out_dir)
         .with_context(|| format!("cannot make the folder {}", out_dir.display()))?;
-    let mut game = Game::load(level)?;
     let bounds = game.level().bounds();
     let tour = Tour::of(&mut game.world, bounds);
     let gpu = Gpu::headless()?;

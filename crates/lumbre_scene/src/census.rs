@@ -275,7 +275,7 @@ impl Census {
             mesh(
                 "own reflection models",
                 self.own_reflection,
-                "with a specular model of its own",
+                "with another specular model than the scene",
                 "all take the scene's",
             ),
             model("Phong reflection", ReflectionModel::Phong),
@@ -310,7 +310,7 @@ impl Census {
                 "no light that is on asks for one",
             ),
             mesh("specular", self.specular, "with a highlight", "every specular coefficient is 0"),
-            mesh("emission", self.emissive, "that emits", "no material emits"),
+            mesh("emission", self.emissive, "with emission", "no material emits"),
             mesh("lightmaps", self.lightmapped, "with a lightmap", "no mesh has a lightmap"),
             mesh("textures", textured, "with a textured material", "no material has a texture"),
             mesh("base colour textures", self.base_color_textures, "with one", "no material has one"),
@@ -331,8 +331,8 @@ impl Census {
                 "with a material on the back",
                 "no visible back has a material of its own",
             ),
-            mesh("unlit", self.unlit, "that takes no light", "every material takes light"),
-            mesh("mirrors", self.mirrors, "that mirrors", "every mirror coefficient is 0"),
+            mesh("unlit", self.unlit, "taking no light", "every material takes light"),
+            mesh("mirrors", self.mirrors, "with a mirror coefficient", "every mirror coefficient is 0"),
             mesh(
                 "transmission",
                 self.transmission,
@@ -340,7 +340,7 @@ impl Census {
                 "every transmission coefficient is 0",
             ),
             scene("fog", self.fog, "the scene has fog", "the scene has no fog"),
-            mesh("dynamic objects", self.dynamic_objects, "that moves", "nothing moves"),
+            mesh("dynamic objects", self.dynamic_objects, "marked as moving", "nothing moves"),
             mesh("static objects", self.static_objects, "for the baker", "no mesh is static"),
         ]
     }

@@ -39,6 +39,7 @@ mod bounds;
 mod census;
 mod components;
 mod default_camera;
+mod default_light;
 mod gltf;
 mod hidden_cone;
 mod image;
@@ -55,9 +56,11 @@ pub use components::{
     Mesh, MetallicRoughnessTexture, Primitive, Projection, SharedImage, StaticObject,
 };
 pub use default_camera::default_camera;
+pub use default_light::{add_default_light, is_without_light};
 pub use gltf::{
-    LightmapFile, LoadError, LoadLimits, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS, SaveError,
-    SaveOptions, SaveReport, load, load_slice, load_slice_within, save, save_with,
+    LightmapFile, LoadError, LoadLimits, LoadOptions, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS,
+    SaveError, SaveOptions, SaveReport, SourceFile, load, load_slice, load_slice_within, load_with, save,
+    save_baked, save_with,
 };
 pub use hidden_cone::{HiddenCone, hidden_cones};
 pub use image::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};

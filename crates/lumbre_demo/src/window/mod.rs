@@ -73,8 +73,15 @@ pub fn has_display() -> bool {
 /// # Errors
 /// The level or the recording cannot be loaded, there is no display or no device, or drawing fails; the message says what to do.
 pub fn run(level: &Path, options: PlayOptions) -> Result<()> {
+    run_game(Game::load(level)?, options)
+}
+
+/// [`run`] of a level that is loaded already.
+///
+/// # Errors
+/// As [`run`], the level aside.
+pub fn run_game(mut game: Game, options: PlayOptions) -> Result<()> {
     let recording = options.input.as_deref().map(Recording::load).transpose()?;
-    let mut game = Game::load(level)?;
     if options.record.is_some() {
         game.record();
     }

@@ -3,7 +3,8 @@
 //! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and what is
 //! decoded counts against one limit for the whole file.
 
-use super::document::{Accessor, Document, element};
+use super::compressed_views::DecodedViews;
+use super::document::{Accessor, Document, Sparse, element};
 use super::error::LoadProblem;
 use super::limits::Budget;
 
@@ -18,6 +19,8 @@ const FLOAT: u32 = 5126;
 pub(crate) struct Buffers<'a> {
     pub document: &'a Document,
     pub bytes: Vec<std::borrow::Cow<'a, [u8]>>,
+    /// Views that were compressed.
+    pub decoded: std::borrow::Cow<'a, DecodedViews>,
 }
 
 /// Elements in a buffer view, `count` of them, already known to lie inside it.
@@ -26,14 +29,25 @@ struct Elements<'a> {
     stride: usize,
 }
 
-/// What elements look like.
-struct Format {
-    component: u32,
-    components: usize,
+impl<'a> Elements<'a> {
+    /// The bytes of one element; empty beyond the last.
+    fn get(&self, index: usize, size: usize) -> &'a [u8] {
+        let start = index.saturating_mul(self.stride);
+        self.bytes.get(start..start.saturating_add(size)).unwrap_or_default()
+    }
+}
+
+/// What elements look like: vectors, or matrices of `columns` columns, each beginning at a multiple of four bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Format {
+    pub component: u32,
+    /// Of a vector or a column.
+    pub components: usize,
+    pub columns: usize,
 }
 
 impl Format {
-    fn component_size(&self) -> usize {
+    pub(crate) fn component_size(self) -> usize {
         match self.component {
             BYTE | UNSIGNED_BYTE => 1,
             SHORT | UNSIGNED_SHORT => 2,
@@ -41,8 +55,42 @@ impl Format {
         }
     }
 
-    fn size(&self) -> usize {
-        self.component_size() * self.components
+    /// Bytes from a column to the next.
+    fn column_size(self) -> usize {
+        let size = self.component_size() * self.components;
+        if self.columns > 1 { size.next_multiple_of(4) } else { size }
+    }
+
+    pub(crate) fn size(self) -> usize {
+        self.column_size() * self.columns
+    }
+
+    /// The components of an element as they stand, without normalization.
+    pub(crate) fn raw(self, element: &[u8]) -> impl Iterator<Item = f64> {
+        let columns = element.chunks(self.column_size()).take(self.columns);
+        let own = self.component_size() * self.components;
+        columns
+            .flat_map(move |column| column.get(..own).unwrap_or_default().chunks_exact(self.component_size()))
+            .map(move |bytes| match self.component {
+                UNSIGNED_INT => f64::from(whole(bytes)),
+                component => f64::from(number(bytes, component, false)),
+            })
+    }
+}
+
+/// The elements of an accessor as they lie in the file.
+pub(crate) struct RawElements<'a> {
+    pub format: Format,
+    pub count: usize,
+    base: Option<Elements<'a>>,
+    /// What is said instead of some of them: index and bytes.
+    pub sparse: Vec<(u32, &'a [u8])>,
+}
+
+impl<'a> RawElements<'a> {
+    /// The bytes of an element of the buffer view; nothing where there is none, which means zeros.
+    pub(crate) fn base(&self, index: usize) -> Option<&'a [u8]> {
+        self.base.as_ref().map(|base| base.get(index, self.format.size()))
     }
 }
 
@@ -54,11 +102,8 @@ impl<'a> Buffers<'a> {
         place: impl FnOnce() -> String,
     ) -> Result<(&[u8], Option<u64>), LoadProblem> {
         let view = element(&self.document.buffer_views, "bufferViews", index, place)?;
-        if view.extensions.contains_key("EXT_meshopt_compression") {
-            return Err(LoadProblem::RequiredExtension {
-                name: "EXT_meshopt_compression".to_owned(),
-                supported: super::SUPPORTED_EXTENSIONS.join(", "),
-            });
+        if let Some(decoded) = self.decoded.get(&index) {
+            return Ok((decoded, view.byte_stride));
         }
         let buffer = element(&self.bytes, "buffers", view.buffer, || format!("bufferViews[{index}].buffer"))?;
         let end = view.byte_offset.checked_add(view.byte_length);
@@ -176,11 +221,14 @@ impl<'a> Buffers<'a> {
                 reader.error(format!("type is {shape:?}, but this use needs {}", shapes.join(" or ")))
             );
         }
-        let components = match accessor.shape.as_str() {
-            "SCALAR" => 1,
-            "VEC2" => 2,
-            "VEC3" => 3,
-            _ => 4,
+        let (components, columns) = match accessor.shape.as_str() {
+            "SCALAR" => (1, 1),
+            "VEC2" => (2, 1),
+            "VEC3" => (3, 1),
+            "MAT2" => (2, 2),
+            "MAT3" => (3, 3),
+            "MAT4" => (4, 4),
+            _ => (4, 1),
         };
         let component = accessor.component_type;
         if !matches!(component, BYTE | UNSIGNED_BYTE | SHORT | UNSIGNED_SHORT | UNSIGNED_INT | FLOAT) {
@@ -188,7 +236,7 @@ impl<'a> Buffers<'a> {
                 reader.error(format!("componentType {component} does not exist in glTF; use 5120 to 5126"))
             );
         }
-        Ok((reader, accessor, Format { component, components }))
+        Ok((reader, accessor, Format { component, components, columns }))
     }
 
     fn decode<T: Copy>(
@@ -219,7 +267,27 @@ impl<'a> Buffers<'a> {
             None => vec![zero; accessor.count as usize],
         };
         let Some(sparse) = &accessor.sparse else { return Ok(values) };
-        let kind = Format { component: sparse.indices.component_type, components: 1 };
+        for (index, replacement) in self.replacements(reader, accessor, sparse, format)? {
+            let Some(value) = values.get_mut(index as usize) else {
+                return Err(reader.error(format!(
+                    "sparse index {index} is not below its count of {}; export the file again",
+                    accessor.count
+                )));
+            };
+            *value = decode(replacement);
+        }
+        Ok(values)
+    }
+
+    /// The elements of a sparse accessor that differ from the rest, with their indices.
+    fn replacements(
+        &self,
+        reader: &Reader<'_>,
+        accessor: &Accessor,
+        sparse: &Sparse,
+        format: &Format,
+    ) -> Result<impl Iterator<Item = (u32, &[u8])>, LoadProblem> {
+        let kind = Format { component: sparse.indices.component_type, components: 1, columns: 1 };
         if !matches!(kind.component, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT)
             || sparse.count > accessor.count
         {
@@ -230,21 +298,31 @@ impl<'a> Buffers<'a> {
         }
         let (at, new) = (&sparse.indices, &sparse.values);
         let indices = self.elements(at.buffer_view, at.byte_offset, sparse.count, &kind, false, reader)?;
-        let replacements =
-            self.elements(new.buffer_view, new.byte_offset, sparse.count, format, false, reader)?;
-        let pairs =
-            indices.bytes.chunks_exact(kind.size()).zip(replacements.bytes.chunks_exact(format.size()));
-        for (index, replacement) in pairs.take(sparse.count as usize) {
-            let index = whole(index);
-            let Some(value) = values.get_mut(index as usize) else {
-                return Err(reader.error(format!(
-                    "sparse index {index} is not below its count of {}; export the file again",
-                    accessor.count
-                )));
-            };
-            *value = decode(replacement);
+        let values = self.elements(new.buffer_view, new.byte_offset, sparse.count, format, false, reader)?;
+        let pairs = indices.bytes.chunks_exact(kind.size()).zip(values.bytes.chunks_exact(format.size()));
+        Ok(pairs.take(sparse.count as usize).map(|(index, value)| (whole(index), value)))
+    }
+
+    /// The elements of an accessor of any type, unread.
+    pub(crate) fn raw(&self, index: usize, used_by: &str) -> Result<RawElements<'_>, LoadProblem> {
+        const SHAPES: [&str; 7] = ["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"];
+        let (reader, accessor, format) = self.reader(index, used_by, &SHAPES)?;
+        let base = match accessor.buffer_view {
+            Some(view) => {
+                Some(self.elements(view, accessor.byte_offset, accessor.count, &format, true, &reader)?)
+            }
+            None => None,
+        };
+        let sparse = match &accessor.sparse {
+            Some(sparse) => self.replacements(&reader, accessor, sparse, &format)?.collect(),
+            None => Vec::new(),
+        };
+        match usize::try_from(accessor.count) {
+            Ok(count) if sparse.iter().all(|(index, _)| (*index as usize) < count) => {
+                Ok(RawElements { format, count, base, sparse })
+            }
+            _ => Err(reader.error("a sparse index is not below its count; export the file again")),
         }
-        Ok(values)
     }
 }
 

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::error::LoadProblem;
+use super::error::{LoadProblem, Notes};
 
 /// Extension objects by name.
 pub(crate) type Extensions = Map<String, Value>;
@@ -111,6 +111,8 @@ pub(crate) struct BufferView {
 pub(crate) struct Buffer {
     pub uri: Option<String>,
     pub byte_length: u64,
+    #[serde(default)]
+    pub extensions: Extensions,
 }
 
 #[derive(Deserialize, Debug, Default)]
@@ -257,24 +259,32 @@ pub(crate) struct Document {
     pub animations: Vec<Animation>,
     pub skins: usize,
     pub lights: Vec<PunctualLight>,
+    /// Of each light, whether its strength is in candela or lux.
+    pub photometric: Vec<bool>,
     pub extensions_used: Vec<String>,
     pub extensions_required: Vec<String>,
 }
 
 impl Document {
-    /// Reads the JSON text of a file; checks types and the version, not indices or ranges.
-    pub(crate) fn parse(json: &[u8]) -> Result<Self, LoadProblem> {
+    /// Reads the JSON of a file; checks types and the version, not indices or ranges.
+    pub(crate) fn from_root(mut root: Map<String, Value>, notes: &mut Notes) -> Result<Self, LoadProblem> {
         let at = |place: &str| {
             let place = place.to_owned();
             move |source| LoadProblem::Json { place, source }
         };
-        let mut root: Map<String, Value> = serde_json::from_slice(json).map_err(at("JSON"))?;
         let version = root.get("asset").and_then(|asset| asset.get("version")).and_then(Value::as_str);
         if version.is_none_or(|version| version.split('.').next() != Some("2")) {
-            let version =
-                version.map_or_else(|| "unstated (no asset.version)".to_owned(), |v| shortened(v).to_owned());
-            return Err(LoadProblem::Version { version });
+            let unstated = version.is_none();
+            let version = version.map_or_else(|| "unstated".to_owned(), |v| shortened(v).to_owned());
+            let problem = LoadProblem::Version { version };
+            // Version 1 has objects where version 2 has lists.
+            let lists = ["nodes", "meshes", "scenes"].iter().filter_map(|list| root.get(*list));
+            if !unstated || !lists.clone().any(Value::is_array) || !lists.clone().all(Value::is_array) {
+                return Err(problem);
+            }
+            notes.repair("asset.version", problem, "taken for 2.0, which its lists are of")?;
         }
+        let photometric = super::patch::photometric_lights(&root);
         let mut lights = Vec::new();
         if let Some(Value::Object(extensions)) = root.get_mut("extensions")
             && let Some(Value::Object(punctual)) = extensions.get_mut("KHR_lights_punctual")
@@ -298,6 +308,7 @@ impl Document {
             animations: list(&mut root, "animations", "animations")?,
             skins: list::<Value>(&mut root, "skins", "skins")?.len(),
             lights,
+            photometric,
             extensions_used: list(&mut root, "extensionsUsed", "extensionsUsed")?,
             extensions_required: list(&mut root, "extensionsRequired", "extensionsRequired")?,
         })
@@ -321,6 +332,11 @@ impl Document {
             self.materials.get(material).and_then(|material| material.name.as_deref()),
         )
     }
+}
+
+/// The JSON text of a file.
+pub(crate) fn parse(json: &[u8]) -> Result<Map<String, Value>, LoadProblem> {
+    serde_json::from_slice(json).map_err(|source| LoadProblem::Json { place: "JSON".to_owned(), source })
 }
 
 /// The beginning of a text from a file, short enough for a message.

@@ -7,12 +7,22 @@ use lumbre_optics::{FogError, LightError, MaterialError};
 
 /// Why a glTF file cannot be loaded.
 #[derive(Debug, thiserror::Error)]
-#[error("{file}: {problem}")]
+#[error("{file}: {}", described(file, problem))]
 pub struct LoadError {
     /// The file, or the name given to its bytes.
     pub file: String,
     /// What is wrong, and where; part of the message, so that a chain of causes does not say it twice.
     pub problem: Box<LoadProblem>,
+}
+
+/// A problem, which does not name the file again if it is the one that cannot be read.
+fn described(file: &str, problem: &LoadProblem) -> String {
+    match problem {
+        LoadProblem::Read { path, source } if path.display().to_string() == file => {
+            format!("cannot be read: {source}; check that the file exists and may be read")
+        }
+        other => other.to_string(),
+    }
 }
 
 /// What is wrong with a glTF file. Places are JSON paths such as `nodes[3].mesh`.
@@ -36,7 +46,7 @@ pub enum LoadProblem {
         magic: String,
     },
     /// A version other than 2.
-    #[error("is glTF version {version}; only 2.x is supported, export it again as glTF 2.0")]
+    #[error("its glTF version is {version}; only 2.x is supported, export it again as glTF 2.0")]
     Version {
         /// The version as the file states it.
         version: String,
@@ -133,6 +143,14 @@ pub enum LoadProblem {
         /// Bytes that the buffer has.
         length: u64,
     },
+    /// Compressed data cannot be decoded.
+    #[error("{place}: {problem}; compress the file again, or export it without compression")]
+    Compressed {
+        /// The buffer view.
+        place: String,
+        /// What is wrong with the data.
+        problem: &'static str,
+    },
     /// A URI that is not followed, or that holds no data.
     #[error("{place}: the URI {uri:?} {problem}")]
     Uri {
@@ -219,14 +237,35 @@ impl fmt::Display for Note {
 
 /// Collects notes, each one once.
 #[derive(Debug, Default)]
-pub(crate) struct Notes(pub(crate) Vec<Note>);
+pub(crate) struct Notes {
+    pub list: Vec<Note>,
+    /// Whether faults that can be repaired are.
+    pub lenient: bool,
+}
 
 impl Notes {
     pub(crate) fn add(&mut self, place: impl Into<String>, text: impl Into<String>) {
         let note = Note { place: place.into(), text: text.into() };
-        if !self.0.contains(&note) {
+        if !self.list.contains(&note) {
             tracing::debug!("{note}");
-            self.0.push(note);
+            self.list.push(note);
         }
+    }
+
+    /// Notes what is done about a problem, or refuses it where nothing may be.
+    pub(crate) fn repair(
+        &mut self,
+        place: &str,
+        problem: LoadProblem,
+        instead: &str,
+    ) -> Result<(), LoadProblem> {
+        if !self.lenient {
+            return Err(problem);
+        }
+        let text = problem.to_string();
+        // Most problems begin with their place.
+        let text = text.strip_prefix(place).map_or(text.as_str(), |rest| rest.trim_start_matches([':', ' ']));
+        self.add(place, format!("{text}; {instead}"));
+        Ok(())
     }
 }

@@ -128,6 +128,22 @@ pub enum SaveError {
         /// What the writer said.
         source: serde_json::Error,
     },
+    /// A mesh is another than the one that was loaded, by more than lightmap coordinates.
+    #[error(
+        "{place}: its triangles are no longer those of the file, so that they cannot be written into it; save the World as a file of its own"
+    )]
+    MeshChanged {
+        /// The primitive.
+        place: String,
+    },
+    /// Data of the file that is written anew cannot be read.
+    #[error("{place}: {problem}")]
+    Source {
+        /// The primitive.
+        place: String,
+        /// What is wrong with it.
+        problem: Box<super::error::LoadProblem>,
+    },
     /// More than a .glb can hold.
     #[error("{} would exceed the 4 GiB that a .glb can hold; save as .gltf", path.display())]
     TooLarge {
@@ -152,18 +168,52 @@ pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
 /// # Errors
 /// As [`save`].
 pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Result<SaveReport, SaveError> {
-    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
-    let binary = match extension.as_deref() {
-        Some("glb") => true,
-        Some("gltf") => false,
-        _ => return Err(SaveError::Extension { path: path.to_owned() }),
-    };
+    let binary = is_glb(path)?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let mut lightmaps = LightmapFiles::new(stem.clone(), options.encoding);
     let nodes = Nodes::collect(world, &mut lightmaps)?;
     let scene = export_scene::settings(world)?;
 
     let mut files = Files::default();
+    let written = write_lightmaps(&lightmaps, path, options, &mut files)?;
+    let bin_name = format!("{stem}.bin");
+    let (json, data, notes) = document(nodes, scene, (!binary).then_some(bin_name.as_str()));
+    let mut bytes = data.len() as u64;
+    if binary {
+        let text = serde_json::to_vec(&json).map_err(|source| SaveError::Json { source })?;
+        let file = container::join(&text, &data, &[])
+            .ok_or_else(|| SaveError::TooLarge { path: path.to_owned() })?;
+        bytes = file.len() as u64;
+        files.write(path, &file)?;
+    } else {
+        if !data.is_empty() {
+            files.write(&path.with_file_name(&bin_name), &data)?;
+        }
+        let mut text = serde_json::to_vec_pretty(&json).map_err(|source| SaveError::Json { source })?;
+        text.push(b'\n');
+        bytes += text.len() as u64;
+        files.write(path, &text)?;
+    }
+    Ok(SaveReport { files: files.commit()?, bytes, lightmaps: written, notes })
+}
+
+/// Whether a name is that of a .glb; not one of a .gltf.
+pub(crate) fn is_glb(path: &Path) -> Result<bool, SaveError> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    match extension.as_deref() {
+        Some("glb") => Ok(true),
+        Some("gltf") => Ok(false),
+        _ => Err(SaveError::Extension { path: path.to_owned() }),
+    }
+}
+
+/// Writes the images of lightmaps and irradiance volumes beside the file that shows them.
+pub(crate) fn write_lightmaps(
+    lightmaps: &LightmapFiles,
+    path: &Path,
+    options: &SaveOptions,
+    files: &mut Files,
+) -> Result<Vec<LightmapFile>, SaveError> {
     let mut written = Vec::new();
     for (name, image) in &lightmaps.images {
         let failed = |error: LightmapFileError| SaveError::Image {
@@ -197,25 +247,7 @@ pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Resul
         files.write(&path, &image)?;
         written.push(LightmapFile { path, encoding: format.name(), bytes: image.len() as u64, error });
     }
-    let bin_name = format!("{stem}.bin");
-    let (json, data, notes) = document(nodes, scene, (!binary).then_some(bin_name.as_str()));
-    let mut bytes = data.len() as u64;
-    if binary {
-        let text = serde_json::to_vec(&json).map_err(|source| SaveError::Json { source })?;
-        let file =
-            container::join(&text, &data).ok_or_else(|| SaveError::TooLarge { path: path.to_owned() })?;
-        bytes = file.len() as u64;
-        files.write(path, &file)?;
-    } else {
-        if !data.is_empty() {
-            files.write(&path.with_file_name(&bin_name), &data)?;
-        }
-        let mut text = serde_json::to_vec_pretty(&json).map_err(|source| SaveError::Json { source })?;
-        text.push(b'\n');
-        bytes += text.len() as u64;
-        files.write(path, &text)?;
-    }
-    Ok(SaveReport { files: files.commit()?, bytes, lightmaps: written, notes })
+    Ok(written)
 }
 
 /// The JSON and the binary data of a file.
@@ -299,7 +331,7 @@ pub(crate) struct LightmapFiles {
 }
 
 impl LightmapFiles {
-    fn new(stem: String, encoding: Option<LightmapEncoding>) -> Self {
+    pub(crate) fn new(stem: String, encoding: Option<LightmapEncoding>) -> Self {
         let (images, volumes, names) = Default::default();
         Self { stem, encoding, known: HashMap::new(), images, volumes, names }
     }

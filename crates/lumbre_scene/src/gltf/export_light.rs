@@ -54,7 +54,8 @@ pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Va
     Ok(written)
 }
 
-fn phong(light: &Light, khr_spot: Option<SpotCone>) -> PhongLight {
+/// LUMBRE_lights_phong, its cone left out where KHR_lights_punctual says the same.
+pub(crate) fn phong(light: &Light, khr_spot: Option<SpotCone>) -> PhongLight {
     let attenuation = &light.attenuation;
     let spot = light.spot.filter(|cone| Some(*cone) != khr_spot).map(|cone| match cone {
         SpotCone::Exponent { cutoff, exponent } => PhongSpot {

@@ -114,7 +114,10 @@ impl Nodes {
                 let reference = lightmaps.volume_reference(volume, name.as_deref(), number);
                 extend(&mut node, "LUMBRE_irradiance_volume", reference);
             }
-            let mut object = ObjectExtension { dynamic: own_dynamic && !inherited, ..Default::default() };
+            let mut object = ObjectExtension {
+                dynamic: (own_dynamic && !inherited).then_some(true),
+                ..Default::default()
+            };
             if let Some((appearance, group)) = own {
                 object.hidden = appearance.hidden;
                 object.emissive_light = appearance.emissive_light;
@@ -147,7 +150,7 @@ impl Nodes {
                     lightmaps,
                 )?;
                 let object = ObjectExtension {
-                    dynamic: appearance.dynamic && !dynamic,
+                    dynamic: (appearance.dynamic && !dynamic).then_some(true),
                     hidden: appearance.hidden,
                     emissive_light: appearance.emissive_light,
                 };
@@ -160,7 +163,7 @@ impl Nodes {
             }
             result.nodes[number] = node.into();
         }
-        result.notes = notes.0;
+        result.notes = notes.list;
         Ok(result)
     }
 
@@ -182,16 +185,7 @@ impl Nodes {
         if !transform.affine().is_finite() {
             return Err(SaveError::NotFinite { place, field: "Transform".to_owned() });
         }
-        let identity = Transform::IDENTITY;
-        if transform.translation != identity.translation {
-            node.insert("translation".to_owned(), json!(transform.translation.to_array()));
-        }
-        if transform.rotation != identity.rotation {
-            node.insert("rotation".to_owned(), json!(transform.rotation.to_array()));
-        }
-        if transform.scale != identity.scale {
-            node.insert("scale".to_owned(), json!(transform.scale.to_array()));
-        }
+        transform_keys(&mut node, &transform);
         if let Some(light) = world.get::<Light>(entity) {
             self.lights.push(export_light::light(light, name, &place)?);
             extend(&mut node, "KHR_lights_punctual", json!({"light": self.lights.len() - 1}));
@@ -297,6 +291,20 @@ impl Nodes {
     }
 }
 
+/// Translation, rotation and scale of a node, those that are not the identity's.
+pub(crate) fn transform_keys(node: &mut Map<String, Value>, transform: &Transform) {
+    let identity = Transform::IDENTITY;
+    if transform.translation != identity.translation {
+        node.insert("translation".to_owned(), json!(transform.translation.to_array()));
+    }
+    if transform.rotation != identity.rotation {
+        node.insert("rotation".to_owned(), json!(transform.rotation.to_array()));
+    }
+    if transform.scale != identity.scale {
+        node.insert("scale".to_owned(), json!(transform.scale.to_array()));
+    }
+}
+
 /// Whether an entity is nothing but a primitive of its parent's mesh.
 fn is_primitive(world: &World, entity: Entity) -> bool {
     world.get::<Primitive>(entity).is_some()
@@ -327,7 +335,7 @@ fn ancestors(world: &World, entity: Entity) -> impl Iterator<Item = Entity> + '_
 }
 
 fn object_extension(node: &mut Map<String, Value>, object: ObjectExtension) -> Result<(), SaveError> {
-    if object.dynamic || object.hidden || object.emissive_light {
+    if object.dynamic.is_some() || object.hidden || object.emissive_light {
         let extension = serde_json::to_value(object);
         extend(node, "LUMBRE_object", extension.map_err(|source| SaveError::Json { source })?);
     }

@@ -165,8 +165,9 @@ pub(crate) struct IrradianceVolumeExtension {
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ObjectExtension {
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub dynamic: bool,
+    /// `false` says of a mesh with a skeleton that it stands still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dynamic: Option<bool>,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub hidden: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -180,6 +181,28 @@ pub(crate) struct CameraExtension {
     pub exposure: Option<f64>,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub active: bool,
+}
+
+/// EXT_meshopt_compression of a buffer view: where the compressed data are, and what they stand for.
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct MeshoptView {
+    pub buffer: usize,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: u64,
+    pub count: u64,
+    pub mode: String,
+    pub filter: Option<String>,
+}
+
+/// EXT_meshopt_compression of a buffer.
+#[derive(Deserialize, Debug, Default)]
+pub(crate) struct MeshoptBuffer {
+    /// The buffer has no data of its own: views into it are compressed.
+    #[serde(default)]
+    pub fallback: bool,
 }
 
 /// KHR_materials_emissive_strength.

@@ -33,13 +33,13 @@ pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierar
             if child == index {
                 return Err(LoadProblem::Cycle { node: child, name: name(child) });
             }
-            if let Some(first) = parents[child].replace(index) {
-                return Err(twice(
-                    child,
-                    format!("nodes[{first}].children"),
-                    format!("nodes[{index}].children"),
-                ));
+            if let Some(first) = parents[child] {
+                let problem =
+                    twice(child, format!("nodes[{first}].children"), format!("nodes[{index}].children"));
+                notes.repair(&document.node_place(child), problem, "it stays where it was listed first")?;
+                continue;
             }
+            parents[child] = Some(index);
         }
     }
     let below = |roots: &[usize], reached: &mut Vec<bool>| {
@@ -48,7 +48,8 @@ pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierar
         while let Some(node) = stack.pop() {
             if !std::mem::replace(&mut reached[node], true) {
                 order.push(node);
-                stack.extend(document.nodes[node].children.iter().rev());
+                let children = document.nodes[node].children.iter().rev();
+                stack.extend(children.filter(|&&child| parents[child] == Some(node)));
             }
         }
         order
@@ -61,10 +62,13 @@ pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierar
         return Err(LoadProblem::Cycle { node, name: name(node) });
     }
     let scene = match document.scene {
-        Some(scene) => {
-            element(&document.scenes, "scenes", scene, || "scene".to_owned())?;
-            Some(scene)
-        }
+        Some(scene) => match element(&document.scenes, "scenes", scene, || "scene".to_owned()) {
+            Ok(_) => Some(scene),
+            Err(problem) => {
+                notes.repair("scene", problem, "the first is shown")?;
+                (!document.scenes.is_empty()).then_some(0)
+            }
+        },
         None => (!document.scenes.is_empty()).then_some(0),
     };
     let order = match scene {
@@ -72,17 +76,27 @@ pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierar
         Some(scene) => {
             let place = format!("scenes[{scene}].nodes");
             let listed = &document.scenes[scene].nodes;
+            let mut roots = Vec::new();
             let mut seen = vec![false; count];
             for &node in listed {
                 element(&document.nodes, "nodes", node, || place.clone())?;
-                if let Some(parent) = parents[node] {
-                    return Err(twice(node, format!("nodes[{parent}].children"), place));
-                }
                 if std::mem::replace(&mut seen[node], true) {
-                    return Err(twice(node, place.clone(), place));
+                    let problem = twice(node, place.clone(), place.clone());
+                    notes.repair(&document.node_place(node), problem, "it is shown once")?;
+                } else if let Some(parent) = parents[node] {
+                    let problem = twice(node, format!("nodes[{parent}].children"), place.clone());
+                    notes.repair(&document.node_place(node), problem, "it stays below its parent")?;
+                    // Its parents may not be in the scene; then it is shown by itself.
+                    let mut above = std::iter::successors(Some(node), |&node| parents[node]).skip(1);
+                    let is_listed = |above: usize| listed.contains(&above);
+                    if !above.any(is_listed) {
+                        roots.push(node);
+                    }
+                } else {
+                    roots.push(node);
                 }
             }
-            below(listed, &mut vec![false; count])
+            below(&roots, &mut vec![false; count])
         }
     };
     if order.len() < count {

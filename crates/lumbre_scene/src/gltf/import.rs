@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use bevy_ecs::prelude::*;
 
 use super::accessor::Buffers;
-use super::document::{Document, shortened};
+use super::document::{self, Document, shortened};
 use super::error::{LoadError, LoadProblem, Note, Notes};
-use super::limits::{Budget, LoadLimits};
+use super::limits::LoadLimits;
+use super::options::LoadOptions;
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
-use super::{container, uri};
+use super::uri::{self, Base};
+use super::{compressed_views, container};
 use crate::{
     ActiveCamera, DynamicObject, EmissiveLight, Extras, Hidden, MaterialTextures, Mesh, StaticObject,
     update_transforms,
@@ -29,6 +31,10 @@ pub struct LoadReport {
     pub triangles: usize,
     /// The files beside the glTF file that its buffers and images are in, if a folder was given.
     pub files: Vec<PathBuf>,
+    /// Lights whose strength is in candela or lux, as `KHR_lights_punctual` has it: numbers that a picture holds under an exposure only.
+    pub photometric_lights: usize,
+    /// Whether a camera says how its pictures are exposed (`LUMBRE_camera.exposure`).
+    pub states_exposure: bool,
 }
 
 /// Loads a .glb or .gltf file into a World, beside what is there.
@@ -40,10 +46,22 @@ pub struct LoadReport {
 /// # Errors
 /// [`LoadError`] with the place and the remedy; the World is then unchanged.
 pub fn load(world: &mut World, path: &Path) -> Result<LoadReport, LoadError> {
+    load_with(world, path, &LoadOptions::default())
+}
+
+/// [`load`], with choices.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(world: &mut World, path: &Path, options: &LoadOptions) -> Result<LoadReport, LoadError> {
     let name = path.display().to_string();
-    let bytes =
-        uri::read(path).map_err(|problem| LoadError { file: name.clone(), problem: problem.into() })?;
-    load_slice(world, &bytes, &name, Some(path.parent().unwrap_or(Path::new(""))))
+    let read = || {
+        let folder = Some(path.parent().unwrap_or(Path::new("")));
+        read(&uri::read(path)?, Base { folder, root: options.root.as_deref() }, options)
+    };
+    let (prepared, notes) =
+        read().map_err(|problem| LoadError { file: name.clone(), problem: problem.into() })?;
+    Ok(spawn(world, prepared, notes))
 }
 
 /// Loads the bytes of a .glb or .gltf. `name` is for messages, `base` the folder that relative URIs start from.
@@ -70,32 +88,56 @@ pub fn load_slice_within(
     base: Option<&Path>,
     limits: LoadLimits,
 ) -> Result<LoadReport, LoadError> {
-    let mut notes = Notes::default();
-    let prepared = read(bytes, base, limits, &mut notes)
+    let options = LoadOptions { limits, ..LoadOptions::default() };
+    let (prepared, notes) = read(bytes, Base { folder: base, root: None }, &options)
         .map_err(|problem| LoadError { file: name.to_owned(), problem: problem.into() })?;
     Ok(spawn(world, prepared, notes))
 }
 
-fn read(
-    bytes: &[u8],
-    base: Option<&Path>,
-    limits: LoadLimits,
-    notes: &mut Notes,
-) -> Result<Prepared, LoadProblem> {
-    let container = container::split(bytes)?;
-    let document = Document::parse(container.json)?;
+fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared, Notes), LoadProblem> {
+    let mut notes = Notes { lenient: options.lenient, ..Notes::default() };
+    let container = container::split(bytes, &mut notes)?;
+    let document = Document::from_root(document::parse(container.json)?, &mut notes)?;
+    check_extensions(&document)?;
+    let contents = contents(&document, container.binary, base, &mut notes)?;
+    let decoded = Cow::Owned(compressed_views::decode(
+        &document,
+        &contents,
+        &mut options.limits.budget(bytes.len(), &contents),
+    )?);
+    let buffers = Buffers { document: &document, bytes: contents, decoded };
+    let prepared = decode(&buffers, bytes.len() as u64, base, options.limits, &mut notes)?;
+    Ok((prepared, notes))
+}
+
+/// Refuses what cannot be shown without an extension that is not known here.
+pub(crate) fn check_extensions(document: &Document) -> Result<(), LoadProblem> {
     for name in &document.extensions_required {
         if !super::SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
             let (name, supported) = (shortened(name).to_owned(), super::SUPPORTED_EXTENSIONS.join(", "));
             return Err(LoadProblem::RequiredExtension { name, supported });
         }
     }
-    let mut total = bytes.len() as u64;
+    Ok(())
+}
+
+/// The bytes of every buffer, as long as each says it is.
+pub(crate) fn contents<'a>(
+    document: &Document,
+    binary: Option<&'a [u8]>,
+    base: Base<'_>,
+    notes: &mut Notes,
+) -> Result<Vec<Cow<'a, [u8]>>, LoadProblem> {
     let mut contents = Vec::new();
     for (index, buffer) in document.buffers.iter().enumerate() {
         let place = format!("buffers[{index}]");
-        let content = match (&buffer.uri, container.binary) {
+        let content = match (&buffer.uri, binary) {
             (Some(uri), _) => Cow::Owned(uri::fetch(uri, base, &place)?),
+            // Views into it are decoded from other buffers.
+            (None, _) if compressed_views::is_fallback(document, index)? => {
+                contents.push(Cow::Borrowed(&[][..]));
+                continue;
+            }
             (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),
             (None, _) => {
                 let problem =
@@ -105,9 +147,17 @@ fn read(
         };
         let found = content.len() as u64;
         if found < buffer.byte_length {
-            return Err(LoadProblem::Truncated { what: place, needed: buffer.byte_length, found });
+            let problem = LoadProblem::Truncated { what: place.clone(), needed: buffer.byte_length, found };
+            // Four is what everything in a .glb is padded to.
+            if buffer.byte_length - found >= 4 {
+                return Err(problem);
+            }
+            notes.repair(&place, problem, "zeros stand for the padding that is missing")?;
+            let mut padded = content.into_owned();
+            padded.resize(buffer.byte_length as usize, 0);
+            contents.push(Cow::Owned(padded));
+            continue;
         }
-        total = total.saturating_add(found);
         contents.push(match content {
             Cow::Borrowed(content) => Cow::Borrowed(&content[..buffer.byte_length as usize]),
             Cow::Owned(mut content) => {
@@ -116,24 +166,36 @@ fn read(
             }
         });
     }
-    let decoded_bytes =
-        limits.decoded_bytes.unwrap_or_else(|| total.saturating_mul(64).saturating_add(64 << 20));
-    let buffers = Buffers { document: &document, bytes: contents };
-    let mut prepared = prepare(&document, &buffers, base, limits, Budget::new(decoded_bytes), notes)?;
-    prepared.files = files_beside(&document, base);
+    Ok(contents)
+}
+
+/// Checks and decodes everything that is shown of a file of so many bytes.
+pub(crate) fn decode(
+    buffers: &Buffers<'_>,
+    file_bytes: u64,
+    base: Base<'_>,
+    limits: LoadLimits,
+    notes: &mut Notes,
+) -> Result<Prepared, LoadProblem> {
+    let document = buffers.document;
+    let budget = limits.budget(file_bytes as usize, &buffers.bytes);
+    let mut prepared = prepare(document, buffers, base, limits, budget, notes)?;
+    prepared.files = files_beside(document, base);
     Ok(prepared)
 }
 
-fn files_beside(document: &Document, base: Option<&Path>) -> Vec<PathBuf> {
+fn files_beside(document: &Document, base: Base<'_>) -> Vec<PathBuf> {
     let uris = document.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
     let uris = uris.chain(document.images.iter().filter_map(|image| image.uri.as_deref()));
-    let files = uris.filter(|uri| !uri.starts_with("data:")).filter_map(|uri| uri::relative(uri).ok());
-    base.map_or(Vec::new(), |base| files.map(|file| base.join(file)).collect())
+    uris.filter(|uri| !uri.starts_with("data:")).filter_map(|uri| base.file(uri, "").ok()).collect()
 }
 
-fn spawn(world: &mut World, prepared: Prepared, notes: Notes) -> LoadReport {
-    let mut report = LoadReport { notes: notes.0, files: prepared.files, ..LoadReport::default() };
+/// Makes entities of what was decoded.
+pub(crate) fn spawn(world: &mut World, prepared: Prepared, notes: Notes) -> LoadReport {
+    let mut report = LoadReport { notes: notes.list, files: prepared.files, ..LoadReport::default() };
     report.nodes = vec![Entity::PLACEHOLDER; prepared.node_count];
+    (report.photometric_lights, report.states_exposure) =
+        (prepared.photometric_lights, prepared.states_exposure);
     report.meshes = prepared.meshes.values().map(Vec::len).sum();
     // Entities in the order of the file, then children in the order of their parent's list.
     let mut by_index: Vec<&PreparedNode> = prepared.nodes.iter().collect();
@@ -143,8 +205,9 @@ fn spawn(world: &mut World, prepared: Prepared, notes: Notes) -> LoadReport {
     }
     for node in &prepared.nodes {
         let entity = report.nodes[node.index];
-        if let Some(parent) = node.parent {
-            world.entity_mut(entity).insert(ChildOf(report.nodes[parent]));
+        let parent = node.parent.map(|parent| report.nodes[parent]);
+        if let Some(parent) = parent.filter(|parent| *parent != Entity::PLACEHOLDER) {
+            world.entity_mut(entity).insert(ChildOf(parent));
         }
         for primitive in node.mesh.and_then(|mesh| prepared.meshes.get(&mesh)).into_iter().flatten() {
             report.triangles += primitive.mesh.triangle_count();

@@ -1,7 +1,6 @@
 //! Textures: images decoded within limits, samplers, and how a material refers to both.
 
 use std::io::Cursor;
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec2;
@@ -12,7 +11,7 @@ use super::document::{TextureInfo, element, extension, shortened};
 use super::error::{LoadProblem, Notes};
 use super::extensions::TextureTransform;
 use super::limits::{Budget, LoadLimits};
-use super::uri;
+use super::uri::{self, Base};
 use super::value::number;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
 
@@ -23,7 +22,7 @@ const MOST_TEXELS_PER_BYTE: u64 = 8 * 1032;
 /// Decodes images when they are first used.
 pub(crate) struct Images<'a> {
     pub buffers: &'a Buffers<'a>,
-    pub base: Option<&'a Path>,
+    pub base: Base<'a>,
     pub limits: LoadLimits,
     pub budget: Budget,
     pub decoded: Vec<Option<Arc<Image>>>,
@@ -38,7 +37,13 @@ impl Images<'_> {
         notes: &mut Notes,
     ) -> Result<Option<TextureReference>, LoadProblem> {
         let document = self.buffers.document;
-        let texture = element(&document.textures, "textures", info.index, || format!("{place}.index"))?;
+        let texture = match element(&document.textures, "textures", info.index, || format!("{place}.index")) {
+            Ok(texture) => texture,
+            Err(problem) => {
+                notes.repair(place, problem, "left out")?;
+                return Ok(None);
+            }
+        };
         let Some(source) = texture.source else {
             let kinds: Vec<_> = texture.extensions.keys().map(|name| shortened(name)).collect();
             notes.add(
@@ -49,9 +54,14 @@ impl Images<'_> {
         };
         let sampler = match texture.sampler {
             Some(index) => {
-                let place = || format!("textures[{}].sampler", info.index);
-                let source = element(&document.samplers, "samplers", index, place)?;
-                sampler(source)
+                let place = format!("textures[{}].sampler", info.index);
+                match element(&document.samplers, "samplers", index, || place.clone()) {
+                    Ok(source) => sampler(source),
+                    Err(problem) => {
+                        notes.repair(&place, problem, "the usual sampler is used")?;
+                        Sampler::default()
+                    }
+                }
             }
             None => Sampler::default(),
         };
@@ -77,30 +87,48 @@ impl Images<'_> {
                 expected: "use numbers that f32 can hold".to_owned(),
             });
         }
-        let image = self.image(source, || format!("textures[{}].source", info.index))?;
+        let image = self.image(source, &format!("textures[{}].source", info.index), notes)?;
         Ok(Some(TextureReference { image, sampler, tex_coord, offset, rotation, scale }))
     }
 
-    fn image(&mut self, index: usize, place: impl FnOnce() -> String) -> Result<Arc<Image>, LoadProblem> {
-        let document = self.buffers.document;
-        let source = element(&document.images, "images", index, place)?;
+    /// An image, decoded once. White stands in for one that cannot be read, where that may be.
+    fn image(&mut self, index: usize, used_by: &str, notes: &mut Notes) -> Result<Arc<Image>, LoadProblem> {
         if let Some(Some(image)) = self.decoded.get(index) {
             return Ok(image.clone());
         }
-        let place = match &source.name {
+        let name = self.buffers.document.images.get(index).and_then(|image| image.name.as_deref());
+        let place = match name {
             Some(name) => format!("images[{index}] ({})", shortened(name)),
             None => format!("images[{index}]"),
         };
+        let image = match self.read(index, used_by, &place) {
+            Ok(image) => Arc::new(image),
+            // What would fill the memory is no fault to be repaired.
+            Err(problem @ LoadProblem::TooLarge { .. }) => return Err(problem),
+            Err(problem) => {
+                notes.repair(&place, problem, "white stands in for it")?;
+                Arc::new(white())
+            }
+        };
+        if let Some(slot) = self.decoded.get_mut(index) {
+            *slot = Some(image.clone());
+        }
+        Ok(image)
+    }
+
+    fn read(&mut self, index: usize, used_by: &str, place: &str) -> Result<Image, LoadProblem> {
+        let document = self.buffers.document;
+        let source = element(&document.images, "images", index, || used_by.to_owned())?;
         let fetched;
         let bytes = match (&source.uri, source.buffer_view) {
             (Some(uri), _) => {
-                fetched = uri::fetch(uri, self.base, &place)?;
+                fetched = uri::fetch(uri, self.base, place)?;
                 &fetched
             }
             (None, Some(view)) => self.buffers.view(view, || format!("images[{index}].bufferView"))?.0,
             (None, None) => {
                 let problem = "has neither uri nor bufferView; export the file again".to_owned();
-                return Err(LoadProblem::Image { place, problem });
+                return Err(LoadProblem::Image { place: place.to_owned(), problem });
             }
         };
         let name = match (&source.name, &source.uri) {
@@ -108,12 +136,13 @@ impl Images<'_> {
             (None, Some(uri)) if !uri.starts_with("data:") => uri.clone(),
             _ => String::new(),
         };
-        let image = Arc::new(decode(bytes, name, &place, &self.limits, &mut self.budget)?);
-        if let Some(slot) = self.decoded.get_mut(index) {
-            *slot = Some(image.clone());
-        }
-        Ok(image)
+        decode(bytes, name, place, &self.limits, &mut self.budget)
     }
+}
+
+/// One white texel.
+pub(crate) fn white() -> Image {
+    Image { name: "white".into(), width: 1, height: 1, rgba: vec![255; 4] }
 }
 
 /// Decodes a PNG or JPEG, told apart by their first bytes.

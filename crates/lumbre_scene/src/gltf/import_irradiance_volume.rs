@@ -1,12 +1,10 @@
 //! LUMBRE_irradiance_volume: reads the 3D KTX2 image beside a baked file. Not the making of such volumes.
 
-use std::path::Path;
-
 use super::document::shortened;
 use super::error::LoadProblem;
 use super::extensions::IrradianceVolumeExtension;
 use super::limits::{Budget, LoadLimits};
-use super::uri;
+use super::uri::{self, Base};
 use crate::IrradianceVolume;
 use crate::lightmap_files::{Ktx2Error, Ktx2Header};
 
@@ -14,7 +12,7 @@ use crate::lightmap_files::{Ktx2Error, Ktx2Header};
 pub(crate) fn irradiance_volume(
     source: &IrradianceVolumeExtension,
     place: &str,
-    base: Option<&Path>,
+    base: Base<'_>,
     limits: &LoadLimits,
     budget: &mut Budget,
 ) -> Result<IrradianceVolume, LoadProblem> {

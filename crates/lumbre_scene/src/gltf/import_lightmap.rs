@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::io::Cursor;
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -12,7 +11,7 @@ use super::document::shortened;
 use super::error::LoadProblem;
 use super::extensions::LightmapExtension;
 use super::limits::{Budget, LoadLimits};
-use super::uri;
+use super::uri::{self, Base};
 use crate::lightmap_files::{Ktx2Error, Ktx2Header};
 use crate::{Lightmap, LightmapEncoding, LightmapImage};
 
@@ -31,7 +30,7 @@ impl Lightmaps {
         &mut self,
         source: &LightmapExtension,
         place: &str,
-        base: Option<&Path>,
+        base: Base<'_>,
         limits: &LoadLimits,
         budget: &mut Budget,
     ) -> Result<Lightmap, LoadProblem> {

@@ -8,10 +8,10 @@ use lumbre_optics::{AlphaMode, Distribution, Fresnel, Material, Surface};
 use super::document::{self, extension, shortened};
 use super::error::{LoadProblem, Notes};
 use super::extensions::{EmissiveStrength, PhongMaterial, PhongSurface};
-use super::import_image::Images;
+use super::import_image::{Images, white};
 use super::import_scene::unknown;
 use super::value::{color, number};
-use crate::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference};
+use crate::{MaterialTextures, MetallicRoughnessTexture, TextureReference};
 
 /// Reads one material. Textures that only other renderings use (normal, occlusion) are left out with a note.
 pub(crate) fn material(
@@ -61,8 +61,7 @@ pub(crate) fn material(
         && phong.is_none()
         && let Some(base_texture) = &textures.base_color
     {
-        let white = Image { name: "white".into(), width: 1, height: 1, rgba: vec![255; 4] };
-        let texture = TextureReference { image: Arc::new(white), ..base_texture.clone() };
+        let texture = TextureReference { image: Arc::new(white()), ..base_texture.clone() };
         textures.metallic_roughness =
             Some(MetallicRoughnessTexture { texture, base_color: base, metallic, roughness });
     }

@@ -62,21 +62,7 @@ pub(crate) fn triangle_mesh(
             notes.add(place, format!("the attribute {unused} is not used; ignored"));
         }
     }
-    let order = match primitive.indices {
-        Some(accessor) => buffers.indices(accessor, &used_by("indices"), vertices, budget)?,
-        None => {
-            let count = u32::try_from(vertices).map_err(|_| LoadProblem::TooLarge {
-                what: used_by("POSITION"),
-                needed: vertices as u64,
-                limit: u64::from(u32::MAX),
-            })?;
-            budget.charge(u64::from(count), 4, || used_by("indices"))?;
-            (0..count).collect()
-        }
-    };
-    if mode != TRIANGLES {
-        budget.charge(order.len() as u64, 12, || used_by("indices"))?;
-    }
+    let order = order(buffers, primitive, index, place, vertices, budget)?;
     if mode == TRIANGLES && order.len() % 3 != 0 {
         notes.add(used_by("indices"), "the last triangle is incomplete; left out");
     }
@@ -104,6 +90,46 @@ pub(crate) fn triangle_mesh(
         repair_normals(&mut mesh, place, notes);
     }
     Ok(Some(mesh))
+}
+
+/// The vertices of a primitive in the order in which it is drawn, as its mode reads them.
+fn order(
+    buffers: &Buffers<'_>,
+    primitive: &Primitive,
+    index: usize,
+    place: &str,
+    vertices: usize,
+    budget: &mut Budget,
+) -> Result<Vec<u32>, LoadProblem> {
+    let used_by = |attribute: &str| format!("{place}.primitives[{index}].{attribute}");
+    let order = match primitive.indices {
+        Some(accessor) => buffers.indices(accessor, &used_by("indices"), vertices, budget)?,
+        None => {
+            let count = u32::try_from(vertices).map_err(|_| LoadProblem::TooLarge {
+                what: used_by("POSITION"),
+                needed: vertices as u64,
+                limit: u64::from(u32::MAX),
+            })?;
+            budget.charge(u64::from(count), 4, || used_by("indices"))?;
+            (0..count).collect()
+        }
+    };
+    if primitive.mode.unwrap_or(TRIANGLES) != TRIANGLES {
+        budget.charge(order.len() as u64, 12, || used_by("indices"))?;
+    }
+    Ok(order)
+}
+
+/// The file's vertex at each corner of each triangle that [`triangle_mesh`] makes of a primitive of so many vertices.
+pub(crate) fn corners(
+    buffers: &Buffers<'_>,
+    primitive: &Primitive,
+    index: usize,
+    place: &str,
+    vertices: usize,
+) -> Result<Vec<u32>, LoadProblem> {
+    let order = order(buffers, primitive, index, place, vertices, &mut Budget::new(u64::MAX))?;
+    Ok(triangles(primitive.mode.unwrap_or(TRIANGLES), order))
 }
 
 /// The attributes of one primitive.

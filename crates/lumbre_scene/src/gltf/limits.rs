@@ -20,6 +20,16 @@ impl Default for LoadLimits {
     }
 }
 
+impl LoadLimits {
+    /// What may be decoded of a file of so many bytes with these buffers.
+    pub(crate) fn budget(&self, file_bytes: usize, contents: &[std::borrow::Cow<'_, [u8]>]) -> Budget {
+        let total = contents
+            .iter()
+            .fold(file_bytes as u64, |total, content| total.saturating_add(content.len() as u64));
+        Budget::new(self.decoded_bytes.unwrap_or_else(|| total.saturating_mul(64).saturating_add(64 << 20)))
+    }
+}
+
 /// What is left of a limit.
 pub(crate) struct Budget {
     used: u64,

@@ -4,10 +4,13 @@
 //! name whole or not at all.
 
 mod accessor;
+mod beside;
+mod compressed_views;
 mod container;
 mod document;
 mod error;
 mod export;
+mod export_baked;
 mod export_data;
 mod export_files;
 mod export_light;
@@ -24,23 +27,35 @@ mod import_lightmap;
 mod import_material;
 mod import_mesh;
 mod import_scene;
+mod lightmapped;
 mod limits;
+mod meshopt;
+mod options;
+mod patch;
 mod prepared;
+mod source;
+mod texture_sets;
 mod uri;
 mod value;
+mod vertex_data;
 
 pub use error::{LoadError, LoadProblem, Note};
 pub use export::{LightmapFile, SaveError, SaveOptions, SaveReport, save, save_with};
-pub use import::{LoadReport, load, load_slice, load_slice_within};
+pub use export_baked::save_baked;
+pub use import::{LoadReport, load, load_slice, load_slice_within, load_with};
 pub use limits::LoadLimits;
+pub use options::LoadOptions;
+pub use source::SourceFile;
 
 /// Extensions that a file may require.
 pub const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_meshopt_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
+    "LUMBRE_bake",
     "LUMBRE_camera",
     "LUMBRE_irradiance_volume",
     "LUMBRE_lightmap",

@@ -2,7 +2,7 @@
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use lumbre_mesh::TriangleMesh;
@@ -20,6 +20,7 @@ use super::import_image::Images;
 use super::import_irradiance_volume::irradiance_volume;
 use super::import_lightmap::Lightmaps;
 use super::limits::{Budget, LoadLimits};
+use super::uri::Base;
 use super::value::number;
 use super::{import_light, import_material, import_mesh, import_scene};
 use crate::{Camera, IrradianceVolume, Lightmap, MaterialTextures, Primitive, SceneSettings, Transform};
@@ -64,13 +65,17 @@ pub(crate) struct Prepared {
     pub node_count: usize,
     /// Files beside the glTF file.
     pub files: Vec<PathBuf>,
+    /// Lights of shown nodes whose strength is in candela or lux.
+    pub photometric_lights: usize,
+    /// Whether a shown camera says how its pictures are exposed.
+    pub states_exposure: bool,
 }
 
 /// Decodes a document.
 pub(crate) fn prepare(
     document: &Document,
     buffers: &Buffers<'_>,
-    base: Option<&Path>,
+    base: Base<'_>,
     limits: LoadLimits,
     mut budget: Budget,
     notes: &mut Notes,
@@ -106,6 +111,7 @@ pub(crate) fn prepare(
     let mut geometries = Geometries::new();
     let mut lightmaps = Lightmaps::default();
     let mut nodes = Vec::new();
+    let (mut photometric_lights, mut states_exposure) = (0, false);
     for index in order {
         let node = &document.nodes[index];
         let place = document.node_place(index);
@@ -120,15 +126,29 @@ pub(crate) fn prepare(
         let light = match extension::<LightReference>(&node.extensions, "KHR_lights_punctual", &place)? {
             Some(LightReference { light }) => {
                 let field = || format!("{place}.extensions.KHR_lights_punctual.light");
-                Some(element(&lights, "lights", light, field)?.clone())
+                match element(&lights, "lights", light, field) {
+                    Ok(found) => {
+                        photometric_lights += usize::from(document.photometric.get(light) == Some(&true));
+                        Some(found.clone())
+                    }
+                    Err(problem) => {
+                        notes.repair(&place, problem, "it has no light")?;
+                        None
+                    }
+                }
             }
             None => None,
         };
         let lens =
             extension::<CameraExtension>(&node.extensions, "LUMBRE_camera", &place)?.unwrap_or_default();
         let camera = match node.camera {
+            Some(camera) if camera >= document.cameras.len() => {
+                let found = element(&document.cameras, "cameras", camera, || format!("{place}.camera"));
+                found.map_or_else(|problem| notes.repair(&place, problem, "it has no camera"), |_| Ok(()))?;
+                None
+            }
             Some(camera) => {
-                element(&document.cameras, "cameras", camera, || format!("{place}.camera"))?;
+                states_exposure |= lens.exposure.is_some();
                 let exposure = number(lens.exposure, 1.0);
                 if !(exposure.is_finite() && exposure > 0.0) {
                     return Err(LoadProblem::Value {
@@ -179,7 +199,7 @@ pub(crate) fn prepare(
             mesh: node.mesh,
             light,
             camera,
-            active_camera: node.camera.is_some() && lens.active,
+            active_camera: camera.is_some() && lens.active,
             shading,
             reflection,
             lightmap,
@@ -190,7 +210,8 @@ pub(crate) fn prepare(
             extras: node.extras.clone(),
         });
     }
-    Ok(Prepared { nodes, meshes, settings, node_count: document.nodes.len(), files: Vec::new() })
+    let (node_count, files) = (document.nodes.len(), Vec::new());
+    Ok(Prepared { nodes, meshes, settings, node_count, files, photometric_lights, states_exposure })
 }
 
 /// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.
@@ -279,8 +300,13 @@ fn dynamic_nodes(
     for (index, animation) in document.animations.iter().enumerate() {
         notes.add(format!("animations[{index}]"), "animations are not played; their nodes count as dynamic");
         for node in animation.channels.iter().filter_map(|channel| channel.target.node) {
-            element(&document.nodes, "nodes", node, || format!("animations[{index}].channels"))?;
-            dynamic.insert(node);
+            let place = format!("animations[{index}].channels");
+            match element(&document.nodes, "nodes", node, || place.clone()) {
+                Ok(_) => {
+                    dynamic.insert(node);
+                }
+                Err(problem) => notes.repair(&place, problem, "it moves nothing")?,
+            }
         }
     }
     for &index in order {
@@ -288,8 +314,14 @@ fn dynamic_nodes(
         let object =
             extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &document.node_place(index))?;
         let inherited = parents[index].is_some_and(|parent| dynamic.contains(&parent));
-        if inherited || object.is_some_and(|object| object.dynamic) {
+        let own = object.and_then(|object| object.dynamic);
+        if inherited || own == Some(true) {
             dynamic.insert(index);
+        } else if node.skin.is_some() && node.mesh.is_some() && own.is_none() && dynamic.insert(index) {
+            notes.add(
+                document.node_place(index),
+                "moves with its skeleton, so that it is not baked; \"LUMBRE_object\": {\"dynamic\": false} bakes it as it was modelled",
+            );
         }
     }
     Ok(dynamic)

@@ -5,8 +5,56 @@ use std::path::{Path, PathBuf};
 use super::document::shortened;
 use super::error::LoadProblem;
 
-/// The bytes that a URI stands for: inline, or a file below `base`.
-pub(crate) fn fetch(uri: &str, base: Option<&Path>, place: &str) -> Result<Vec<u8>, LoadProblem> {
+/// Where the files are that URIs name.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Base<'a> {
+    /// The folder of the glTF file.
+    pub folder: Option<&'a Path>,
+    /// A folder around it that URIs may lead to.
+    pub root: Option<&'a Path>,
+}
+
+impl Base<'_> {
+    /// The file that a URI names.
+    pub(crate) fn file(self, uri: &str, place: &str) -> Result<PathBuf, LoadProblem> {
+        let refused = |problem: &str| LoadProblem::Uri {
+            place: place.to_owned(),
+            uri: shortened(uri).to_owned(),
+            problem: problem.to_owned(),
+        };
+        match (relative(uri), self.folder, self.root) {
+            (Ok(path), Some(folder), _) => Ok(folder.join(path)),
+            (Ok(_), None, _) => Err(refused(
+                "names a file, but the glTF came without a folder; load it by path, or embed the data",
+            )),
+            (Err(LEADS_OUT), Some(folder), Some(root)) => below(uri, folder, root).map_err(refused),
+            (Err(problem), ..) => Err(refused(problem)),
+        }
+    }
+}
+
+/// Why a URI with too many `..` is not followed.
+const LEADS_OUT: &str = "leads out of the folder of the glTF file; put the file beside it, or name a folder that holds both as the root \
+                         (--root DIR, LoadOptions::root)";
+
+/// The file that a URI names that leads out of its folder, if it lies below a root. Links are followed before that is decided.
+fn below(uri: &str, folder: &Path, root: &Path) -> Result<PathBuf, &'static str> {
+    let decoded = percent_decoded(uri).and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
+    let relative: PathBuf = decoded.split(['/', '\\']).filter(|part| !part.contains(':')).collect();
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let real = std::fs::canonicalize(folder.join(relative));
+    match (real, std::fs::canonicalize(root)) {
+        (Ok(file), Ok(root)) if file.starts_with(&root) => Ok(file),
+        (Ok(_), Ok(_)) => {
+            Err("leads out of the root that is allowed; name a folder that holds it with --root DIR")
+        }
+        (Err(_), _) => Err("names a file that does not exist or cannot be reached"),
+        (_, Err(_)) => Err("cannot be followed, as the root does not exist; name another with --root DIR"),
+    }
+}
+
+/// The bytes that a URI stands for: inline, or a file.
+pub(crate) fn fetch(uri: &str, base: Base<'_>, place: &str) -> Result<Vec<u8>, LoadProblem> {
     let refused = |problem: &str| LoadProblem::Uri {
         place: place.to_owned(),
         uri: shortened(uri).to_owned(),
@@ -24,13 +72,7 @@ pub(crate) fn fetch(uri: &str, base: Option<&Path>, place: &str) -> Result<Vec<u
                 .ok_or_else(|| refused("has a broken percent escape; export the file again"))
         };
     }
-    let path = relative(uri).map_err(refused)?;
-    let Some(base) = base else {
-        return Err(refused(
-            "names a file, but the glTF came without a folder; load it by path, or embed the data",
-        ));
-    };
-    read(&base.join(path))
+    read(&base.file(uri, place)?)
 }
 
 /// A whole file, if it is an ordinary one.
@@ -46,7 +88,6 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadProblem> {
 
 /// The relative path that a URI reference names; the reason if it must not be followed.
 pub(crate) fn relative(uri: &str) -> Result<PathBuf, &'static str> {
-    let escape = "leaves the folder of the glTF file; put the file beside it and name it relatively";
     let scheme = uri.split(['/', '?', '#']).next().is_some_and(|start| start.contains(':'));
     if scheme {
         return Err(
@@ -66,9 +107,9 @@ pub(crate) fn relative(uri: &str) -> Result<PathBuf, &'static str> {
     for part in decoded.split(['/', '\\']) {
         match part {
             "" | "." => {}
-            ".." => return Err(escape),
+            ".." => return Err(LEADS_OUT),
             // `C:` would start anew on Windows.
-            part if part.contains(':') => return Err(escape),
+            part if part.contains(':') => return Err(LEADS_OUT),
             part => path.push(part),
         }
     }
@@ -104,6 +145,12 @@ pub(crate) fn percent_encoded(name: &str) -> String {
         }
         encoded
     })
+}
+
+/// A relative path as a URI reference: its parts as [`percent_encoded`] has them.
+pub(crate) fn percent_encoded_path(path: &Path) -> String {
+    let parts = path.iter().map(|part| percent_encoded(&part.to_string_lossy()));
+    parts.collect::<Vec<_>>().join("/")
 }
 
 /// RFC 4648 base64, with or without padding.
@@ -182,9 +229,43 @@ mod tests {
 
     #[test]
     fn data_uris() {
-        assert_eq!(fetch("data:application/octet-stream;base64,Zm9v", None, "x").unwrap(), b"foo");
-        assert_eq!(fetch("data:,a%20b", None, "x").unwrap(), b"a b");
-        assert!(fetch("data:;base64", None, "x").is_err());
-        assert!(fetch("x.bin", None, "x").is_err());
+        assert_eq!(fetch("data:application/octet-stream;base64,Zm9v", Base::default(), "x").unwrap(), b"foo");
+        assert_eq!(fetch("data:,a%20b", Base::default(), "x").unwrap(), b"a b");
+        assert!(fetch("data:;base64", Base::default(), "x").is_err());
+        assert!(fetch("x.bin", Base::default(), "x").is_err());
+    }
+
+    #[test]
+    fn a_root_lets_files_around_be_named() {
+        let place = tempfile::tempdir().unwrap();
+        let (level, textures) =
+            (place.path().join("project/levels"), place.path().join("project/my textures"));
+        for folder in [&level, &textures] {
+            std::fs::create_dir_all(folder).unwrap();
+        }
+        std::fs::write(textures.join("wall.png"), "wall").unwrap();
+        std::fs::write(place.path().join("secret"), "secret").unwrap();
+        let uri = "../my%20textures/wall.png";
+        let (project, root) = (place.path().join("project"), place.path());
+        let missing = project.join("no such folder");
+        let allowed = |root| Base { folder: Some(&level), root: Some(root) };
+        assert_eq!(fetch(uri, allowed(&project), "x").unwrap(), b"wall");
+        assert_eq!(fetch("../../secret", allowed(root), "x").unwrap(), b"secret");
+        for (uri, base, said) in [
+            (uri, Base { folder: Some(&level), root: None }, "--root"),
+            ("../../secret", allowed(&project), "out of the root"),
+            ("../levels/../../secret", allowed(&project), "out of the root"),
+            ("../nothing", allowed(&project), "does not exist"),
+            (uri, allowed(&missing), "root does not exist"),
+            ("/etc/passwd", allowed(Path::new("/")), "absolute"),
+        ] {
+            let error = fetch(uri, base, "x").unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(place.path(), project.join("link")).unwrap();
+            assert!(fetch("../link/secret", allowed(&project), "x").is_err());
+        }
     }
 }

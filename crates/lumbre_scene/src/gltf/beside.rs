@@ -1,0 +1,144 @@
+//! Files that a glTF file names: copied beside an output that lies in another folder. Not their content.
+
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::error::Notes;
+use super::export::SaveError;
+use super::export_files::Files;
+use super::uri::{self, Base};
+use super::{container, document, patch};
+
+/// What was copied, by the URIs that name it now.
+#[derive(Default)]
+pub(crate) struct Copied {
+    pub uris: Vec<String>,
+    pub notes: Notes,
+}
+
+/// Copies the files that a file's JSON names from one folder to that of the output, and lets the JSON name them there.
+///
+/// Of the same name only a file is replaced that is the same or that an earlier bake copied there; otherwise the copy gets a name of
+/// its own. Nothing is done if both folders are one.
+pub(crate) fn copy(
+    root: &mut Value,
+    base: Base<'_>,
+    output: &Path,
+    files: &mut Files,
+) -> Result<Copied, SaveError> {
+    let beside = output.parent().unwrap_or(Path::new(""));
+    let mut copies =
+        Copies { base, output, beside, files, former: former(output), copied: Copied::default() };
+    let real =
+        |folder: &Path| fs::canonicalize(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    match (real(base.folder.unwrap_or(Path::new(""))), real(beside)) {
+        (Ok(from), Ok(to)) if from == to => {}
+        _ => copies.walk(root)?,
+    }
+    Ok(copies.copied)
+}
+
+/// What the bake copied that wrote the output which is there, if one did.
+fn former(output: &Path) -> HashSet<String> {
+    let read = || {
+        let bytes = uri::read(output).ok()?;
+        let container = container::split(&bytes, &mut Notes::default()).ok()?;
+        Some(patch::copied(&document::parse(container.json).ok()?))
+    };
+    read().unwrap_or_default().into_iter().collect()
+}
+
+struct Copies<'a> {
+    base: Base<'a>,
+    output: &'a Path,
+    beside: &'a Path,
+    files: &'a mut Files,
+    former: HashSet<String>,
+    copied: Copied,
+}
+
+impl Copies<'_> {
+    fn walk(&mut self, value: &mut Value) -> Result<(), SaveError> {
+        match value {
+            Value::Object(object) => {
+                for (key, member) in
+                    object.iter_mut().filter(|(key, _)| *key != "extras" && *key != patch::EXTENSION)
+                {
+                    match member {
+                        Value::String(text) if key == "uri" && !text.starts_with("data:") => {
+                            *text = self.copy(text)?;
+                        }
+                        _ => self.walk(member)?,
+                    }
+                }
+                Ok(())
+            }
+            Value::Array(list) => list.iter_mut().try_for_each(|element| self.walk(element)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Copies what a URI names; the URI of the copy.
+    fn copy(&mut self, named: &str) -> Result<String, SaveError> {
+        let Ok(file) = self.base.file(named, "") else {
+            let place = format!("the URI {:?}", document::shortened(named));
+            self.copied.notes.add(place, "is not of a file that may be read; kept as it is");
+            return Ok(named.to_owned());
+        };
+        // A copy of what lies outside of the folder lies in it.
+        let (relative, own) = match uri::relative(named) {
+            Ok(relative) => (relative, named.to_owned()),
+            Err(_) => {
+                let name = PathBuf::from(file.file_name().unwrap_or_default());
+                let own = uri::percent_encoded_path(&name);
+                (name, own)
+            }
+        };
+        let Ok(bytes) = uri::read(&file) else {
+            self.copied
+                .notes
+                .add(relative.display().to_string(), "cannot be read; not copied beside the output");
+            return Ok(named.to_owned());
+        };
+        let own = std::iter::once((relative.clone(), own));
+        for (path, named) in own.chain(self.other_names(&relative)) {
+            let target = self.beside.join(&path);
+            let present = fs::read(&target).ok();
+            let same = present.as_ref() == Some(&bytes);
+            if !same && target.exists() && !self.former.contains(&named) && !self.copied.uris.contains(&named)
+            {
+                continue;
+            }
+            if !same {
+                if let Some(folder) = target.parent() {
+                    fs::create_dir_all(folder)
+                        .map_err(|source| SaveError::Write { path: folder.to_owned(), source })?;
+                }
+                if !self.copied.uris.contains(&named) {
+                    self.files.write(&target, &bytes)?;
+                }
+            }
+            if (!same || self.former.contains(&named)) && !self.copied.uris.contains(&named) {
+                self.copied.uris.push(named.clone());
+            }
+            return Ok(named);
+        }
+        Ok(named.to_owned())
+    }
+
+    /// Names that a copy may get where its own is taken.
+    fn other_names(&self, relative: &Path) -> impl Iterator<Item = (PathBuf, String)> + use<> {
+        let stem = self.output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = relative.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let relative = relative.to_owned();
+        (1..1000).map(move |number| {
+            let name = if number == 1 { format!("{stem}.{name}") } else { format!("{stem}.{number}.{name}") };
+            let path = relative.with_file_name(name);
+            let uri = uri::percent_encoded_path(&path);
+            (path, uri)
+        })
+    }
+}

@@ -1,0 +1,82 @@
+//! Buffer views that EXT_meshopt_compression stands in for: found, bounded, decoded. Not the codec.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use super::document::{Document, element, extension, shortened};
+use super::error::LoadProblem;
+use super::extensions::{MeshoptBuffer, MeshoptView};
+use super::limits::Budget;
+use super::meshopt::{self, Filter, Mode};
+
+const EXTENSION: &str = "EXT_meshopt_compression";
+
+/// The decoded bytes of buffer views, by their index.
+pub(crate) type DecodedViews = HashMap<usize, Vec<u8>>;
+
+/// Whether a buffer only says how long the decoded views would be.
+pub(crate) fn is_fallback(document: &Document, buffer: usize) -> Result<bool, LoadProblem> {
+    let Some(own) = document.buffers.get(buffer) else { return Ok(false) };
+    let found = extension::<MeshoptBuffer>(&own.extensions, EXTENSION, &format!("buffers[{buffer}]"))?;
+    Ok(own.uri.is_none() && found.is_some_and(|found| found.fallback))
+}
+
+/// Decodes every compressed view of a file.
+pub(crate) fn decode(
+    document: &Document,
+    contents: &[Cow<'_, [u8]>],
+    budget: &mut Budget,
+) -> Result<DecodedViews, LoadProblem> {
+    let mut decoded = DecodedViews::new();
+    for (index, view) in document.buffer_views.iter().enumerate() {
+        let place = format!("bufferViews[{index}]");
+        let Some(source) = extension::<MeshoptView>(&view.extensions, EXTENSION, &place)? else { continue };
+        let refused = |field: &str, value: String, expected: &str| LoadProblem::Value {
+            place: place.clone(),
+            field: format!("{EXTENSION}.{field}"),
+            value,
+            expected: expected.to_owned(),
+        };
+        let mode = match source.mode.as_str() {
+            "ATTRIBUTES" => Mode::Attributes,
+            "TRIANGLES" => Mode::Triangles,
+            "INDICES" => Mode::Indices,
+            other => {
+                let value = format!("{:?}", shortened(other));
+                return Err(refused("mode", value, "use ATTRIBUTES, TRIANGLES or INDICES"));
+            }
+        };
+        let filter = match source.filter.as_deref() {
+            None | Some("NONE") => Filter::None,
+            Some("OCTAHEDRAL") => Filter::Octahedral,
+            Some("QUATERNION") => Filter::Quaternion,
+            Some("EXPONENTIAL") => Filter::Exponential,
+            Some(other) => {
+                let value = format!("{:?}", shortened(other));
+                return Err(refused("filter", value, "use NONE, OCTAHEDRAL, QUATERNION or EXPONENTIAL"));
+            }
+        };
+        let length = source.count.checked_mul(source.byte_stride);
+        if length != Some(view.byte_length) {
+            let value = format!("{} elements of {} bytes", source.count, source.byte_stride);
+            return Err(refused("count", value, "they have to fill the buffer view; export the file again"));
+        }
+        budget.charge(view.byte_length, 1, || place.clone())?;
+        let field = || format!("{place}.{EXTENSION}.buffer");
+        let buffer = element(contents, "buffers", source.buffer, field)?;
+        let end = source.byte_offset.checked_add(source.byte_length);
+        let range =
+            end.and_then(|end| Some(usize::try_from(source.byte_offset).ok()?..usize::try_from(end).ok()?));
+        let bytes = range.and_then(|range| buffer.get(range)).ok_or_else(|| LoadProblem::BufferView {
+            view: index,
+            offset: source.byte_offset,
+            end: end.unwrap_or(u64::MAX),
+            buffer: source.buffer,
+            length: buffer.len() as u64,
+        })?;
+        let made = meshopt::decode(mode, filter, source.count as usize, source.byte_stride as usize, bytes);
+        let made = made.map_err(|problem| LoadProblem::Compressed { place: place.clone(), problem })?;
+        decoded.insert(index, made);
+    }
+    Ok(decoded)
+}

@@ -1,0 +1,122 @@
+//! A glTF file kept as it was read, so that it can be written again with light. Not what is in it.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use bevy_ecs::prelude::*;
+use serde_json::{Map, Value};
+
+use super::accessor::Buffers;
+use super::compressed_views::DecodedViews;
+use super::document::{self, Document};
+use super::error::{LoadError, LoadProblem, Notes};
+use super::import::{LoadReport, check_extensions, contents, decode, spawn};
+use super::options::LoadOptions;
+use super::patch::{Former, take_back};
+use super::uri::{self, Base};
+use super::{compressed_views, container};
+
+/// A glTF file as its artist made it: the JSON, the buffers and chunks of others, untouched. What an earlier bake added to the file is
+/// taken back when it is read.
+#[derive(Debug)]
+pub struct SourceFile {
+    pub(crate) root: Map<String, Value>,
+    pub(crate) document: Document,
+    /// The bytes of every buffer.
+    pub(crate) contents: Vec<Vec<u8>>,
+    /// Buffer views that were compressed.
+    decoded: DecodedViews,
+    /// Type and bytes of chunks that glTF does not know.
+    pub(crate) chunks: Vec<(u32, Vec<u8>)>,
+    /// The folder that it lies in.
+    pub(crate) folder: PathBuf,
+    /// The entity of each node, once it is loaded.
+    pub(crate) nodes: Vec<Entity>,
+    name: String,
+    file_bytes: u64,
+    notes: Notes,
+    options: LoadOptions,
+}
+
+impl SourceFile {
+    /// Reads a .glb, or a .gltf with its buffers.
+    ///
+    /// # Errors
+    /// [`LoadError`] with the place and the remedy.
+    pub fn read(path: &Path, options: &LoadOptions) -> Result<Self, LoadError> {
+        let name = path.display().to_string();
+        Self::read_named(path, &name, options)
+            .map_err(|problem| LoadError { file: name, problem: problem.into() })
+    }
+
+    fn read_named(path: &Path, name: &str, options: &LoadOptions) -> Result<Self, LoadProblem> {
+        let bytes = uri::read(path)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let mut notes = Notes { lenient: options.lenient, ..Notes::default() };
+        let container = container::split(&bytes, &mut notes)?;
+        let mut root = document::parse(container.json)?;
+        match take_back(&mut root) {
+            Former::None => {}
+            Former::TakenBack => notes.add("LUMBRE_bake", "was baked before; begins as it was then"),
+            Former::Changed => notes.add(
+                "LUMBRE_bake",
+                "was changed by another program after a bake; what that bake added is taken for the artist's",
+            ),
+        }
+        let document = Document::from_root(root.clone(), &mut notes)?;
+        check_extensions(&document)?;
+        let contents = contents(
+            &document,
+            container.binary,
+            Base { folder: Some(&folder), root: options.root.as_deref() },
+            &mut notes,
+        )?;
+        let decoded = compressed_views::decode(
+            &document,
+            &contents,
+            &mut options.limits.budget(bytes.len(), &contents),
+        )?;
+        let contents = contents.into_iter().map(Cow::into_owned).collect();
+        let chunks = container.others.into_iter().map(|(kind, bytes)| (kind, bytes.to_vec())).collect();
+        let (name, file_bytes) = (name.to_owned(), bytes.len() as u64);
+        let (nodes, options) = (Vec::new(), options.clone());
+        Ok(Self {
+            root,
+            document,
+            contents,
+            chunks,
+            decoded,
+            folder,
+            nodes,
+            name,
+            file_bytes,
+            notes,
+            options,
+        })
+    }
+
+    /// Loads it into a World, as [`load`](super::load()) does. [`save_baked`](super::save_baked) then knows its entities.
+    ///
+    /// # Errors
+    /// [`LoadError`] with the place and the remedy; the World is then unchanged.
+    pub fn load_into(&mut self, world: &mut World) -> Result<LoadReport, LoadError> {
+        let mut notes = std::mem::take(&mut self.notes);
+        let limits = self.options.limits;
+        let prepared = decode(&self.buffers(), self.file_bytes, self.base(), limits, &mut notes)
+            .map_err(|problem| LoadError { file: self.name.clone(), problem: problem.into() })?;
+        let report = spawn(world, prepared, notes);
+        self.nodes.clone_from(&report.nodes);
+        Ok(report)
+    }
+
+    /// Where its files are.
+    pub(crate) fn base(&self) -> Base<'_> {
+        Base { folder: Some(&self.folder), root: self.options.root.as_deref() }
+    }
+
+    /// The buffers, to be read through the document.
+    pub(crate) fn buffers(&self) -> Buffers<'_> {
+        let bytes = self.contents.iter().map(|content| Cow::Borrowed(content.as_slice())).collect();
+        Buffers { document: &self.document, bytes, decoded: Cow::Borrowed(&self.decoded) }
+    }
+}

@@ -1,0 +1,193 @@
+//! Vertices of a file chosen anew: accessors of any type copied element by element, bit for bit. Not which vertices are chosen.
+
+use std::collections::HashMap;
+
+use serde_json::{Value, json};
+
+use super::accessor::{Buffers, Format};
+use super::error::LoadProblem;
+use super::patch::{Patch, place};
+
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+const UNSIGNED_BYTE: u64 = 5121;
+const UNSIGNED_SHORT: u64 = 5123;
+const UNSIGNED_INT: u64 = 5125;
+
+/// Bytes that a file's last buffer gets, and the views into them.
+pub(crate) struct NewData {
+    /// The buffer.
+    pub buffer: usize,
+    /// Bytes that it has already; a multiple of four.
+    pub start: usize,
+    pub bytes: Vec<u8>,
+}
+
+/// The vertices of a primitive that takes the place of another.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Vertices {
+    /// The old vertex of every new one.
+    pub sources: Vec<u32>,
+    /// Whether every old vertex is among them.
+    pub complete: bool,
+}
+
+impl NewData {
+    fn view(&mut self, patch: &mut Patch, bytes: &[u8], target: Option<u32>, stride: Option<usize>) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let offset = self.start + self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        let mut view = json!({"buffer": self.buffer, "byteOffset": offset, "byteLength": bytes.len()});
+        if let Some(stride) = stride {
+            view["byteStride"] = stride.into();
+        }
+        if let Some(target) = target {
+            view["target"] = target.into();
+        }
+        patch.push("bufferViews", view)
+    }
+
+    /// Texture coordinates.
+    pub(crate) fn coordinates(&mut self, patch: &mut Patch, values: &[[f32; 2]]) -> usize {
+        let bytes: Vec<u8> = values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        let view = self.view(patch, &bytes, Some(ARRAY_BUFFER), None);
+        let accessor =
+            json!({"bufferView": view, "componentType": 5126, "count": values.len(), "type": "VEC2"});
+        patch.push("accessors", accessor)
+    }
+
+    /// Indices of at most `vertices` vertices, in the component type of the accessor that they replace where that is wide enough.
+    pub(crate) fn indices(
+        &mut self,
+        patch: &mut Patch,
+        values: &[u32],
+        vertices: usize,
+        replaced: Option<usize>,
+    ) -> usize {
+        let former = replaced.and_then(|accessor| patch.get(&place!["accessors", accessor])).cloned();
+        let least = former.as_ref().and_then(|former| former["componentType"].as_u64());
+        // The largest number of a type restarts primitives, and is not a vertex.
+        let component = index_component(least.unwrap_or(UNSIGNED_SHORT), vertices);
+        let bytes = index_bytes(values, component);
+        let view = self.view(patch, &bytes, Some(ELEMENT_ARRAY_BUFFER), None);
+        let mut accessor = former.unwrap_or_else(|| json!({}));
+        if let Value::Object(object) = &mut accessor {
+            for stale in ["byteOffset", "sparse", "min", "max"] {
+                object.shift_remove(stale);
+            }
+        }
+        accessor["bufferView"] = view.into();
+        accessor["componentType"] = component.into();
+        accessor["count"] = values.len().into();
+        accessor["type"] = "SCALAR".into();
+        patch.push("accessors", accessor)
+    }
+
+    /// An attribute's values for other vertices, in the same format: normalized, quantized or sparse as they are.
+    ///
+    /// # Errors
+    /// [`LoadProblem`] where the accessor does not describe `vertices` values that exist.
+    pub(crate) fn attribute(
+        &mut self,
+        patch: &mut Patch,
+        buffers: &Buffers<'_>,
+        accessor: usize,
+        used_by: &str,
+        vertices: usize,
+        chosen: &Vertices,
+    ) -> Result<usize, LoadProblem> {
+        let raw = buffers.raw(accessor, used_by)?;
+        if raw.count != vertices {
+            return Err(LoadProblem::Accessor {
+                accessor,
+                used_by: used_by.to_owned(),
+                problem: format!("has {} elements, but POSITION has {vertices}", raw.count),
+            });
+        }
+        let mut written = patch.get(&place!["accessors", accessor]).cloned().unwrap_or_default();
+        let size = raw.format.size();
+        let zero = vec![0; size];
+        let replacements: HashMap<u32, &[u8]> = raw.sparse.iter().copied().collect();
+        if !chosen.complete {
+            let elements = chosen.sources.iter().map(|source| {
+                let replaced = replacements.get(source).copied();
+                replaced.or_else(|| raw.base(*source as usize)).unwrap_or(&zero)
+            });
+            state_range(&mut written, raw.format, elements);
+        }
+        let Value::Object(object) = &mut written else { return Ok(accessor) };
+        object.shift_remove("byteOffset");
+        object.insert("count".to_owned(), chosen.sources.len().into());
+        if raw.base(0).is_some() {
+            let stride = size.next_multiple_of(4);
+            let mut bytes = Vec::with_capacity(stride * chosen.sources.len());
+            for source in &chosen.sources {
+                bytes.extend_from_slice(raw.base(*source as usize).unwrap_or(&zero));
+                bytes.resize(bytes.len().next_multiple_of(stride), 0);
+            }
+            let view = self.view(patch, &bytes, Some(ARRAY_BUFFER), (stride != size).then_some(stride));
+            object.insert("bufferView".to_owned(), view.into());
+        }
+        let sparse: Vec<(u32, &[u8])> = (0u32..)
+            .zip(&chosen.sources)
+            .filter_map(|(new, source)| Some((new, *replacements.get(source)?)))
+            .collect();
+        let former = object.shift_remove("sparse");
+        if let Some(mut former) = former.filter(|_| !sparse.is_empty()) {
+            let least = former["indices"]["componentType"].as_u64().unwrap_or(UNSIGNED_SHORT);
+            let component = index_component(least, chosen.sources.len());
+            let indices: Vec<u32> = sparse.iter().map(|(index, _)| *index).collect();
+            let values: Vec<u8> = sparse.iter().flat_map(|(_, value)| value.iter().copied()).collect();
+            let at = self.view(patch, &index_bytes(&indices, component), None, None);
+            let of = self.view(patch, &values, None, None);
+            former["count"] = sparse.len().into();
+            former["indices"] = json!({"bufferView": at, "componentType": component});
+            former["values"] = json!({"bufferView": of});
+            object.insert("sparse".to_owned(), former);
+        }
+        Ok(patch.push("accessors", written))
+    }
+}
+
+/// The narrowest type from `least` on that holds the numbers of so many vertices.
+fn index_component(least: u64, vertices: usize) -> u64 {
+    let fits = |component: u64| match component {
+        UNSIGNED_BYTE => vertices <= usize::from(u8::MAX),
+        UNSIGNED_SHORT => vertices <= usize::from(u16::MAX),
+        _ => true,
+    };
+    [UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT]
+        .into_iter()
+        .find(|&component| component >= least && fits(component))
+        .unwrap_or(UNSIGNED_INT)
+}
+
+fn index_bytes(values: &[u32], component: u64) -> Vec<u8> {
+    let size = match component {
+        UNSIGNED_BYTE => 1,
+        UNSIGNED_SHORT => 2,
+        _ => 4,
+    };
+    values.iter().flat_map(|value| value.to_le_bytes().into_iter().take(size)).collect()
+}
+
+/// `min` and `max` of the elements, where the accessor states them.
+fn state_range<'a>(accessor: &mut Value, format: Format, elements: impl Iterator<Item = &'a [u8]>) {
+    let stated: Vec<&str> = ["min", "max"].into_iter().filter(|key| accessor.get(key).is_some()).collect();
+    if stated.is_empty() {
+        return;
+    }
+    let mut range: Vec<[f64; 2]> = Vec::new();
+    for element in elements {
+        for (at, value) in format.raw(element).enumerate() {
+            match range.get_mut(at) {
+                Some([least, most]) => (*least, *most) = (least.min(value), most.max(value)),
+                None => range.push([value; 2]),
+            }
+        }
+    }
+    for key in stated {
+        let end = usize::from(key == "max");
+        accessor[key] = range.iter().map(|ends| Value::from(ends[end])).collect();
+    }
+}
