@@ -8,7 +8,7 @@ use lumbre_scene::SceneSettings;
 
 use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects};
 use crate::layout::InstanceData;
-use crate::light_lists::LightLists;
+use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::MeshKey;
 use crate::pipelines::PipelineKey;
 use crate::shader::Feature;
@@ -35,6 +35,8 @@ pub(crate) struct Draws {
     pub instances: Vec<InstanceData>,
     /// Objects outside the view.
     pub outside: usize,
+    /// From the nearest to the farthest point of what is lit by clusters, along the line of sight, in metres.
+    pub clustered_depths: Option<[f64; 2]>,
 }
 
 struct Visible<'a> {
@@ -53,7 +55,7 @@ impl Draws {
         settings: &SceneSettings,
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
-        lights: &mut LightLists,
+        lights: &mut ObjectLightLists,
     ) -> Self {
         let mut draws = Self::default();
         let planes = view.frustum(objects.origin);
@@ -78,6 +80,12 @@ impl Draws {
                 blend: pass == LitPass::Transparent,
                 texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
             };
+            if pipeline.variant.has(Feature::Clusters) {
+                let depth = (view.eye - object.center).dot(view.basis.z_axis);
+                let [near, far] = draws.clustered_depths.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+                draws.clustered_depths =
+                    Some([near.min(depth - object.radius), far.max(depth + object.radius)]);
+            }
             visible.push(Visible { pass, slot, distance: distance(object, view.eye), object, pipeline });
         }
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
@@ -93,10 +101,15 @@ impl Draws {
     }
 
     /// Adds an instance, to the last batch if it fits.
-    fn push(&mut self, seen: &Visible, lights: &mut LightLists) {
+    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
         let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
-        let list = lights.reaching(seen.object.entity, seen.object.center, seen.object.half_size);
+        let list = lights.reaching(
+            seen.object.entity,
+            seen.object.center,
+            seen.object.half_size,
+            seen.pipeline.variant.has(Feature::Clusters),
+        );
         self.instances.push(InstanceData { object, ..list });
         let batches = match seen.pass {
             LitPass::Lightmap => &mut self.lightmapped,

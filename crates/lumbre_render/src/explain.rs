@@ -40,7 +40,7 @@ pub fn explain(
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let mut lights = LightSet::of(world)?;
     if !options.lightmaps {
-        lights.dynamic = lights.all;
+        lights = lights.without_lightmaps();
     }
     let features = FrameFeatures {
         shading: options.shading,
@@ -50,6 +50,7 @@ pub fn explain(
         clamp: options.display == Display::Clamp,
         half: !options.full_precision,
         lights,
+        clustered: lights.are_clustered(options.light_lists),
     };
     let mut query = world.query_filtered::<(
         &Mesh,

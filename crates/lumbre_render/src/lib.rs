@@ -30,6 +30,7 @@
 //! # Ok::<(), lumbre_render::RenderError>(())
 //! ```
 
+mod cluster_buffers;
 mod display;
 mod draws;
 mod error;
@@ -40,6 +41,7 @@ mod frame_report;
 mod gpu;
 mod growable_buffer;
 mod layout;
+mod light_clusters;
 mod light_lists;
 mod mesh_buffers;
 mod offscreen;
@@ -57,7 +59,7 @@ pub use explain::{SceneExplanation, explain};
 pub use frame_report::{FrameReport, Statistics};
 pub use gpu::Gpu;
 pub use offscreen::{Offscreen, OffscreenFormat};
-pub use options::{Display, FrameOptions, Measure};
+pub use options::{Display, FrameOptions, LightLists, Measure};
 pub use renderer::Renderer;
 pub use target::FrameTarget;
 pub use window_surface::{Acquired, SurfaceFrame, WindowSurface};

@@ -2,23 +2,24 @@
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_optics::{BakeMode, Light, LightKind};
+use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, SpotCone};
 use lumbre_scene::{GlobalTransform, Name};
 
 use super::emitters::{EmissivePolygon, Emitters};
-use crate::RenderError;
 use crate::growable_buffer::GrowableBuffer;
-use crate::layout::LightData;
+use crate::layout::{InverseSquareLightData, LightData};
+use crate::{LightLists, RenderError};
 
-/// What the shaders need to know of a frame's lights.
+/// From so many lights with a range on they are listed by clusters.
+const CLUSTERED_LIGHTS: u32 = 4;
+
+/// Lights of one class, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct LightSet {
+pub(crate) struct LightCounts {
     /// Lights that are shaded in full.
     pub dynamic: u32,
     /// These and the lights that are baked into the lightmaps.
     pub all: u32,
-    /// Sum of the ambient lights.
-    pub ambient: Vec3,
     /// Whether a baked light has an ambient colour.
     pub static_ambient: bool,
     pub directional: bool,
@@ -26,6 +27,70 @@ pub(crate) struct LightSet {
     pub spot: bool,
     /// Whether faces of emissive objects shine.
     pub polygon: bool,
+}
+
+/// What the shaders need to know of a frame's lights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LightSet {
+    /// Sum of the ambient lights, which are in no class.
+    pub ambient: Vec3,
+    /// Lights of all classes.
+    pub every: LightCounts,
+    pub unbounded: LightCounts,
+    pub inverse_square: LightCounts,
+    pub ranged: LightCounts,
+}
+
+/// By what a light can be found, and what has to be asked of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LightClass {
+    /// It has no range, or is directional, or a polygon: it is in the lists of objects.
+    Unbounded,
+    /// A point light without a cone, of one colour, with the inverse square within a range: what most lights of a game are.
+    InverseSquare,
+    /// Any other point light with a range: with a cone, an attenuation of its own, or colours that differ.
+    Ranged,
+}
+
+impl LightClass {
+    /// Of a light that is not ambient.
+    fn of(light: &Light) -> Self {
+        let Attenuation { range, constant, linear, quadratic, clamp } = light.attenuation;
+        if light.kind != LightKind::Point || !range.is_finite() {
+            return Self::Unbounded;
+        }
+        let inverse_square = (constant, linear, quadratic, clamp) == (0.0, 0.0, 1.0, false);
+        let one_color = light.ambient == Vec3::ZERO && light.specular == light.diffuse;
+        let everywhere = cone(light).is_none();
+        // What `attenuate_inverse_square` takes.
+        let usual_range = (1e-9..=1e15).contains(&range);
+        match inverse_square && one_color && everywhere && usual_range {
+            true => Self::InverseSquare,
+            false => Self::Ranged,
+        }
+    }
+}
+
+/// The cone of a light, if it narrows it.
+fn cone(light: &Light) -> Option<SpotCone> {
+    light.spot.filter(|cone| !cone.is_everywhere())
+}
+
+impl LightCounts {
+    fn add(&mut self, light: &Light) {
+        self.dynamic += u32::from(light.bake != BakeMode::Static);
+        self.all += 1;
+        self.static_ambient |= light.bake == BakeMode::Static && light.ambient != Vec3::ZERO;
+        self.directional |= light.kind == LightKind::Directional;
+        self.point |= light.kind == LightKind::Point;
+        self.spot |= cone(light).is_some();
+    }
+
+    fn add_polygon(&mut self, polygon: &EmissivePolygon) {
+        self.dynamic += u32::from(!polygon.baked);
+        self.all += 1;
+        self.polygon = true;
+    }
 }
 
 impl LightSet {
@@ -44,10 +109,26 @@ impl LightSet {
         Ok(set)
     }
 
+    /// With lightmaps switched off nothing counts as baked.
+    pub fn without_lightmaps(mut self) -> Self {
+        for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
+            counts.dynamic = counts.all;
+        }
+        self
+    }
+
+    /// Whether fragments find lights with a range by clusters: with fewer, the lists of objects are as short.
+    pub fn are_clustered(&self, lists: LightLists) -> bool {
+        match lists {
+            LightLists::Auto => self.inverse_square.all + self.ranged.all >= CLUSTERED_LIGHTS,
+            LightLists::Clusters => true,
+            LightLists::Objects | LightLists::Everything => false,
+        }
+    }
+
     fn add_polygon(&mut self, polygon: &EmissivePolygon) {
-        self.dynamic += u32::from(!polygon.baked);
-        self.all += 1;
-        self.polygon = true;
+        self.every.add_polygon(polygon);
+        self.unbounded.add_polygon(polygon);
     }
 
     fn add(&mut self, light: &Light) {
@@ -55,21 +136,22 @@ impl LightSet {
             self.ambient += light.ambient;
             return;
         }
-        self.dynamic += u32::from(light.bake != BakeMode::Static);
-        self.all += 1;
-        self.static_ambient |= light.bake == BakeMode::Static && light.ambient != Vec3::ZERO;
-        self.directional |= light.kind == LightKind::Directional;
-        self.point |= light.kind == LightKind::Point;
-        self.spot |= light.spot.is_some_and(|cone| !cone.is_everywhere());
+        self.every.add(light);
+        match LightClass::of(light) {
+            LightClass::Unbounded => self.unbounded.add(light),
+            LightClass::InverseSquare => self.inverse_square.add(light),
+            LightClass::Ranged => self.ranged.add(light),
+        }
     }
 }
 
 /// How far a light of the buffer goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightReach {
-    /// In the world.
+    pub class: LightClass,
+    /// Of the ball that holds all it reaches, in the world; of a polygon light, its corner.
     pub center: DVec3,
-    /// Metres; infinite for a light without a range.
+    /// Of that ball, in metres; infinite for a light without a range.
     pub radius: f64,
     /// Baked into the lightmaps in use.
     pub baked: bool,
@@ -87,18 +169,44 @@ pub(crate) struct PolygonReach {
 
 impl LightReach {
     fn new(light: &Light, transform: &GlobalTransform) -> Self {
-        let radius = match light.kind {
-            LightKind::Point => f64::from(light.attenuation.range),
-            LightKind::Ambient | LightKind::Directional => f64::INFINITY,
+        let class = LightClass::of(light);
+        let (center, radius) = match light.kind {
+            LightKind::Point => bounding_sphere(light, transform),
+            LightKind::Ambient | LightKind::Directional => (transform.translation(), f64::INFINITY),
         };
-        let baked = light.bake == BakeMode::Static;
-        Self { center: transform.translation(), radius, baked, polygon: None }
+        Self { class, center, radius, baked: light.bake == BakeMode::Static, polygon: None }
     }
 
     fn of_polygon(EmissivePolygon { light, emitter, baked }: &EmissivePolygon) -> Self {
         let reach = PolygonReach { front: light.area_vector(), emitter: *emitter };
-        Self { center: light.corner, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
+        let (class, center) = (LightClass::Unbounded, light.corner);
+        Self { class, center, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
     }
+}
+
+/// Middle and radius of the smallest ball around all that a point light reaches: the ball of its range, or around a spotlight's part of it.
+fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64) {
+    let (place, range) = (transform.translation(), f64::from(light.attenuation.range));
+    let Some(cone) = cone(light).filter(|_| range.is_finite()) else { return (place, range) };
+    // Rounded to f32 on the device, and strictly inside is lit: a little wider is enough.
+    let cosine = (cone.cosines().outer - 1e-6).max(0.0);
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let axis = transform.forward();
+    match cosine > sine {
+        // Through the apex and the rim of the cap.
+        true => (place + axis * (0.5 * range / cosine), 0.5 * range / cosine),
+        // Around the rim.
+        false => (place + axis * (range * cosine), range * sine),
+    }
+}
+
+/// The lights of a frame: what is counted of them, and one entry of each list for each light, dynamic ones first.
+#[derive(Debug, Default)]
+pub(crate) struct SceneLights {
+    pub set: LightSet,
+    pub reaches: Vec<LightReach>,
+    /// Those of the class, in the order of `reaches`.
+    pub inverse_square: Vec<InverseSquareLightData>,
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
@@ -112,10 +220,10 @@ pub(crate) fn extract_lights(
     buffer: &mut GrowableBuffer<LightData>,
     origin: DVec3,
     left_out: &mut Vec<String>,
-) -> Result<(LightSet, Vec<LightReach>), RenderError> {
-    let mut set = LightSet::default();
+) -> Result<SceneLights, RenderError> {
+    let mut scene = SceneLights::default();
     let polygons = emitters.polygons(world)?;
-    polygons.iter().for_each(|polygon| set.add_polygon(polygon));
+    polygons.iter().for_each(|polygon| scene.set.add_polygon(polygon));
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
     let mut found: Vec<_> = query
         .iter(world)
@@ -125,19 +233,29 @@ pub(crate) fn extract_lights(
         })
         .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
-    found.iter().for_each(|(_, light, _)| set.add(light));
+    found.iter().for_each(|(_, light, _)| scene.set.add(light));
     found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
-    let lights = found.iter().map(|(_, light, transform)| {
-        (LightReach::new(light, transform), LightData::new(light, transform, origin))
-    });
-    let polygons = polygons
-        .iter()
-        .map(|polygon| (LightReach::of_polygon(polygon), LightData::polygon(&polygon.light, origin)));
-    let mut all: Vec<(LightReach, LightData)> = lights.chain(polygons).collect();
     // Stable: within both halves the order stays.
-    all.sort_by_key(|(reach, _)| reach.baked);
-    buffer.replace(all.iter().map(|(_, data)| *data));
-    Ok((set, all.into_iter().map(|(reach, _)| reach).collect()))
+    found.sort_by_key(|(_, light, _)| light.bake == BakeMode::Static);
+    let baked = found.iter().position(|(_, light, _)| light.bake == BakeMode::Static).unwrap_or(found.len());
+    let (dynamic, baked) = found.split_at(baked);
+    let mut data = Vec::with_capacity(found.len() + polygons.len());
+    for (lights, of_baked) in [(dynamic, false), (baked, true)] {
+        for (_, light, transform) in lights {
+            let reach = LightReach::new(light, transform);
+            if reach.class == LightClass::InverseSquare {
+                scene.inverse_square.push(InverseSquareLightData::new(light, transform, origin));
+            }
+            scene.reaches.push(reach);
+            data.push(LightData::new(light, transform, origin));
+        }
+        for polygon in polygons.iter().filter(|polygon| polygon.baked == of_baked) {
+            scene.reaches.push(LightReach::of_polygon(polygon));
+            data.push(LightData::polygon(&polygon.light, origin));
+        }
+    }
+    buffer.replace(data);
+    Ok(scene)
 }
 
 /// What is wrong with a light that is on, by name; nothing as a rule.
