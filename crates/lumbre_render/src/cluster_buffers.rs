@@ -26,7 +26,7 @@ impl ClusterBuffers {
             ranged: Vec::new(),
             grid: GrowableBuffer::uniform("cluster grid", 1),
             lists: None,
-            lights: GrowableBuffer::uniform("inverse-square lights", UNIFORM_LIGHTS as usize),
+            lights: GrowableBuffer::uniform("inverse-square lights", UNIFORM_LIGHTS as usize + 1),
         }
     }
 
@@ -54,7 +54,7 @@ impl ClusterBuffers {
         grid.first_baked_inverse_square = number(dynamic(LightClass::InverseSquare));
         grid.first_baked_ranged = number(lights.reaches.iter().filter(|reach| !reach.baked).count());
         self.grid.replace([*grid]);
-        self.lights.replace(lights.inverse_square.iter().copied());
+        self.lights.replace(lights.inverse_square.iter().copied().chain([InverseSquareLightData::BLACK]));
     }
 
     /// Bytes that the next `upload` will send.
@@ -98,7 +98,7 @@ impl ClusterBuffers {
     /// What is bound, by binding; none before the first `upload`.
     pub fn bindings(&self) -> Option<[(u32, wgpu::BindingResource<'_>); 4]> {
         let lights = self.lights.buffer()?;
-        let uniform_bytes = u64::from(UNIFORM_LIGHTS) * size_of::<InverseSquareLightData>() as u64;
+        let uniform_bytes = u64::from(UNIFORM_LIGHTS + 1) * size_of::<InverseSquareLightData>() as u64;
         let uniform =
             wgpu::BufferBinding { buffer: lights, offset: 0, size: wgpu::BufferSize::new(uniform_bytes) };
         Some([

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use glam::DVec3;
 use lumbre_scene::SceneSettings;
 
-use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects};
+use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects, Traits};
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::MeshKey;
 use crate::pipelines::PipelineKey;
-use crate::shader::Feature;
+use crate::shader::{Feature, Variant};
 use crate::texture_sets::TextureSet;
 
 /// Instances of one mesh in one pipeline.
@@ -42,7 +42,8 @@ pub(crate) struct Draws {
 struct Visible<'a> {
     pass: LitPass,
     slot: usize,
-    distance: f64,
+    /// Smaller is drawn earlier.
+    order: f64,
     object: &'a Object,
     pipeline: PipelineKey,
 }
@@ -64,6 +65,8 @@ impl Draws {
             planes.iter().all(|plane| plane.dot(center) >= -object.radius)
         };
         let mut visible: Vec<Visible> = Vec::new();
+        // Most objects are as the one before.
+        let mut known: Option<(Traits, Variant)> = None;
         for (slot, object) in objects.iter() {
             if !inside(object) {
                 draws.outside += 1;
@@ -71,8 +74,13 @@ impl Draws {
             }
             let traits = &object.traits;
             let pass = traits.pass(frame.lightmaps);
+            let variant = match known {
+                Some((of, variant)) if of == *traits => variant,
+                _ => traits.variant(settings, frame),
+            };
+            known = Some((*traits, variant));
             let pipeline = PipelineKey {
-                variant: traits.variant(settings, frame),
+                variant,
                 format,
                 samples,
                 mirrored: object.mirrored,
@@ -86,16 +94,22 @@ impl Draws {
                 draws.clustered_depths =
                     Some([near.min(depth - object.radius), far.max(depth + object.radius)]);
             }
-            visible.push(Visible { pass, slot, distance: distance(object, view.eye), object, pipeline });
+            visible.push(Visible {
+                pass,
+                slot,
+                order: order(object, view.eye, pass),
+                object,
+                pipeline,
+            });
         }
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
-        visible.sort_by(|a, b| {
-            let order = a.distance.total_cmp(&b.distance);
-            let order = if a.pass == LitPass::Transparent { order.reverse() } else { order };
-            a.pass.cmp(&b.pass).then(order).then(a.slot.cmp(&b.slot))
-        });
-        for seen in visible {
-            draws.push(&seen, lights);
+        // Sorted are numbers alone: what they stand for is large.
+        let key = |(index, seen): (usize, &Visible)| (seen.pass, seen.order, index);
+        let mut order: Vec<(LitPass, f64, usize)> = visible.iter().enumerate().map(key).collect();
+        order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        draws.instances.reserve(visible.len());
+        for (_, _, index) in order {
+            draws.push(&visible[index], lights);
         }
         draws
     }
@@ -150,7 +164,12 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
     }
 }
 
-/// From the eye to the nearest point of the bounding sphere.
-fn distance(object: &Object, eye: DVec3) -> f64 {
-    ((object.center - eye).length() - object.radius).max(0.0)
+/// By what the objects of a pass are sorted: how far the farthest point of the bounding sphere is from the eye where they are opaque, as a
+/// room or a floor is behind what it holds, and the nearest one, the farthest first, where they are transparent.
+fn order(object: &Object, eye: DVec3, pass: LitPass) -> f64 {
+    let center = (object.center - eye).length();
+    match pass {
+        LitPass::Transparent => -(center - object.radius).max(0.0),
+        LitPass::Lightmap | LitPass::Forward => center + object.radius,
+    }
 }

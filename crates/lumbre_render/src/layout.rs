@@ -253,6 +253,10 @@ pub(crate) struct InverseSquareLightData {
 }
 
 impl InverseSquareLightData {
+    /// A light that adds nothing.
+    pub const BLACK: Self =
+        Self { position: Vec3::ZERO, inverse_range_squared: 1.0, color: Vec3::ZERO, padding: 0.0 };
+
     /// A light in frame space.
     pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
         let range = f64::from(light.attenuation.range);

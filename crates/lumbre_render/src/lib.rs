@@ -42,6 +42,7 @@ mod gpu;
 mod growable_buffer;
 mod layout;
 mod light_clusters;
+mod light_grid;
 mod light_lists;
 mod mesh_buffers;
 mod offscreen;
@@ -56,7 +57,7 @@ mod window_surface;
 
 pub use error::RenderError;
 pub use explain::{SceneExplanation, explain};
-pub use frame_report::{FrameReport, Statistics};
+pub use frame_report::{CpuStages, FrameReport, LightListing, Statistics};
 pub use gpu::Gpu;
 pub use offscreen::{Offscreen, OffscreenFormat};
 pub use options::{Display, FrameOptions, LightLists, Measure};

@@ -23,8 +23,10 @@ const DISTANCE_MARGIN: f64 = 2e-6;
 /// Slices overlap by this part of one, for the same reason.
 const SLICE_MARGIN: f64 = 2e-3;
 
-/// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has.
-pub(crate) const UNIFORM_LIGHTS: u32 = 2048;
+/// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
+pub(crate) const UNIFORM_LIGHTS: u32 = 2047;
+/// Most inverse-square lights that 16 bits number, beside a black one; more of them are listed as other lights with a range are.
+pub(crate) const NUMBERED_LIGHTS: usize = 65_535;
 
 /// A ball that holds all points that a light reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,13 +55,16 @@ pub(crate) struct ClusteredView {
 #[derive(Debug, Default)]
 pub(crate) struct LightClusters {
     /// For each cluster where its list begins in here, and where the last one ends; the same for the second class of lights; then the
-    /// lists of the first class, one after the other, an entry for a list that is empty to read, and those of the second.
+    /// lists of the first class, one after the other, two lights in a word, a word for a list that is empty to read, and the lists of the
+    /// second class with one light in a word.
     pub values: Vec<u32>,
     pub grid: ClusterGridData,
     /// Pixels along the side of a tile.
     pub tile_side: u32,
     /// Entries of all lists.
     pub entries: usize,
+    /// The number of a light of the first class that is black.
+    black: u32,
     spheres: Vec<ViewSphere>,
     spans: Vec<Span>,
     rows: Vec<Edge>,
@@ -112,7 +117,7 @@ struct Depths {
 }
 
 impl LightClusters {
-    /// Makes the lists of the classes of lights: those of a class are numbered from 0.
+    /// Makes the lists of both classes of lights. Those of the first are numbered from 0, and the number after the last is a black one's.
     pub fn build(&mut self, view: &ClusteredView, classes: [&[BoundingSphere]; 2]) {
         self.spheres.clear();
         for sphere in classes.into_iter().flatten() {
@@ -134,8 +139,9 @@ impl LightClusters {
         self.values.clear();
         self.values.resize(2 * (clusters + 1), 0);
         self.grid.ranged_offsets = u32::try_from(clusters + 1).unwrap_or(u32::MAX);
-        self.class(0..first, 0, clusters, [&columns, &rows], &depths);
-        self.class(first..self.spheres.len(), clusters + 1, clusters, [&columns, &rows], &depths);
+        self.black = saturated(first);
+        self.class(0..first, 0, clusters, [&columns, &rows], &depths, true);
+        self.class(first..self.spheres.len(), clusters + 1, clusters, [&columns, &rows], &depths, false);
     }
 
     /// The finest grid whose lists are not too long.
@@ -188,9 +194,9 @@ impl LightClusters {
         clusters: usize,
         [columns, rows]: [&Axis; 2],
         depths: &Depths,
+        packed: bool,
     ) {
         self.spans.clear();
-        let any = self.spheres[lights.clone()].first().map_or(0, |sphere| sphere.light);
         for sphere in &self.spheres[lights] {
             let Some([first, last]) = depths.span(sphere.depth, sphere.radius) else { continue };
             for slice in first..=last {
@@ -215,13 +221,25 @@ impl LightClusters {
                 }
             }
         }
-        // From lengths to ends; writing the lists backwards turns those into beginnings.
-        let mut end = u32::try_from(self.values.len()).unwrap_or(u32::MAX);
-        for offset in &mut self.values[table..=table + clusters] {
-            end = end.saturating_add(*offset);
-            *offset = end;
+        let begin = self.values.len();
+        if packed {
+            self.fill_pairs(table, clusters, begin);
+        } else {
+            self.fill(table, clusters, begin);
+            // Any light of the class may be evaluated anywhere: it adds nothing where it does not reach.
+            let any = self.spans.first().map_or(0, |span| span.light);
+            self.values.push(any);
         }
-        self.values.resize(end as usize, 0);
+    }
+
+    /// Writes the lists of the spans: from lengths to ends, and backwards from there, which turns ends into beginnings.
+    fn fill(&mut self, table: usize, clusters: usize, begin: usize) {
+        let mut end = begin;
+        for offset in &mut self.values[table..=table + clusters] {
+            end += *offset as usize;
+            *offset = saturated(end);
+        }
+        self.values.resize(end, 0);
         for span in self.spans.iter().rev() {
             for cluster in span.first..span.first + span.count {
                 let offset = &mut self.values[table + cluster as usize];
@@ -230,9 +248,36 @@ impl LightClusters {
                 self.values[place] = span.light;
             }
         }
-        // Any light of the class may be evaluated anywhere: it adds nothing where it does not reach.
-        self.values.push(any);
     }
+
+    /// As `fill`, two lights in a word; a list of odd length ends in a black light.
+    fn fill_pairs(&mut self, table: usize, clusters: usize, begin: usize) {
+        let black = self.black | self.black << 16;
+        let mut end = begin;
+        for offset in &mut self.values[table..=table + clusters] {
+            let length = *offset as usize;
+            *offset = saturated(2 * end + length);
+            end += length.div_ceil(2);
+        }
+        // And one more for a list that is empty to read.
+        self.values.resize(end + 1, black);
+        for span in self.spans.iter().rev() {
+            for cluster in span.first..span.first + span.count {
+                let offset = &mut self.values[table + cluster as usize];
+                *offset -= 1;
+                let (word, half) = ((*offset / 2) as usize, 16 * (*offset % 2));
+                self.values[word] = self.values[word] & !(0xffff << half) | span.light << half;
+            }
+        }
+        for offset in &mut self.values[table..=table + clusters] {
+            *offset /= 2;
+        }
+    }
+}
+
+/// A number of words, as far as a u32 goes: beyond it no device has a buffer.
+fn saturated(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
 }
 
 impl ViewSphere {

@@ -10,6 +10,7 @@ use glam::DVec3;
 use crate::RenderError;
 use crate::extract::{LightClass, LightReach};
 use crate::layout::InstanceData;
+use crate::light_grid::LightGrid;
 
 /// Bytes of one index on the device.
 const INDEX_BYTES: u64 = size_of::<u32>() as u64;
@@ -19,6 +20,9 @@ const INDEX_BYTES: u64 = size_of::<u32>() as u64;
 pub(crate) struct ObjectLightLists<'a> {
     reaches: &'a [LightReach],
     everything: bool,
+    /// Made when an object first asks.
+    grid: Option<LightGrid>,
+    near: Vec<u32>,
     /// Lights that no cluster's list has.
     unbounded: Vec<u32>,
     /// All lists, one after the other.
@@ -40,6 +44,8 @@ impl<'a> ObjectLightLists<'a> {
         Self {
             reaches,
             everything,
+            grid: None,
+            near: Vec::new(),
             unbounded,
             indices: Vec::new(),
             known: HashMap::new(),
@@ -58,6 +64,10 @@ impl<'a> ObjectLightLists<'a> {
         half_size: DVec3,
         clustered: bool,
     ) -> InstanceData {
+        if clustered && self.unbounded.is_empty() {
+            self.lengths.1 += 1;
+            return InstanceData::default();
+        }
         let everything = self.everything;
         let reaches = |light: &LightReach| {
             if let Some(polygon) = light.polygon {
@@ -71,15 +81,16 @@ impl<'a> ObjectLightLists<'a> {
             let outside = ((light.center - center).abs() - half_size).max(DVec3::ZERO);
             light.radius.is_infinite() || outside.length() < light.radius
         };
-        let list: Vec<u32> = match clustered {
-            true => {
-                let found = self.unbounded.iter().copied();
-                found.filter(|index| reaches(&self.reaches[*index as usize])).collect()
-            }
-            false => {
-                let found = self.reaches.iter().zip(0..).filter(|(light, _)| reaches(light));
-                found.map(|(_, index)| index).collect()
-            }
+        let reached = |index: &u32| reaches(&self.reaches[*index as usize]);
+        let list: Vec<u32> = if clustered {
+            self.unbounded.iter().copied().filter(reached).collect()
+        } else if everything {
+            let all = u32::try_from(self.reaches.len()).unwrap_or(u32::MAX);
+            (0..all).filter(reached).collect()
+        } else {
+            let grid = self.grid.get_or_insert_with(|| LightGrid::new(self.reaches));
+            grid.near(center, half_size, &mut self.near);
+            self.near.iter().copied().filter(reached).collect()
         };
         self.lengths = (self.lengths.0 + list.len() as u64, self.lengths.1 + 1);
         if let Some(known) = self.known.get(&list) {

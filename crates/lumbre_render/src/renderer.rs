@@ -1,6 +1,8 @@
 //! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
 //! these has its own file.
 
+use std::time::Instant;
+
 use bevy_ecs::prelude::*;
 use lumbre_graph::Executor;
 use lumbre_scene::{SceneSettings, propagate_transforms};
@@ -19,7 +21,8 @@ use crate::pipelines::{Pipelines, attributes, is_flat};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::{
-    Display, FrameOptions, FrameReport, FrameTarget, Gpu, LightLists, Measure, RenderError, Statistics,
+    CpuStages, Display, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, Measure,
+    RenderError, Statistics,
 };
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
@@ -118,8 +121,12 @@ impl Renderer {
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
         self.gpu.check()?;
+        let begun = Instant::now();
+        let mut clock = Clock { last: begun };
+        let mut cpu = CpuStages::default();
         // The system cannot fail: it has no parameter that may be missing.
         let _ = world.run_system_cached(propagate_transforms);
+        cpu.transforms_ms = clock.lap();
         let mut settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
         // As lights, a fog made in code whose numbers no file may have is left out.
         let fog_fault = settings.fog.and_then(|fog| fog.validate("scene").err());
@@ -137,9 +144,11 @@ impl Renderer {
             &mut self.sets,
             view.eye,
         )?;
+        cpu.objects_ms = clock.lap();
         let mut lights =
             extract_lights(world, &mut self.emitters, &mut self.lights, self.objects.origin, &mut left_out)?;
         self.warn_once(&left_out);
+        cpu.lights_ms = clock.lap();
         if !options.lightmaps {
             lights.set = lights.set.without_lightmaps();
             lights.reaches.iter_mut().for_each(|reach| reach.baked = false);
@@ -168,6 +177,7 @@ impl Renderer {
         let target_kind = (plan.format, plan.samples);
         let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
         lists.check()?;
+        cpu.draws_ms = clock.lap();
         self.instances.replace(draws.instances.iter().copied());
         self.light_list.replace(lists.indices.iter().copied());
         if let Some(depths) = draws.clustered_depths {
@@ -175,6 +185,7 @@ impl Renderer {
             self.clusters.build(&ClusteredView { view, origin, size, depths }, &lights);
         }
         let clustered = draws.clustered_depths.is_some();
+        cpu.clusters_ms = clock.lap();
         let uploaded_bytes = self.upload(&view, &settings, &lights.set, exposure, clustered)?;
         let mut triangles = 0;
         for batch in draws.batches() {
@@ -189,7 +200,20 @@ impl Renderer {
             true => None,
             false => Some(self.display.prepare(&self.gpu, options.display, target.format, exposure)?),
         };
-        let statistics = Statistics {
+        cpu.upload_ms = clock.lap();
+        let clusters = &self.clusters.clusters;
+        let light_lists = LightListing {
+            clustered,
+            clusters: if clustered { clusters.grid.size.to_array() } else { [0; 3] },
+            tile_side: if clustered { clusters.tile_side } else { 0 },
+            entries: if clustered { clusters.entries } else { 0 },
+            inverse_square_lights: lights.set.inverse_square.all,
+            other_ranged_lights: lights.set.ranged.all,
+            unbounded_lights: lights.set.unbounded.all,
+        };
+        let mut statistics = Statistics {
+            light_lists,
+            cpu,
             lights: lights.set.every.all,
             static_lights: lights.set.every.all - lights.set.every.dynamic,
             lights_per_object: lists.mean_length(),
@@ -206,6 +230,7 @@ impl Renderer {
             Measure::TimeAndInvocations => lumbre_graph::Measure::ALL,
         });
         self.executor.enable_probe(options.probe);
+        self.executor.begun_at(begun);
         let prepared = Prepared {
             flat_rule,
             gpu: &self.gpu,
@@ -219,6 +244,8 @@ impl Renderer {
         };
         let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
         self.gpu.check()?;
+        statistics.cpu.encoding_ms = clock.lap();
+        statistics.cpu.total_ms = milliseconds(begun);
         let measured = self.executor.latest_report().cloned();
         Ok(FrameReport { statistics, plan: frame.plan, measured, left_out })
     }
@@ -309,4 +336,22 @@ impl Renderer {
             entries: &entries,
         })
     }
+}
+
+/// Times the stages of a frame.
+struct Clock {
+    last: Instant,
+}
+
+impl Clock {
+    /// Milliseconds since the last call.
+    fn lap(&mut self) -> f64 {
+        let lap = milliseconds(self.last);
+        self.last = Instant::now();
+        lap
+    }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }

@@ -8,6 +8,7 @@ use lumbre_scene::{GlobalTransform, Name};
 use super::emitters::{EmissivePolygon, Emitters};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{InverseSquareLightData, LightData};
+use crate::light_clusters::NUMBERED_LIGHTS;
 use crate::{LightLists, RenderError};
 
 /// From so many lights with a range on they are listed by clusters.
@@ -139,6 +140,9 @@ impl LightSet {
         self.every.add(light);
         match LightClass::of(light) {
             LightClass::Unbounded => self.unbounded.add(light),
+            LightClass::InverseSquare if self.inverse_square.all as usize == NUMBERED_LIGHTS => {
+                self.ranged.add(light);
+            }
             LightClass::InverseSquare => self.inverse_square.add(light),
             LightClass::Ranged => self.ranged.add(light),
         }
@@ -242,7 +246,10 @@ pub(crate) fn extract_lights(
     let mut data = Vec::with_capacity(found.len() + polygons.len());
     for (lights, of_baked) in [(dynamic, false), (baked, true)] {
         for (_, light, transform) in lights {
-            let reach = LightReach::new(light, transform);
+            let mut reach = LightReach::new(light, transform);
+            if scene.inverse_square.len() == NUMBERED_LIGHTS && reach.class == LightClass::InverseSquare {
+                reach.class = LightClass::Ranged;
+            }
             if reach.class == LightClass::InverseSquare {
                 scene.inverse_square.push(InverseSquareLightData::new(light, transform, origin));
             }
