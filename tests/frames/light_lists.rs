@@ -12,8 +12,8 @@ use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 
 use crate::adapter::{draw, linear};
 
-/// The largest difference of any channel that is let pass, relative to the brightest channel: other orders of the same sums, and the
-/// inverse square taken from 1/range² and the squared distance instead of from their roots.
+/// The largest difference of a pixel that is let pass, relative to its brightest channel and a hundredth: other orders of the same sums,
+/// and the inverse square taken from 1/range² and the squared distance instead of from their roots. A display's step is 4e-3.
 const ROUNDING: f64 = 2e-5;
 
 struct Random(u64);
@@ -36,7 +36,7 @@ impl Random {
 /// A floor and balls between which lights are put, and a camera.
 fn room(random: &mut Random, projection: Projection, eye: DVec3) -> World {
     let mut world = World::new();
-    let mut material = |random: &mut Random| {
+    let material = |random: &mut Random| {
         let front = Surface {
             ambient: Vec3::splat(0.3),
             diffuse: random.color(),
@@ -95,14 +95,18 @@ fn by(lists: LightLists) -> FrameOptions {
     FrameOptions { light_lists: lists, shading: Some(Shading::Phong), ..linear() }
 }
 
-/// The largest difference from brute force, relative to the brightest channel, and what the clustered frame reports.
+/// The largest difference of two frames, each pixel's relative to its brightest channel and a hundredth.
+fn apart(expected: &[DVec3], got: &[DVec3]) -> f64 {
+    assert!(expected.iter().any(|pixel| pixel.max_element() > 0.01), "the frame is black");
+    let of = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element() / (a.max_element() + 0.01);
+    expected.iter().zip(got).map(of).fold(0.0, f64::max)
+}
+
+/// The difference from brute force, and what the frame with lists reports.
 fn difference(world: &mut World, size: (u32, u32), lists: LightLists) -> (f64, FrameReport) {
     let (expected, _) = draw(world, size.0, size.1, &by(LightLists::Everything));
     let (got, report) = draw(world, size.0, size.1, &by(lists));
-    let brightest = expected.iter().map(|pixel| pixel.max_element()).fold(0.0, f64::max);
-    assert!(brightest > 0.0, "the frame is black");
-    let apart = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element();
-    (expected.iter().zip(&got).map(apart).fold(0.0, f64::max) / brightest, report)
+    (apart(&expected, &got), report)
 }
 
 fn perspective(degrees: f64, near: f64) -> Projection {
@@ -112,12 +116,8 @@ fn perspective(degrees: f64, near: f64) -> Projection {
 #[test]
 fn clusters_and_objects_agree_with_brute_force() {
     // Odd sizes, one tile, one column, one row; cameras that look from within the lights, from afar, and in parallel, mirrored too.
-    let upright = |half_width: f64| Projection::Orthographic {
-        half_width,
-        half_height: 5.0,
-        near: 0.5,
-        far: 40.0,
-    };
+    let upright =
+        |half_width: f64| Projection::Orthographic { half_width, half_height: 5.0, near: 0.5, far: 40.0 };
     let views = [
         (perspective(50.0, 0.1), DVec3::new(0.0, 4.0, 13.0), (97, 61), 300),
         (perspective(100.0, 1e-3), DVec3::new(1.0, 0.5, 1.5), (131, 33), 500),
@@ -143,7 +143,8 @@ fn clusters_and_objects_agree_with_brute_force() {
 
 #[test]
 fn a_light_that_no_list_has_is_seen() {
-    // Negative control: the same scene without one of its lights differs by far more than rounding.
+    // Negative control: the same scene without one of its lights differs by far more than rounding, wherever the light reaches what is in
+    // view, which most of them do not.
     let scene = || {
         let mut random = Random(3);
         let mut world = room(&mut random, perspective(50.0, 0.1), DVec3::new(0.0, 4.0, 13.0));
@@ -159,10 +160,10 @@ fn a_light_that_no_list_has_is_seen() {
         light.enabled = false;
         let (got, _) = draw(&mut world, 97, 61, &by(LightLists::Clusters));
         world.get_mut::<Light>(*lost).unwrap().enabled = true;
-        let apart = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element();
-        seen += usize::from(expected.iter().zip(&got).map(apart).fold(0.0, f64::max) > 1e-3);
+        seen += usize::from(apart(&expected, &got) > 10.0 * ROUNDING);
     }
-    assert!(seen * 2 > all.len() / 8, "of {} lights that were left out {seen} are missed", all.len() / 8);
+    println!("of 25 lights {seen} are missed");
+    assert!(seen >= 8, "of 25 lights that were left out only {seen} are missed");
 }
 
 #[test]
@@ -209,11 +210,9 @@ fn a_hundred_thousand_lights() {
     let (got, report) = draw(&mut world, 40, 30, &by(LightLists::Auto));
     let listing = report.statistics.light_lists;
     assert!(listing.clustered && listing.other_ranged_lights > 30_000, "{listing:?}");
-    let brightest = expected.iter().map(|pixel| pixel.max_element()).fold(0.0, f64::max);
-    let apart = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element();
-    let apart = expected.iter().zip(&got).map(apart).fold(0.0, f64::max) / brightest;
+    let apart = apart(&expected, &got);
     println!("a hundred thousand: {apart:.1e}, {listing:?}");
-    assert!(brightest > 0.01 && apart < 20.0 * ROUNDING, "{apart} of {brightest}: longer sums");
+    assert!(apart < ROUNDING, "{apart}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What a frame costs against the number of lights: 64 balls (73,728 triangles with the floor) under point lights of three metres.
 //! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong] [--reflection blinn]
-//! [--kind point|spot|unbounded] [--png FOLDER] [LIGHTS …]`
+//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--png FOLDER] [LIGHTS …]`
 //!
 //! Wall clock from the call to the finished frame, the device waited for: the median of the frames, and the least.
 
@@ -11,7 +11,7 @@ use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Attenuation, Light, Material, ReflectionModel, Shading, SpotCone};
-use lumbre_render::{FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{FrameOptions, Gpu, LightLists, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Camera, Mesh, Projection, Transform};
 
 /// Metres.
@@ -54,6 +54,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     "spot" => Kind::Spot,
                     "unbounded" => Kind::Unbounded,
                     _ => return Err("--kind takes point, spot or unbounded".into()),
+                }
+            }
+            "--lists" => {
+                options.light_lists = match value()?.as_str() {
+                    "auto" => LightLists::Auto,
+                    "objects" => LightLists::Objects,
+                    "clusters" => LightLists::Clusters,
+                    "everything" => LightLists::Everything,
+                    _ => return Err("--lists takes auto, objects, clusters or everything".into()),
                 }
             }
             "--png" => png = Some(value()?),

@@ -94,13 +94,7 @@ impl Draws {
                 draws.clustered_depths =
                     Some([near.min(depth - object.radius), far.max(depth + object.radius)]);
             }
-            visible.push(Visible {
-                pass,
-                slot,
-                order: order(object, view.eye, pass),
-                object,
-                pipeline,
-            });
+            visible.push(Visible { pass, slot, order: order(object, view.eye, pass), object, pipeline });
         }
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
         // Sorted are numbers alone: what they stand for is large.

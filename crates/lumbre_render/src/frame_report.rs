@@ -11,7 +11,8 @@ pub struct Statistics {
     pub lights: u32,
     /// Of these, the static ones: a lightmapped mesh takes their highlights only. 0 while lightmaps are switched off.
     pub static_lights: u32,
-    /// Lights that reach an object in view, on average: what each of its vertices or fragments loops over.
+    /// Lights in the list of an object in view, on average: what each of its vertices or fragments loops over. Where fragments find
+    /// lights with a range by clusters, these are not in it.
     pub lights_per_object: f32,
     /// Objects in view.
     pub objects: usize,

@@ -11,8 +11,8 @@ use crate::layout::{InverseSquareLightData, LightData};
 use crate::light_clusters::NUMBERED_LIGHTS;
 use crate::{LightLists, RenderError};
 
-/// From so many lights with a range on they are listed by clusters.
-const CLUSTERED_LIGHTS: u32 = 4;
+/// From so many lights with a range on they are listed by clusters: with two, finding the cluster costs about what it saves.
+const CLUSTERED_LIGHTS: u32 = 3;
 
 /// Lights of one class, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -125,6 +125,42 @@ impl LightSet {
             LightLists::Clusters => true,
             LightLists::Objects | LightLists::Everything => false,
         }
+    }
+
+    /// By which lists the lights of a frame are found, and why, a line for each kind of list. `clustered` of `objects` shown ones have
+    /// fragments that read clusters' lists.
+    pub fn listing(&self, lists: LightLists, clustered: usize, objects: usize) -> Vec<String> {
+        let (every, inverse_square, ranged) = (self.every.all, self.inverse_square.all, self.ranged.all);
+        if every == 0 {
+            return vec!["none: the scene has no lights but ambient ones".to_owned()];
+        }
+        let mut lines = Vec::new();
+        let with_range = inverse_square + ranged;
+        if clustered > 0 {
+            lines.push(format!(
+                "clusters: {with_range} lights with a range ({CLUSTERED_LIGHTS} are enough), for the fragments of {clustered} \
+                 objects under Phong shading: {inverse_square} inverse-square ones of one colour in lean records, {ranged} others"
+            ));
+        }
+        let why = match (lists, self.are_clustered(lists), clustered) {
+            (LightLists::Everything, ..) => "every light for every object, as was asked".to_owned(),
+            (LightLists::Objects, ..) => format!("{every} lights, as was asked"),
+            (_, false, _) => {
+                format!("{every} lights, {with_range} with a range: fewer than {CLUSTERED_LIGHTS}")
+            }
+            (_, true, 0) => {
+                format!("{every} lights: nothing that reads lists of clusters is under Phong shading")
+            }
+            (_, true, _) => {
+                let apart = objects - clustered;
+                let unbounded = self.unbounded.all;
+                format!(
+                    "{unbounded} lights without a range or with a shape; and all {every} for {apart} objects that no fragment lights"
+                )
+            }
+        };
+        lines.push(format!("objects: {why}"));
+        lines
     }
 
     fn add_polygon(&mut self, polygon: &EmissivePolygon) {
