@@ -3,7 +3,7 @@
 //! ```text
 //!   World ──► extract ─────────► draws ──────────────► frame_graph ───────────────► target
 //!             changed components  cull, sort, batch     background ► lightmap ►        Offscreen or
-//!             to GPU buffers      variant per object    forward ► transparent ►        WindowSurface
+//!             to GPU buffers      variants, light lists    forward ► transparent ►        WindowSurface
 //!                 │                    │                display ► overlay
 //!                 └──── traits ────────┴──► explain: what the scene calls for, and what not
 //! ```

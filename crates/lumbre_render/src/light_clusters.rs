@@ -440,3 +440,144 @@ impl Depths {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy_ecs::world::World;
+    use lumbre_scene::{Camera, GlobalTransform, Projection, Transform};
+
+    use super::*;
+
+    struct Random(u64);
+
+    impl Random {
+        fn within(&mut self, least: f64, most: f64) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            least + (most - least) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
+        }
+
+        fn place(&mut self, half: f64) -> DVec3 {
+            DVec3::from([0; 3].map(|_| self.within(-half, half)))
+        }
+    }
+
+    fn view(projection: Projection, size: [u32; 2], depths: [f64; 2]) -> ClusteredView {
+        let mut world = World::new();
+        let place = Transform::from_xyz(3.0, 2.0, 9.0).looking_at(DVec3::new(0.5, 0.0, 0.0), DVec3::Y);
+        let camera =
+            world.spawn((Camera { projection, exposure: 1.0 }, GlobalTransform(place.affine()))).id();
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let view = CameraView::new(&world, camera, aspect).unwrap();
+        ClusteredView { view, origin: DVec3::new(1.0, -2.0, 0.25), size, depths }
+    }
+
+    /// What shaders/light_clusters.wesl does; none outside of the frame.
+    fn cluster_at(clusters: &LightClusters, of: &ClusteredView, point: DVec3) -> Option<usize> {
+        let clip = of.view.clip_from_frame(of.origin) * (point - of.origin).extend(1.0);
+        let [x, y] = [clip.x / clip.w, clip.y / clip.w];
+        if clip.w <= 0.0 || x.abs() >= 1.0 || y.abs() >= 1.0 || clip.z > clip.w || clip.z < 0.0 {
+            return None;
+        }
+        let grid = &clusters.grid;
+        let pixel = |ndc: f64, size: u32| {
+            ((0.5 + 0.5 * ndc) * f64::from(size) * f64::from(grid.tiles_per_pixel)) as u32
+        };
+        let (column, row) = (pixel(x, of.size[0]), pixel(-y, of.size[1]));
+        let depth = (of.view.eye - point).dot(of.view.basis.z_axis) as f32;
+        let along = if grid.logarithmic != 0 { depth.max(1e-30).log2() } else { depth };
+        let slice = (along * grid.depth_scale + grid.depth_bias).clamp(0.0, grid.size.z as f32 - 1.0) as u32;
+        Some(((slice * grid.size.y + row) * grid.size.x + column) as usize)
+    }
+
+    fn list(clusters: &LightClusters, cluster: usize, packed: bool) -> Vec<u32> {
+        let table = if packed { 0 } else { clusters.grid.ranged_offsets as usize };
+        let [begin, end] = [0, 1].map(|next| clusters.values[table + cluster + next] as usize);
+        let words = clusters.values[begin..end].iter();
+        if !packed {
+            return words.copied().collect();
+        }
+        words.flat_map(|word| [word & 0xffff, word >> 16]).filter(|light| *light != clusters.black).collect()
+    }
+
+    #[test]
+    fn a_point_within_a_lights_range_finds_it_in_its_cluster() {
+        let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
+        let narrow = Projection::Perspective { vertical_fov: 0.05, aspect: None, near: 2.0, far: None };
+        let parallel =
+            |half_width| Projection::Orthographic { half_width, half_height: 4.0, near: 0.1, far: 30.0 };
+        for (number, (projection, size)) in [
+            (wide, [640, 360]),
+            (wide, [33, 1]),
+            (narrow, [100, 301]),
+            (parallel(6.0), [320, 200]),
+            (parallel(-6.0), [97, 61]),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let mut random = Random(number as u64);
+            let view = view(projection, size, [-5.0, 1e3]);
+            let mut sphere = |light| BoundingSphere {
+                light,
+                center: random.place(8.0),
+                radius: if light % 50 == 0 { 1e3 } else { 10.0_f64.powf(random.within(-2.0, 0.5)) },
+            };
+            let first: Vec<BoundingSphere> = (0..301).map(&mut sphere).collect();
+            let second: Vec<BoundingSphere> = (500..600).map(&mut sphere).collect();
+            let mut clusters = LightClusters::default();
+            // Twice: what was there before leaves no trace.
+            clusters.build(&view, [&second, &first]);
+            clusters.build(&view, [&first, &second]);
+            let (mut seen, mut listed, mut reaching) = (0, 0, 0);
+            for _ in 0..20_000 {
+                let chosen = &first[random.within(0.0, 301.0) as usize];
+                let inside = random.place(1.0);
+                let point = chosen.center
+                    + inside.normalize_or_zero() * (chosen.radius.min(20.0) * random.within(0.0, 1.0));
+                let Some(cluster) = cluster_at(&clusters, &view, point) else { continue };
+                seen += 1;
+                for (spheres, packed) in [(&first, true), (&second, false)] {
+                    let list = list(&clusters, cluster, packed);
+                    assert!(list.is_sorted_by(|a, b| a < b), "each once: {list:?}");
+                    listed += list.len();
+                    for sphere in
+                        spheres.iter().filter(|sphere| sphere.center.distance(point) < sphere.radius)
+                    {
+                        reaching += 1;
+                        assert!(
+                            list.contains(&sphere.light),
+                            "view {number}: {sphere:?} is missed at {point}"
+                        );
+                    }
+                }
+            }
+            assert!(seen > 100, "view {number}: only {seen} points are in view");
+            // Negative control of tightness: all lights in each list would be 400 for each point.
+            assert!(
+                listed < 100 * seen,
+                "view {number}: {listed} listed for {seen} points, {reaching} reach"
+            );
+        }
+    }
+
+    #[test]
+    fn lists_that_would_grow_too_long_take_a_coarser_grid() {
+        let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
+        let view = view(wide, [1920, 1080], [0.1, 100.0]);
+        let sphere = |light| BoundingSphere { light, center: DVec3::ZERO, radius: 6.0 };
+        let mut clusters = LightClusters::default();
+        clusters.build(&view, [&[sphere(0)], &[]]);
+        assert_eq!(clusters.tile_side, 32);
+        let many: Vec<BoundingSphere> = (0..60_000).map(sphere).collect();
+        clusters.build(&view, [&many, &[]]);
+        assert!(
+            clusters.tile_side > 32 && clusters.entries as f64 <= 2.0 * MANY_ENTRIES,
+            "{}",
+            clusters.entries
+        );
+        // None at all: every list is empty, and there is a word to read.
+        clusters.build(&view, [&[], &[]]);
+        assert_eq!((clusters.entries, list(&clusters, 0, true)), (0, vec![]));
+        assert!((clusters.values[0] as usize) < clusters.values.len());
+    }
+}

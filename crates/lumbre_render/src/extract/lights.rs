@@ -322,3 +322,59 @@ fn shines(light: &Light, transform: &GlobalTransform) -> bool {
         && colors.iter().any(|color| *color != Vec3::ZERO)
         && light.validate("light").is_ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use lumbre_scene::Transform;
+
+    use super::*;
+
+    #[test]
+    fn the_ball_around_a_cone_holds_what_it_lights_and_no_more() {
+        let transform = Transform::from_xyz(1.0, 2.0, 3.0).looking_at(DVec3::new(-1.0, 0.5, 2.0), DVec3::Y);
+        let place = GlobalTransform(transform.affine());
+        let axis = place.forward();
+        let side = axis.any_orthonormal_vector();
+        for outer in [0.01_f32, 0.5, 0.785, 0.786, 1.2, 1.57] {
+            let attenuation = Attenuation { range: 4.0, ..Attenuation::INVERSE_SQUARE };
+            let cone = SpotCone::Smooth { inner: 0.0, outer };
+            let (center, radius) =
+                bounding_sphere(&Light { attenuation, ..Light::spot(Vec3::ONE, cone) }, &place);
+            // Its farthest points: the apex, the middle and the rim of the cap.
+            let rim = |angle: f64| axis * angle.cos() + side * angle.sin();
+            let outer = f64::from(outer);
+            let mut farthest: f64 = if outer < 0.786 { center.distance(place.translation()) } else { 0.0 };
+            for step in 0..=100 {
+                let at = place.translation() + rim(outer * (f64::from(step) / 50.0 - 1.0)) * 4.0;
+                farthest = farthest.max(center.distance(at));
+            }
+            assert!(center.distance(place.translation()) <= radius * (1.0 + 1e-12), "{outer}");
+            assert!(farthest <= radius + 1e-9, "{outer}: {farthest} is outside of {radius}");
+            assert!(radius < farthest * (1.0 + 1e-4), "{outer}: {radius} is wider than {farthest}");
+        }
+    }
+
+    #[test]
+    fn lights_are_classed_by_what_has_to_be_asked_of_them() {
+        let ranged = Attenuation { range: 3.0, ..Attenuation::INVERSE_SQUARE };
+        let lamp = Light { attenuation: ranged, ..Light::point(Vec3::ONE) };
+        assert_eq!(LightClass::of(&lamp), LightClass::InverseSquare);
+        let cone = Some(SpotCone::Smooth { inner: 0.1, outer: 0.2 });
+        let constant = Attenuation { constant: 0.1, ..ranged };
+        let clamped = Attenuation { clamp: true, ..ranged };
+        let tiny = Attenuation { range: 1e-12, ..ranged };
+        for other in [
+            Light { spot: cone, ..lamp.clone() },
+            Light { ambient: Vec3::X, ..lamp.clone() },
+            Light { specular: Vec3::ZERO, ..lamp.clone() },
+            Light { attenuation: constant, ..lamp.clone() },
+            Light { attenuation: clamped, ..lamp.clone() },
+            Light { attenuation: tiny, ..lamp.clone() },
+        ] {
+            assert_eq!(LightClass::of(&other), LightClass::Ranged, "{other:?}");
+        }
+        for other in [Light::point(Vec3::ONE), Light { kind: LightKind::Directional, ..lamp }] {
+            assert_eq!(LightClass::of(&other), LightClass::Unbounded, "{other:?}");
+        }
+    }
+}
