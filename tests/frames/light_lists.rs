@@ -237,3 +237,32 @@ fn few_lights_keep_the_simple_path_and_gouraud_its_own() {
     let (apart, _) = difference(&mut world, (40, 30), LightLists::Auto);
     assert!(apart < ROUNDING, "{apart}");
 }
+
+#[test]
+fn explain_says_how_lights_are_found_and_why() {
+    let mut random = Random(7);
+    let mut world = room(&mut random, perspective(50.0, 0.1), DVec3::new(0.0, 4.0, 13.0));
+    let told = |world: &mut World, options: &FrameOptions| {
+        lumbre_scene::update_transforms(world);
+        lumbre_render::explain(world, options, 40, 30).unwrap().light_lists
+    };
+    let phong = by(LightLists::Auto);
+    assert_eq!(told(&mut world, &phong), ["none: the scene has no lights but ambient ones"]);
+    let ranged = Attenuation { range: 3.0, ..Attenuation::INVERSE_SQUARE };
+    let lamp = Light { attenuation: ranged, ..Light::point(Vec3::ONE) };
+    world.spawn((lamp.clone(), Transform::IDENTITY));
+    world.spawn((Light::directional(Vec3::ONE), Transform::IDENTITY));
+    assert_eq!(told(&mut world, &phong), ["objects: 2 lights, 1 with a range: fewer than 3"]);
+    (0..10).for_each(|_| drop(world.spawn((lamp.clone(), Transform::IDENTITY))));
+    let lines = told(&mut world, &phong);
+    assert!(lines[0].starts_with("clusters: 11 lights with a range"), "{lines:?}");
+    assert!(lines[0].contains("11 inverse-square") && lines[0].contains("13 objects"), "{lines:?}");
+    assert!(lines[1].starts_with("objects: 1 lights without a range"), "{lines:?}");
+    let gouraud = FrameOptions { shading: Some(Shading::Gouraud), ..phong.clone() };
+    assert_eq!(told(&mut world, &gouraud), ["objects: 12 lights: no object is under Phong shading"]);
+    // As it says, so it is drawn.
+    let (_, report) = draw(&mut world, 40, 30, &phong);
+    let listing = report.statistics.light_lists;
+    assert_eq!((listing.clustered, listing.inverse_square_lights, listing.unbounded_lights), (true, 11, 1));
+    assert!(report.statistics.cpu.total_ms > 0.0);
+}

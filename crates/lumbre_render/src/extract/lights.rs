@@ -149,7 +149,7 @@ impl LightSet {
                 format!("{every} lights, {with_range} with a range: fewer than {CLUSTERED_LIGHTS}")
             }
             (_, true, 0) => {
-                format!("{every} lights: nothing that reads lists of clusters is under Phong shading")
+                format!("{every} lights: no object is under Phong shading")
             }
             (_, true, _) => {
                 let apart = objects - clustered;
