@@ -150,8 +150,10 @@ impl Variant {
             (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
         }
         if self.shading != Shading::Phong {
-            // No highlight is evaluated in a pixel.
-            self.bits &= !(Feature::SpecularAntialiasing as u64);
+            // No highlight is evaluated in a pixel, and no vertex is in a cluster.
+            self.bits &= !(Feature::SpecularAntialiasing as u64
+                | Feature::InverseSquareClusters as u64
+                | Feature::RangedClusters as u64);
         }
         let clusters = self.has(Feature::InverseSquareClusters) || self.has(Feature::RangedClusters);
         self.bits &= !(Feature::Clusters as u64);
