@@ -121,7 +121,7 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
 /// At most 8 u of the factor, and 4 u (d/range)⁴ of the factor without its window: the division is 5 u, the difference before it 1 u, and
 /// under a centimetre the divisor, the square of a rounded constant, 2 u; the fourth power is off by 3 u of itself.
 pub fn attenuate_inverse_square(inverse_range_squared: f64, distance_squared: f64) -> f64 {
-    let ratio_squared = (distance_squared * inverse_range_squared).min(1.0);
+    let ratio_squared = (distance_squared * inverse_range_squared).clamp(0.0, 1.0);
     let window = 1.0 - ratio_squared * ratio_squared;
     window / distance_squared.max(MINIMUM_DISTANCE * MINIMUM_DISTANCE)
 }

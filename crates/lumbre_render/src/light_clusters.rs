@@ -502,7 +502,7 @@ mod tests {
     #[test]
     fn a_point_within_a_lights_range_finds_it_in_its_cluster() {
         let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
-        let narrow = Projection::Perspective { vertical_fov: 0.05, aspect: None, near: 2.0, far: None };
+        let narrow = Projection::Perspective { vertical_fov: 0.4, aspect: None, near: 2.0, far: None };
         let parallel =
             |half_width| Projection::Orthographic { half_width, half_height: 4.0, near: 0.1, far: 30.0 };
         for (number, (projection, size)) in [
