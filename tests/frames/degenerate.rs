@@ -7,7 +7,7 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{Attenuation, Light, Material, Shading};
-use lumbre_render::{FrameOptions, RenderError};
+use lumbre_render::{FrameOptions, LightLists, RenderError};
 use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 use lumbre_tests::compare::compare;
 use lumbre_tests::panes::{orthographic, pane, pane_of};
@@ -156,7 +156,8 @@ fn ten_thousand_lights_behind_the_camera_change_nothing() {
     // Negative control: in front of it, they are seen.
     let mut lights = world.query_filtered::<&mut Transform, With<Light>>();
     lights.iter_mut(&mut world).for_each(|mut place| place.translation.z -= 8.0);
-    let (after, report) = draw(&mut world, SIZE as u32, SIZE as u32, &linear());
+    let by_objects = FrameOptions { light_lists: LightLists::Objects, ..linear() };
+    let (after, report) = draw(&mut world, SIZE as u32, SIZE as u32, &by_objects);
     assert!(report.statistics.lights_per_object > 5.0);
     assert!(after.iter().any(|pixel| pixel.max_element() > 10.0));
 }

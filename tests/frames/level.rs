@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::*;
 use glam::DVec3;
 use lumbre_optics::{AlphaMode, Light, Material};
-use lumbre_render::{Display, FrameOptions};
+use lumbre_render::{Display, FrameOptions, LightLists};
 use lumbre_scene::{Camera, MaterialTextures, Name};
 use lumbre_tests::compare::{Difference, compare};
 use lumbre_tests::twin::{self, TwinOptions};
@@ -119,7 +119,8 @@ fn the_level_looks_as_it_did() {
 #[test]
 fn the_level_calls_for_what_it_has_and_nothing_else() {
     let mut world = level("tour 06");
-    let (pixels, report) = draw(&mut world, 64, 36, &linear());
+    let by_objects = FrameOptions { light_lists: LightLists::Objects, ..linear() };
+    let (pixels, report) = draw(&mut world, 64, 36, &by_objects);
     assert!(pixels.iter().any(|pixel| *pixel != DVec3::ZERO));
     assert!(report.plan.status("forward").unwrap().runs());
     assert!(report.plan.status("transparent").unwrap().runs(), "there is a pane");

@@ -13,6 +13,7 @@ mod faces;
 mod flat_rules;
 mod highlights;
 mod level;
+mod light_lists;
 mod materials;
 mod models;
 mod multisampling;

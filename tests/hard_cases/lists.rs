@@ -7,7 +7,7 @@ use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Attenuation, Light, Material, evaluate_light, lambert};
-use lumbre_render::FrameReport;
+use lumbre_render::{FrameOptions, FrameReport, LightLists};
 use lumbre_scene::{Camera, Hidden, Mesh, Projection, SceneSettings, Transform};
 use lumbre_tests::panes::{orthographic, pane, pane_of, pixel_point};
 
@@ -28,6 +28,11 @@ crate::cases! {
 
 /// A rounding of f32.
 const U: f64 = 5.960_464_477_539_063e-8;
+
+/// Lists of objects, where the frame would take those of clusters.
+fn by_objects() -> FrameOptions {
+    FrameOptions { light_lists: LightLists::Objects, ..linear() }
+}
 
 fn grey(color: DVec3) -> f64 {
     color.element_sum() / 3.0
@@ -106,7 +111,7 @@ fn a_list_ends_where_the_range_does() -> Outcome {
     let lamp_entity = world.spawn(Transform::from_xyz(0.0, 0.0, 4.0)).id();
     for range in [4f32.next_down(), 4.0, 4f32.next_up()] {
         world.entity_mut(lamp_entity).insert(lamp(range));
-        lists.push(f64::from(draw(&mut world, 9, 9, &linear()).1.statistics.lights_per_object));
+        lists.push(f64::from(draw(&mut world, 9, 9, &by_objects()).1.statistics.lights_per_object));
     }
     Outcome::worst(
         [0.0, 0.0, 1.0].into_iter().zip(lists),
@@ -152,7 +157,7 @@ fn an_empty_list_beside_full_ones() -> Outcome {
         }
     }
     world.spawn(orthographic());
-    let (pixels, report) = draw(&mut world, 35, 35, &linear());
+    let (pixels, report) = draw(&mut world, 35, 35, &by_objects());
     assert!((report.statistics.lights_per_object - 8.0 / 3.0).abs() < 1e-6);
     let pairs = pixels.iter().enumerate().filter_map(|(at, pixel)| {
         let point = pixel_point(at % 35, at / 35, 35);
@@ -271,7 +276,7 @@ fn ten_thousand_lights_in_a_thousand_different_lists() -> Outcome {
 
 fn the_length_of_those_lists() -> Outcome {
     let (mut world, places, _) = strips();
-    let (_, report) = draw(&mut world, 1, 1, &linear());
+    let (_, report) = draw(&mut world, 1, 1, &by_objects());
     let half_width = 1.0 / f64::from(STRIPS);
     let reached = |number: u32| {
         let lamps = places.iter().filter(|place| {
@@ -298,7 +303,7 @@ fn ten_thousand_lights_half_of_them_too_far() -> Outcome {
         let z = if number % 2 == 0 { 1.0 } else { 2.5 };
         world.spawn((light.clone(), Transform::from_xyz(0.0, 0.0, z)));
     }
-    let (pixels, report) = draw(&mut world, 9, 9, &linear());
+    let (pixels, report) = draw(&mut world, 9, 9, &by_objects());
     assert_eq!(report.statistics.lights_per_object, 5000.0);
     // 1 - (1/2)^4 each, n.l = 1.
     let expected = 5000.0 * f64::from(1e-4f32) * (1.0 - 0.0625);

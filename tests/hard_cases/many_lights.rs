@@ -3,6 +3,7 @@
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Attenuation, Light, Material};
+use lumbre_render::{FrameOptions, LightLists};
 use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 use lumbre_tests::panes::{pane, pane_of};
 
@@ -61,7 +62,8 @@ fn ten_thousand_lights_behind_the_camera() -> Outcome {
         let place = Transform::from_xyz(f64::from(number % 100) * 0.1, f64::from(number / 100) * 0.1, 9.0);
         world.spawn((Light { attenuation, ..Light::point(Vec3::ONE) }, place));
     }
-    let (pixels, report) = draw(&mut world, 9, 9, &linear());
+    let by_objects = FrameOptions { light_lists: LightLists::Objects, ..linear() };
+    let (pixels, report) = draw(&mut world, 9, 9, &by_objects);
     assert_eq!((report.statistics.lights, report.statistics.lights_per_object), (10_000, 0.0));
     Outcome::worst(
         pixels.iter().map(|pixel| (0.0, grey(*pixel))).collect::<Vec<_>>(),

@@ -49,6 +49,25 @@ fn attenuation() -> Twin {
         .range(0.0, 1.001e30)
 }
 
+/// 1/range², squared distance.
+fn squares(sequence: &mut Sequence) -> Vec<f32> {
+    let range = sequence.decades(-2.0, 4.0);
+    let distance = if sequence.next() < 0.7 { range * sequence.next() } else { sequence.decades(-4.0, 4.0) };
+    vec![1.0 / (range * range), distance * distance]
+}
+
+fn attenuation_inverse_square() -> Twin {
+    Twin::new("attenuation", "attenuate_inverse_square", &[], &[Type::Number; 2], Type::Number)
+        .expect(|x| attenuate_inverse_square(x[0], x[1]))
+        .within(|x| lights::attenuate_inverse_square(x[0], x[1]))
+        .random(squares)
+        .corners(product(&[
+            &[1e-30, 1e-6, 0.111_111_11, 1.0, 1e18],
+            &[0.0, 1e-30, 1e-4, 0.999_999, 1.0, 8.999_999, 9.0, 1e6, 1e36],
+        ]))
+        .range(0.0, 1.001e4)
+}
+
 fn spots() -> [Twin; 2] {
     let arguments = [Type::Flag, Type::Number, Type::Number, Type::Number];
     let twin = |name: &str, smooth: bool| {
@@ -157,7 +176,7 @@ fn light(kind: LightKind, spot: u32) -> Twin {
 }
 
 pub fn twins() -> Vec<Twin> {
-    let mut all = vec![attenuation()];
+    let mut all = vec![attenuation(), attenuation_inverse_square()];
     all.extend(spots());
     all.push(light(LightKind::Directional, 0));
     all.push(light(LightKind::Directional, 1));

@@ -31,6 +31,7 @@ pub struct Executor {
     report: Option<FrameReport>,
     exported: Vec<(crate::resource::Name, GpuObject)>,
     frame: u64,
+    begun: Option<Instant>,
 }
 
 /// A frame that was handed to the GPU.
@@ -54,6 +55,12 @@ impl Executor {
     /// What to measure from the next frame on.
     pub fn set_measure(&mut self, measure: Measure) {
         self.measure = measure;
+    }
+
+    /// When work for the next frame began: its [`FrameReport::cpu_ms`] counts from then on and not from the call of
+    /// [`execute`](Self::execute).
+    pub fn begun_at(&mut self, begun: Instant) {
+        self.begun = Some(begun);
     }
 
     /// Whether to merge raster passes that draw into the same attachments (on from the start).
@@ -109,7 +116,8 @@ impl Executor {
         imports: &Imports,
         user: &mut User,
     ) -> Result<Frame, RunError> {
-        let start = self.measure.cpu.then(Instant::now);
+        let begun = self.begun.take();
+        let start = self.measure.cpu.then(|| begun.unwrap_or_else(Instant::now));
         self.collect(device, queue);
         self.frame += 1;
         let plan = self.plan(&graph)?;

@@ -78,7 +78,8 @@ mod viewer;
 
 pub use angle::quarter_angle;
 pub use attenuation::{
-    Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, try_attenuate,
+    Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, attenuate_inverse_square,
+    try_attenuate,
 };
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
 pub use emission::{add_emission, exitance};

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use glam::DVec3;
 use lumbre_scene::SceneSettings;
 
-use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects};
+use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects, Traits};
 use crate::layout::InstanceData;
-use crate::light_lists::LightLists;
+use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::MeshKey;
 use crate::pipelines::PipelineKey;
-use crate::shader::Feature;
+use crate::shader::{Feature, Variant};
 use crate::texture_sets::TextureSet;
 
 /// Instances of one mesh in one pipeline.
@@ -35,12 +35,15 @@ pub(crate) struct Draws {
     pub instances: Vec<InstanceData>,
     /// Objects outside the view.
     pub outside: usize,
+    /// From the nearest to the farthest point of what is lit by clusters, along the line of sight, in metres.
+    pub clustered_depths: Option<[f64; 2]>,
 }
 
 struct Visible<'a> {
     pass: LitPass,
     slot: usize,
-    distance: f64,
+    /// Smaller is drawn earlier.
+    order: f64,
     object: &'a Object,
     pipeline: PipelineKey,
 }
@@ -53,7 +56,7 @@ impl Draws {
         settings: &SceneSettings,
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
-        lights: &mut LightLists,
+        lights: &mut ObjectLightLists,
     ) -> Self {
         let mut draws = Self::default();
         let planes = view.frustum(objects.origin);
@@ -62,6 +65,8 @@ impl Draws {
             planes.iter().all(|plane| plane.dot(center) >= -object.radius)
         };
         let mut visible: Vec<Visible> = Vec::new();
+        // Most objects are as the one before.
+        let mut known: Option<(Traits, Variant)> = None;
         for (slot, object) in objects.iter() {
             if !inside(object) {
                 draws.outside += 1;
@@ -69,8 +74,13 @@ impl Draws {
             }
             let traits = &object.traits;
             let pass = traits.pass(frame.lightmaps);
+            let variant = match known {
+                Some((of, variant)) if of == *traits => variant,
+                _ => traits.variant(settings, frame),
+            };
+            known = Some((*traits, variant));
             let pipeline = PipelineKey {
-                variant: traits.variant(settings, frame),
+                variant,
                 format,
                 samples,
                 mirrored: object.mirrored,
@@ -78,25 +88,36 @@ impl Draws {
                 blend: pass == LitPass::Transparent,
                 texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
             };
-            visible.push(Visible { pass, slot, distance: distance(object, view.eye), object, pipeline });
+            if pipeline.variant.has(Feature::Clusters) {
+                let depth = (view.eye - object.center).dot(view.basis.z_axis);
+                let [near, far] = draws.clustered_depths.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+                draws.clustered_depths =
+                    Some([near.min(depth - object.radius), far.max(depth + object.radius)]);
+            }
+            visible.push(Visible { pass, slot, order: order(object, view.eye, pass), object, pipeline });
         }
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
-        visible.sort_by(|a, b| {
-            let order = a.distance.total_cmp(&b.distance);
-            let order = if a.pass == LitPass::Transparent { order.reverse() } else { order };
-            a.pass.cmp(&b.pass).then(order).then(a.slot.cmp(&b.slot))
-        });
-        for seen in visible {
-            draws.push(&seen, lights);
+        // Sorted are numbers alone: what they stand for is large.
+        let key = |(index, seen): (usize, &Visible)| (seen.pass, seen.order, index);
+        let mut order: Vec<(LitPass, f64, usize)> = visible.iter().enumerate().map(key).collect();
+        order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        draws.instances.reserve(visible.len());
+        for (_, _, index) in order {
+            draws.push(&visible[index], lights);
         }
         draws
     }
 
     /// Adds an instance, to the last batch if it fits.
-    fn push(&mut self, seen: &Visible, lights: &mut LightLists) {
+    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
         let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
-        let list = lights.reaching(seen.object.entity, seen.object.center, seen.object.half_size);
+        let list = lights.reaching(
+            seen.object.entity,
+            seen.object.center,
+            seen.object.half_size,
+            seen.pipeline.variant.has(Feature::Clusters),
+        );
         self.instances.push(InstanceData { object, ..list });
         let batches = match seen.pass {
             LitPass::Lightmap => &mut self.lightmapped,
@@ -137,7 +158,12 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
     }
 }
 
-/// From the eye to the nearest point of the bounding sphere.
-fn distance(object: &Object, eye: DVec3) -> f64 {
-    ((object.center - eye).length() - object.radius).max(0.0)
+/// By what the objects of a pass are sorted: how far the farthest point of the bounding sphere is from the eye where they are opaque, as a
+/// room or a floor is behind what it holds, and the nearest one, the farthest first, where they are transparent.
+fn order(object: &Object, eye: DVec3, pass: LitPass) -> f64 {
+    let center = (object.center - eye).length();
+    match pass {
+        LitPass::Transparent => -(center - object.radius).max(0.0),
+        LitPass::Lightmap | LitPass::Forward => center + object.radius,
+    }
 }

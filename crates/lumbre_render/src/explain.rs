@@ -12,6 +12,7 @@ use lumbre_scene::{
 
 use crate::extract::{FrameFeatures, LightSet, Traits};
 use crate::frame_graph::{FramePlan, declare};
+use crate::shader::Feature;
 use crate::{Display, FrameOptions, RenderError};
 
 /// A scene's frame, explained.
@@ -23,6 +24,8 @@ pub struct SceneExplanation {
     pub hidden_cones: Vec<HiddenCone>,
     /// The passes and resources of a frame.
     pub frame: Explanation,
+    /// By which lists lights are found, and why.
+    pub light_lists: Vec<String>,
     /// Each shader variant in use with the number of objects it draws.
     pub variants: BTreeMap<String, usize>,
 }
@@ -40,7 +43,7 @@ pub fn explain(
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let mut lights = LightSet::of(world)?;
     if !options.lightmaps {
-        lights.dynamic = lights.all;
+        lights = lights.without_lightmaps();
     }
     let features = FrameFeatures {
         shading: options.shading,
@@ -50,6 +53,7 @@ pub fn explain(
         clamp: options.display == Display::Clamp,
         half: !options.full_precision,
         lights,
+        clustered: lights.are_clustered(options.light_lists),
     };
     let mut query = world.query_filtered::<(
         &Mesh,
@@ -65,9 +69,13 @@ pub fn explain(
         })
         .collect();
     let mut variants = BTreeMap::new();
+    let mut clustered = 0;
     for object in &traits {
-        *variants.entry(object.variant(&settings, &features).to_string()).or_insert(0) += 1;
+        let variant = object.variant(&settings, &features);
+        clustered += usize::from(variant.has(Feature::Clusters));
+        *variants.entry(variant.to_string()).or_insert(0) += 1;
     }
+    let light_lists = lights.listing(options.light_lists, clustered, traits.len());
     let plan = FramePlan::new(&traits, options);
     let target = TextureDescriptor::new_2d(width, height, wgpu::TextureFormat::Rgba8Unorm);
     let frame = declare(&plan, target, None, None).compile()?.explain();
@@ -76,7 +84,7 @@ pub fn explain(
         Some(Shading::Phong) => Vec::new(),
         _ => hidden_cones(world),
     };
-    Ok(SceneExplanation { census: Census::of(world), hidden_cones, frame, variants })
+    Ok(SceneExplanation { census: Census::of(world), hidden_cones, frame, light_lists, variants })
 }
 
 impl SceneExplanation {
@@ -98,6 +106,10 @@ impl SceneExplanation {
         }
         text.push_str("\nThe frame\n");
         for line in self.frame.to_text().lines() {
+            let _ = writeln!(text, "  {line}");
+        }
+        text.push_str("\nLight lists\n");
+        for line in &self.light_lists {
             let _ = writeln!(text, "  {line}");
         }
         text.push_str("\nShader variants\n");

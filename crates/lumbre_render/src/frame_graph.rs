@@ -11,7 +11,7 @@ use crate::draws::{Batch, Draws};
 use crate::extract::{LitPass, Traits};
 use crate::mesh_buffers::MeshBuffers;
 use crate::pipelines::{DEPTH_FORMAT, Pipelines};
-use crate::shader::DisplayVariant;
+use crate::shader::{DisplayVariant, Feature};
 use crate::{Display, FrameOptions, FrameTarget, Gpu, RenderError};
 
 /// The largest finite half float.
@@ -41,7 +41,8 @@ pub(crate) struct Prepared<'a> {
     pub pipelines: &'a Pipelines,
     pub meshes: &'a MeshBuffers,
     pub flat_rule: FlatRule,
-    pub frame_group: Option<&'a wgpu::BindGroup>,
+    /// Of group 0, for variants without clusters and with them.
+    pub frame_groups: [Option<&'a wgpu::BindGroup>; 2],
     pub display: &'a DisplayPass,
     pub display_key: Option<(DisplayVariant, wgpu::TextureFormat)>,
     pub background: Vec3,
@@ -211,11 +212,9 @@ fn draw_batches<'a>(
     prepared: Option<&'a Prepared<'a>>,
     batches: impl FnOnce(&'a Draws) -> &'a [Batch],
 ) -> lumbre_graph::BodyResult {
-    let Some((prepared, frame_group)) = prepared.and_then(|p| Some((p, p.frame_group?))) else {
-        return Ok(());
-    };
+    let Some(prepared) = prepared else { return Ok(()) };
     let pass = &mut *context.pass;
-    pass.set_bind_group(0, frame_group, &[]);
+    let mut bound = None;
     for batch in batches(prepared.draws) {
         let (Some(pipeline), Some(mesh)) =
             (prepared.pipelines.get(&batch.pipeline), prepared.meshes.get(batch.mesh))
@@ -227,6 +226,12 @@ fn draw_batches<'a>(
             continue;
         }
         pass.set_pipeline(&pipeline.pipeline);
+        let clustered = batch.pipeline.variant.has(Feature::Clusters);
+        if bound != Some(clustered) {
+            let Some(group) = prepared.frame_groups[usize::from(clustered)] else { continue };
+            pass.set_bind_group(0, group, &[]);
+            bound = Some(clustered);
+        }
         if let Some(set) = &batch.texture_set {
             pass.set_bind_group(1, &set.bind_group, &[]);
         }

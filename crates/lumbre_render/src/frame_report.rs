@@ -11,7 +11,8 @@ pub struct Statistics {
     pub lights: u32,
     /// Of these, the static ones: a lightmapped mesh takes their highlights only. 0 while lightmaps are switched off.
     pub static_lights: u32,
-    /// Lights that reach an object in view, on average: what each of its vertices or fragments loops over.
+    /// Lights in the list of an object in view, on average: what each of its vertices or fragments loops over. Where fragments find
+    /// lights with a range by clusters, these are not in it.
     pub lights_per_object: f32,
     /// Objects in view.
     pub objects: usize,
@@ -23,8 +24,52 @@ pub struct Statistics {
     pub draws: usize,
     /// Forward shader variants compiled so far.
     pub variants: usize,
+    /// How fragments and vertices find their lights.
+    pub light_lists: LightListing,
+    /// What the CPU did, stage by stage.
+    pub cpu: CpuStages,
     /// Bytes of components uploaded for this frame because they changed.
     pub uploaded_bytes: u64,
+}
+
+/// By which lists lights are found, with their sizes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct LightListing {
+    /// Whether Phong fragments find lights with a range by clusters.
+    pub clustered: bool,
+    /// Columns, rows and slices of depth of the clusters; 0 without.
+    pub clusters: [u32; 3],
+    /// Pixels along the side of a cluster's tile; 0 without.
+    pub tile_side: u32,
+    /// Entries of all clusters' lists.
+    pub entries: usize,
+    /// Of these, the inverse-square lights of one colour, which have lean records.
+    pub inverse_square_lights: u32,
+    /// Other lights with a range: with a cone, an attenuation of their own, several colours.
+    pub other_ranged_lights: u32,
+    /// Lights without a range, directional and polygon lights: they are in the lists of objects always.
+    pub unbounded_lights: u32,
+}
+
+/// Milliseconds of a frame on the CPU, from the call of `render` until it was submitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct CpuStages {
+    /// Transforms carried down the hierarchy.
+    pub transforms_ms: f64,
+    /// Changed objects and their bounds.
+    pub objects_ms: f64,
+    /// Lights and their records.
+    pub lights_ms: f64,
+    /// Culling, sorting, batches, and the lists of objects.
+    pub draws_ms: f64,
+    /// The lists of clusters.
+    pub clusters_ms: f64,
+    /// Buffers and pipelines.
+    pub upload_ms: f64,
+    /// The graph, its passes' commands, and their submission.
+    pub encoding_ms: f64,
+    /// All of it.
+    pub total_ms: f64,
 }
 
 /// What became of a frame.

@@ -6,19 +6,32 @@ use bytemuck::Pod;
 
 use crate::{Gpu, RenderError};
 
+/// Values between two changes that are sent along with them.
+const COALESCED: usize = 16;
+
 /// A mirrored storage buffer.
 #[derive(Debug)]
 pub(crate) struct GrowableBuffer<T> {
     label: &'static str,
     pub values: Vec<T>,
     dirty: Vec<Range<usize>>,
+    /// Values that there is room for from the start.
+    least: usize,
     buffer: Option<wgpu::Buffer>,
     capacity: usize,
+    usage: wgpu::BufferUsages,
 }
 
 impl<T: Pod + PartialEq> GrowableBuffer<T> {
     pub fn new(label: &'static str) -> Self {
-        Self { label, values: Vec::new(), dirty: Vec::new(), buffer: None, capacity: 0 }
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        Self { label, values: Vec::new(), dirty: Vec::new(), least: 1, buffer: None, capacity: 0, usage }
+    }
+
+    /// A buffer that is a uniform one too, of which shaders read `least` values whether they are there or not.
+    pub fn uniform(label: &'static str, least: usize) -> Self {
+        let new = Self::new(label);
+        Self { least, usage: new.usage | wgpu::BufferUsages::UNIFORM, ..new }
     }
 
     /// Sets one value and remembers it for the next upload.
@@ -28,8 +41,10 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         }
         self.values[index] = value;
         match self.dirty.last_mut() {
-            Some(last) if last.end == index => last.end += 1,
-            Some(last) if last.contains(&index) => {}
+            // A few values between two changes are cheaper to send than another copy.
+            Some(last) if index >= last.start && index <= last.end + COALESCED => {
+                last.end = last.end.max(index + 1);
+            }
             _ => self.dirty.push(index..index + 1),
         }
     }
@@ -66,12 +81,12 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
                 return Err(RenderError::BufferTooLarge { what: self.label, bytes, limit });
             }
             let most = usize::try_from(limit).unwrap_or(usize::MAX) / size_of::<T>();
-            self.capacity = self.values.len().next_power_of_two().max(1).min(most);
+            self.capacity = self.values.len().next_power_of_two().max(self.least).min(most);
             let size = (self.capacity * size_of::<T>()) as u64;
             self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(self.label),
                 size,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                usage: self.usage,
                 mapped_at_creation: false,
             }));
             self.dirty.clear();
@@ -109,5 +124,10 @@ mod tests {
         assert_eq!(buffer.pending_bytes(), 0);
         buffer.replace([1, 9, 3]);
         assert_eq!((buffer.pending_bytes(), buffer.values.as_slice()), (4, [1, 9, 3].as_slice()));
+        // What changed close together is sent in one piece, what did not apart.
+        buffer.replace(0..100);
+        buffer.dirty.clear();
+        buffer.replace((0..100).map(|value| if [3, 9, 90].contains(&value) { 0 } else { value }));
+        assert_eq!(buffer.dirty, [3..10, 90..91]);
     }
 }

@@ -1,7 +1,7 @@
 //! The bytes that shaders read. Layout twins of shaders/frame.wesl and shaders/optics/evaluate_light.wesl, field by field.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3};
 use lumbre_optics::{
     DEFAULT_IOR, Fresnel, LARGEST_COEFFICIENT, LARGEST_INTENSITY, Light, LightKind, Material, PolygonLight,
     SpotCone, SpotCosines, Surface,
@@ -241,6 +241,50 @@ impl LightData {
     }
 }
 
+/// `InverseSquareLight`: what a fragment needs of a light without a cone, of one colour, whose attenuation is the inverse square within
+/// a range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct InverseSquareLightData {
+    position: Vec3,
+    inverse_range_squared: f32,
+    color: Vec3,
+    padding: f32,
+}
+
+impl InverseSquareLightData {
+    /// A light that adds nothing.
+    pub const BLACK: Self =
+        Self { position: Vec3::ZERO, inverse_range_squared: 1.0, color: Vec3::ZERO, padding: 0.0 };
+
+    /// A light in frame space.
+    pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
+        let range = f64::from(light.attenuation.range);
+        Self {
+            position: (transform.translation() - origin).as_vec3(),
+            inverse_range_squared: (1.0 / (range * range)) as f32,
+            color: light.diffuse,
+            padding: 0.0,
+        }
+    }
+}
+
+/// `ClusterGrid`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ClusterGridData {
+    /// Columns, rows and slices.
+    pub size: UVec3,
+    pub ranged_offsets: u32,
+    pub tiles_per_pixel: f32,
+    pub depth_scale: f32,
+    pub depth_bias: f32,
+    pub logarithmic: u32,
+    pub first_baked_inverse_square: u32,
+    pub first_baked_ranged: u32,
+    pub padding: [u32; 2],
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,5 +295,7 @@ mod tests {
         assert_eq!(size_of::<ObjectData>(), 96);
         assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 4 * 16);
         assert_eq!(size_of::<LightData>(), 96);
+        assert_eq!(size_of::<InverseSquareLightData>(), 32);
+        assert_eq!(size_of::<ClusterGridData>(), 48);
     }
 }

@@ -3,7 +3,7 @@
 //! ```text
 //!   World ──► extract ─────────► draws ──────────────► frame_graph ───────────────► target
 //!             changed components  cull, sort, batch     background ► lightmap ►        Offscreen or
-//!             to GPU buffers      variant per object    forward ► transparent ►        WindowSurface
+//!             to GPU buffers      variants, light lists    forward ► transparent ►        WindowSurface
 //!                 │                    │                display ► overlay
 //!                 └──── traits ────────┴──► explain: what the scene calls for, and what not
 //! ```
@@ -30,6 +30,7 @@
 //! # Ok::<(), lumbre_render::RenderError>(())
 //! ```
 
+mod cluster_buffers;
 mod display;
 mod draws;
 mod error;
@@ -40,6 +41,8 @@ mod frame_report;
 mod gpu;
 mod growable_buffer;
 mod layout;
+mod light_clusters;
+mod light_grid;
 mod light_lists;
 mod mesh_buffers;
 mod metering;
@@ -55,11 +58,11 @@ mod window_surface;
 
 pub use error::RenderError;
 pub use explain::{SceneExplanation, explain};
-pub use frame_report::{FrameReport, Statistics};
+pub use frame_report::{CpuStages, FrameReport, LightListing, Statistics};
 pub use gpu::Gpu;
 pub use metering::{Metering, meter};
 pub use offscreen::{Offscreen, OffscreenFormat};
-pub use options::{Display, FrameOptions, Measure};
+pub use options::{Display, FrameOptions, LightLists, Measure};
 pub use renderer::Renderer;
 pub use target::FrameTarget;
 pub use window_surface::{Acquired, SurfaceFrame, WindowSurface};

@@ -8,16 +8,23 @@ use bevy_ecs::entity::Entity;
 use glam::DVec3;
 
 use crate::RenderError;
-use crate::extract::LightReach;
+use crate::extract::{LightClass, LightReach};
 use crate::layout::InstanceData;
+use crate::light_grid::LightGrid;
 
 /// Bytes of one index on the device.
 const INDEX_BYTES: u64 = size_of::<u32>() as u64;
 
 /// Lists of light indices; objects that the same lights reach share one.
 #[derive(Debug)]
-pub(crate) struct LightLists<'a> {
+pub(crate) struct ObjectLightLists<'a> {
     reaches: &'a [LightReach],
+    everything: bool,
+    /// Made when an object first asks.
+    grid: Option<LightGrid>,
+    near: Vec<u32>,
+    /// Lights that no cluster's list has.
+    unbounded: Vec<u32>,
     /// All lists, one after the other.
     pub indices: Vec<u32>,
     known: HashMap<Vec<u32>, InstanceData>,
@@ -27,26 +34,64 @@ pub(crate) struct LightLists<'a> {
     needed: u64,
 }
 
-impl<'a> LightLists<'a> {
+impl<'a> ObjectLightLists<'a> {
     /// No lists yet. Baked lights stand last in `reaches`; the device's buffers hold `bytes`.
-    pub fn new(reaches: &'a [LightReach], bytes: u64) -> Self {
+    /// With `everything` each list has every light.
+    pub fn new(reaches: &'a [LightReach], everything: bool, bytes: u64) -> Self {
         let most = (bytes / INDEX_BYTES).min(u64::from(u32::MAX));
-        Self { reaches, indices: Vec::new(), known: HashMap::new(), lengths: (0, 0), most, needed: 0 }
+        let unbounded = (0..).zip(reaches).filter(|(_, light)| light.class == LightClass::Unbounded);
+        let unbounded = unbounded.map(|(index, _)| index).collect();
+        Self {
+            reaches,
+            everything,
+            grid: None,
+            near: Vec::new(),
+            unbounded,
+            indices: Vec::new(),
+            known: HashMap::new(),
+            lengths: (0, 0),
+            most,
+            needed: 0,
+        }
     }
 
-    /// The list of an object with this bounding box in the world (its `object` is 0).
-    pub fn reaching(&mut self, entity: Entity, center: DVec3, half_size: DVec3) -> InstanceData {
+    /// The list of an object with this bounding box in the world (its `object` is 0). Where the object's fragments have lists of their
+    /// own (`clustered`), only of the lights that those do not have.
+    pub fn reaching(
+        &mut self,
+        entity: Entity,
+        center: DVec3,
+        half_size: DVec3,
+        clustered: bool,
+    ) -> InstanceData {
+        if clustered && self.unbounded.is_empty() {
+            self.lengths.1 += 1;
+            return InstanceData::default();
+        }
+        let everything = self.everything;
         let reaches = |light: &LightReach| {
             if let Some(polygon) = light.polygon {
                 let farthest =
                     (center - light.center).dot(polygon.front) + half_size.dot(polygon.front.abs());
                 return polygon.emitter != entity && farthest > 0.0;
             }
+            if everything {
+                return true;
+            }
             let outside = ((light.center - center).abs() - half_size).max(DVec3::ZERO);
             light.radius.is_infinite() || outside.length() < light.radius
         };
-        let found = self.reaches.iter().zip(0..).filter(|(light, _)| reaches(light));
-        let list: Vec<u32> = found.map(|(_, index)| index).collect();
+        let reached = |index: &u32| reaches(&self.reaches[*index as usize]);
+        let list: Vec<u32> = if clustered {
+            self.unbounded.iter().copied().filter(reached).collect()
+        } else if everything {
+            let all = u32::try_from(self.reaches.len()).unwrap_or(u32::MAX);
+            (0..all).filter(reached).collect()
+        } else {
+            let grid = self.grid.get_or_insert_with(|| LightGrid::new(self.reaches));
+            grid.near(center, half_size, &mut self.near);
+            self.near.iter().copied().filter(reached).collect()
+        };
         self.lengths = (self.lengths.0 + list.len() as u64, self.lengths.1 + 1);
         if let Some(known) = self.known.get(&list) {
             return *known;
@@ -97,6 +142,7 @@ mod tests {
     #[test]
     fn an_object_gets_the_lights_whose_range_touches_it_baked_ones_last() {
         let light = |x: f64, radius, baked| LightReach {
+            class: LightClass::Ranged,
             center: DVec3::new(x, 0.0, 0.0),
             radius,
             baked,
@@ -110,30 +156,36 @@ mod tests {
             light(1.0, 1.0, true),
             light(30.0, 1.0, true),
         ];
-        let mut lists = LightLists::new(&reaches, u64::MAX);
-        let near = lists.reaching(object, DVec3::ZERO, DVec3::splat(0.5));
+        let mut lists = ObjectLightLists::new(&reaches, false, u64::MAX);
+        let near = lists.reaching(object, DVec3::ZERO, DVec3::splat(0.5), false);
         assert_eq!(lists.indices, [0, 1, 3]);
         assert_eq!((near.first_light, near.dynamic_end, near.static_end), (0, 2, 3));
-        let far = lists.reaching(object, DVec3::new(11.0, 0.0, 0.0), DVec3::splat(0.5));
+        let far = lists.reaching(object, DVec3::new(11.0, 0.0, 0.0), DVec3::splat(0.5), false);
         assert_eq!(lists.indices, [0, 1, 3, 1, 2]);
         assert_eq!((far.first_light, far.dynamic_end, far.static_end), (3, 5, 5));
         // The same lights, the same list.
-        assert_eq!(lists.reaching(object, DVec3::new(0.1, 0.0, 0.0), DVec3::splat(0.5)), near);
+        assert_eq!(lists.reaching(object, DVec3::new(0.1, 0.0, 0.0), DVec3::splat(0.5), false), near);
         assert_eq!(lists.indices.len(), 5);
         // A box that touches the sphere meets it where the window is 0 already.
-        assert_eq!(lists.reaching(object, DVec3::new(-3.0, 0.0, 0.0), DVec3::ONE).static_end, 6);
+        assert_eq!(lists.reaching(object, DVec3::new(-3.0, 0.0, 0.0), DVec3::ONE, false).static_end, 6);
     }
 
     #[test]
     fn lists_beyond_the_devices_buffer_are_refused_and_not_stored() {
-        let light = |x: f64| LightReach { center: DVec3::X * x, radius: 1.5, baked: false, polygon: None };
+        let light = |x: f64| LightReach {
+            class: LightClass::Ranged,
+            center: DVec3::X * x,
+            radius: 1.5,
+            baked: false,
+            polygon: None,
+        };
         let reaches: Vec<LightReach> = (0..10).map(|x| light(f64::from(x))).collect();
         // Two lights reach each point half way between neighbours: each object has a list of its own.
         let fill = |objects: u32, bytes: u64| {
-            let mut lists = LightLists::new(&reaches, bytes);
+            let mut lists = ObjectLightLists::new(&reaches, false, bytes);
             for object in 0..objects {
                 let middle = DVec3::X * (f64::from(object) + 0.5);
-                lists.reaching(Entity::PLACEHOLDER, middle, DVec3::ZERO);
+                lists.reaching(Entity::PLACEHOLDER, middle, DVec3::ZERO, false);
             }
             (lists.indices.len(), lists.check())
         };
@@ -150,11 +202,17 @@ mod tests {
     fn a_polygon_reaches_what_lies_before_it_and_is_not_its_own() {
         let [lamp, other] = [1, 2].map(|index| Entity::from_raw_u32(index).unwrap());
         let polygon = Some(PolygonReach { front: DVec3::new(0.0, -1e-3, 0.0), emitter: lamp });
-        let light = LightReach { center: DVec3::Y * 2.0, radius: f64::INFINITY, baked: false, polygon };
+        let light = LightReach {
+            class: LightClass::Unbounded,
+            center: DVec3::Y * 2.0,
+            radius: f64::INFINITY,
+            baked: false,
+            polygon,
+        };
         let reaches = [light];
-        let mut lists = LightLists::new(&reaches, u64::MAX);
+        let mut lists = ObjectLightLists::new(&reaches, false, u64::MAX);
         let mut count = |entity, y: f64, half: f64| {
-            let list = lists.reaching(entity, DVec3::Y * y, DVec3::splat(half));
+            let list = lists.reaching(entity, DVec3::Y * y, DVec3::splat(half), false);
             list.static_end - list.first_light
         };
         assert_eq!(count(other, 0.0, 0.5), 1);

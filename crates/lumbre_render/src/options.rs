@@ -46,6 +46,20 @@ pub enum Measure {
     TimeAndInvocations,
 }
 
+/// By which lists a fragment finds its lights. What is drawn is the same to rounding: a light that is in no list adds nothing there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum LightLists {
+    /// By clusters where the scene has many lights with a range, else by objects.
+    #[default]
+    Auto,
+    /// A list for each object, by its bounding box.
+    Objects,
+    /// A list for each cluster of pixels and depths, for lights with a range under Phong shading.
+    Clusters,
+    /// Every light for every object: brute force, to compare with.
+    Everything,
+}
+
 /// Choices for one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
@@ -59,6 +73,8 @@ pub struct FrameOptions {
     pub flat_rule: Option<FlatRule>,
     /// Filters highlights within pixels under Phong shading, or not, whatever the scene says.
     pub specular_antialiasing: Option<bool>,
+    /// By which lists lights are found.
+    pub light_lists: LightLists,
     /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
     pub lightmaps: bool,
     /// Four samples per pixel instead of one.
@@ -83,6 +99,7 @@ impl Default for FrameOptions {
             reflection: None,
             flat_rule: None,
             specular_antialiasing: None,
+            light_lists: LightLists::Auto,
             lightmaps: true,
             multisample: false,
             display: Display::Srgb,

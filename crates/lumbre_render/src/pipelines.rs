@@ -40,18 +40,20 @@ pub(crate) struct Pipeline {
 #[derive(Debug)]
 pub(crate) struct Pipelines {
     frame_layout: wgpu::BindGroupLayout,
+    clustered_layout: wgpu::BindGroupLayout,
     modules: HashMap<Variant, wgpu::ShaderModule>,
     pipelines: HashMap<PipelineKey, Pipeline>,
 }
 
 impl Pipelines {
     pub fn new(gpu: &Gpu) -> Self {
-        Self { frame_layout: frame_layout(gpu), modules: HashMap::new(), pipelines: HashMap::new() }
+        let [frame_layout, clustered_layout] = [false, true].map(|clustered| frame_layout(gpu, clustered));
+        Self { frame_layout, clustered_layout, modules: HashMap::new(), pipelines: HashMap::new() }
     }
 
-    /// The layout of group 0.
-    pub fn frame_layout(&self) -> &wgpu::BindGroupLayout {
-        &self.frame_layout
+    /// The layout of group 0, of variants that read clusters' lists or of those that do not.
+    pub fn frame_layout(&self, clustered: bool) -> &wgpu::BindGroupLayout {
+        if clustered { &self.clustered_layout } else { &self.frame_layout }
     }
 
     /// Number of shader variants compiled so far.
@@ -75,7 +77,11 @@ impl Pipelines {
         };
         let textures = sets.layout(gpu, key.texture_mask);
         let lightmap = key.variant.has(Feature::Lightmap).then(|| sets.lightmap_layout(gpu));
-        let pipeline = make(gpu, module, &self.frame_layout, [textures.as_ref(), lightmap.as_ref()], key)?;
+        let frame = match key.variant.has(Feature::Clusters) {
+            true => &self.clustered_layout,
+            false => &self.frame_layout,
+        };
+        let pipeline = make(gpu, module, frame, [textures.as_ref(), lightmap.as_ref()], key)?;
         self.pipelines.insert(key, pipeline);
         Ok(())
     }
@@ -107,24 +113,28 @@ pub(crate) fn is_flat(variant: &Variant) -> bool {
     variant.has(Feature::Lit) && variant.shading == Shading::Flat
 }
 
-fn frame_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+fn frame_layout(gpu: &Gpu, clustered: bool) -> wgpu::BindGroupLayout {
+    let entry = |visibility, binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
-        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        visibility,
         ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
         count: None,
     };
-    let storage = wgpu::BufferBindingType::Storage { read_only: true };
+    let (storage, uniform) =
+        (wgpu::BufferBindingType::Storage { read_only: true }, wgpu::BufferBindingType::Uniform);
+    let both = wgpu::ShaderStages::VERTEX_FRAGMENT;
+    let mut entries = vec![entry(both, 0, uniform)];
+    entries.extend((1..=5).map(|binding| entry(both, binding, storage)));
+    if clustered {
+        let fragment = wgpu::ShaderStages::FRAGMENT;
+        entries.extend(
+            [(6, uniform), (7, storage), (8, uniform), (9, storage)]
+                .map(|(binding, ty)| entry(fragment, binding, ty)),
+        );
+    }
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("frame"),
-        entries: &[
-            entry(0, wgpu::BufferBindingType::Uniform),
-            entry(1, storage),
-            entry(2, storage),
-            entry(3, storage),
-            entry(4, storage),
-            entry(5, storage),
-        ],
+        label: Some(if clustered { "frame with clusters" } else { "frame" }),
+        entries: &entries,
     })
 }
 

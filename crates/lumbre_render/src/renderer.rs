@@ -1,22 +1,29 @@
 //! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
 //! these has its own file.
 
+use std::time::Instant;
+
 use bevy_ecs::prelude::*;
 use lumbre_graph::Executor;
 use lumbre_scene::{SceneSettings, propagate_transforms};
 
+use crate::cluster_buffers::ClusterBuffers;
 use crate::display::DisplayPass;
 use crate::draws::Draws;
 use crate::extract::{CameraView, Emitters, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
 use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, InstanceData, LightData, radiance};
-use crate::light_lists::LightLists;
+use crate::light_clusters::ClusteredView;
+use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::MeshBuffers;
 use crate::pipelines::{Pipelines, attributes, is_flat};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
-use crate::{Display, FrameOptions, FrameReport, FrameTarget, Gpu, Measure, RenderError, Statistics};
+use crate::{
+    CpuStages, Display, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, Measure,
+    RenderError, Statistics,
+};
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
 pub struct Renderer {
@@ -27,6 +34,7 @@ pub struct Renderer {
     lights: GrowableBuffer<LightData>,
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
+    clusters: ClusterBuffers,
     meshes: MeshBuffers,
     textures: Textures,
     sets: TextureSets,
@@ -34,6 +42,7 @@ pub struct Renderer {
     display: DisplayPass,
     frame_uniform: wgpu::Buffer,
     frame_group: Option<wgpu::BindGroup>,
+    clustered_group: Option<wgpu::BindGroup>,
     /// Of the last frame.
     left_out: Vec<String>,
 }
@@ -49,6 +58,7 @@ impl Renderer {
             lights: GrowableBuffer::new("lights"),
             instances: GrowableBuffer::new("instances"),
             light_list: GrowableBuffer::new("light list"),
+            clusters: ClusterBuffers::new(),
             meshes: MeshBuffers::default(),
             textures: Textures::default(),
             sets: TextureSets::default(),
@@ -61,6 +71,7 @@ impl Renderer {
                 mapped_at_creation: false,
             }),
             frame_group: None,
+            clustered_group: None,
             left_out: Vec::new(),
         }
     }
@@ -110,8 +121,12 @@ impl Renderer {
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
         self.gpu.check()?;
+        let begun = Instant::now();
+        let mut clock = Clock { last: begun };
+        let mut cpu = CpuStages::default();
         // The system cannot fail: it has no parameter that may be missing.
         let _ = world.run_system_cached(propagate_transforms);
+        cpu.transforms_ms = clock.lap();
         let mut settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
         // As lights, a fog made in code whose numbers no file may have is left out.
         let fog_fault = settings.fog.and_then(|fog| fog.validate("scene").err());
@@ -129,12 +144,14 @@ impl Renderer {
             &mut self.sets,
             view.eye,
         )?;
-        let (mut lights, mut reaches) =
+        cpu.objects_ms = clock.lap();
+        let mut lights =
             extract_lights(world, &mut self.emitters, &mut self.lights, self.objects.origin, &mut left_out)?;
         self.warn_once(&left_out);
+        cpu.lights_ms = clock.lap();
         if !options.lightmaps {
-            lights.dynamic = lights.all;
-            reaches.iter_mut().for_each(|reach| reach.baked = false);
+            lights.set = lights.set.without_lightmaps();
+            lights.reaches.iter_mut().for_each(|reach| reach.baked = false);
         }
         let exposure = options.exposure.unwrap_or(view.exposure);
         if !(exposure > 0.0 && exposure.is_finite()) {
@@ -150,17 +167,26 @@ impl Renderer {
             lightmaps: options.lightmaps,
             clamp: options.display == Display::Clamp,
             half: plan.format == wgpu::TextureFormat::Rgba16Float,
-            lights,
+            lights: lights.set,
+            clustered: lights.set.are_clustered(options.light_lists),
         };
         let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
-        let mut lists = LightLists::new(&reaches, limit);
+        let everything = options.light_lists == LightLists::Everything;
+        let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
         let target_kind = (plan.format, plan.samples);
         let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
         lists.check()?;
+        cpu.draws_ms = clock.lap();
         self.instances.replace(draws.instances.iter().copied());
         self.light_list.replace(lists.indices.iter().copied());
-        let uploaded_bytes = self.upload(&view, &settings, &lights, exposure)?;
+        if let Some(depths) = draws.clustered_depths {
+            let (origin, size) = (self.objects.origin, [target.width, target.height]);
+            self.clusters.build(&ClusteredView { view, origin, size, depths }, &lights);
+        }
+        let clustered = draws.clustered_depths.is_some();
+        cpu.clusters_ms = clock.lap();
+        let uploaded_bytes = self.upload(&view, &settings, &lights.set, exposure, clustered)?;
         let mut triangles = 0;
         for batch in draws.batches() {
             self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline)?;
@@ -174,9 +200,22 @@ impl Renderer {
             true => None,
             false => Some(self.display.prepare(&self.gpu, options.display, target.format, exposure)?),
         };
-        let statistics = Statistics {
-            lights: lights.all,
-            static_lights: lights.all - lights.dynamic,
+        cpu.upload_ms = clock.lap();
+        let clusters = &self.clusters.clusters;
+        let light_lists = LightListing {
+            clustered,
+            clusters: if clustered { clusters.grid.size.to_array() } else { [0; 3] },
+            tile_side: if clustered { clusters.tile_side } else { 0 },
+            entries: if clustered { clusters.entries } else { 0 },
+            inverse_square_lights: lights.set.inverse_square.all,
+            other_ranged_lights: lights.set.ranged.all,
+            unbounded_lights: lights.set.unbounded.all,
+        };
+        let mut statistics = Statistics {
+            light_lists,
+            cpu,
+            lights: lights.set.every.all,
+            static_lights: lights.set.every.all - lights.set.every.dynamic,
             lights_per_object: lists.mean_length(),
             objects: draws.instances.len(),
             objects_outside: draws.outside,
@@ -191,19 +230,22 @@ impl Renderer {
             Measure::TimeAndInvocations => lumbre_graph::Measure::ALL,
         });
         self.executor.enable_probe(options.probe);
+        self.executor.begun_at(begun);
         let prepared = Prepared {
             flat_rule,
             gpu: &self.gpu,
             draws: &draws,
             pipelines: &self.pipelines,
             meshes: &self.meshes,
-            frame_group: self.frame_group.as_ref(),
+            frame_groups: [self.frame_group.as_ref(), self.clustered_group.as_ref()],
             display: &self.display,
             display_key,
             background: plan.in_range(radiance(settings.background)),
         };
         let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
         self.gpu.check()?;
+        statistics.cpu.encoding_ms = clock.lap();
+        statistics.cpu.total_ms = milliseconds(begun);
         let measured = self.executor.latest_report().cloned();
         Ok(FrameReport { statistics, plan: frame.plan, measured, left_out })
     }
@@ -223,6 +265,7 @@ impl Renderer {
         settings: &SceneSettings,
         lights: &LightSet,
         exposure: f32,
+        clustered: bool,
     ) -> Result<u64, RenderError> {
         let origin = self.objects.origin;
         let fog = settings.fog.as_ref();
@@ -239,45 +282,76 @@ impl Renderer {
             fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
         };
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&data));
-        let bytes = self.objects.transforms.pending_bytes()
+        let mut bytes = self.objects.transforms.pending_bytes()
             + self.objects.materials.pending_bytes()
             + self.lights.pending_bytes()
             + self.instances.pending_bytes()
             + self.light_list.pending_bytes();
-        let renewed = [
+        let mut renewed = vec![
             self.objects.transforms.upload(&self.gpu),
             self.objects.materials.upload(&self.gpu),
             self.instances.upload(&self.gpu),
             self.lights.upload(&self.gpu),
             self.light_list.upload(&self.gpu),
         ];
+        if clustered {
+            bytes += self.clusters.pending_bytes();
+            renewed.push(self.clusters.upload(&self.gpu));
+        }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
-            // Whatever fails below, the old group names buffers that are gone.
+            // Whatever fails below, the old groups name buffers that are gone.
             self.frame_group = None;
+            self.clustered_group = None;
         }
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
         if self.frame_group.is_none() {
-            let buffers = [
-                Some(&self.frame_uniform),
-                self.objects.transforms.buffer(),
-                self.objects.materials.buffer(),
-                self.instances.buffer(),
-                self.lights.buffer(),
-                self.light_list.buffer(),
-            ];
-            let entries: Vec<_> = buffers
-                .iter()
-                .zip(0..)
-                .filter_map(|(buffer, binding)| {
-                    Some(wgpu::BindGroupEntry { binding, resource: (*buffer)?.as_entire_binding() })
-                })
-                .collect();
-            self.frame_group = Some(self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("frame"),
-                layout: self.pipelines.frame_layout(),
-                entries: &entries,
-            }));
+            self.frame_group = Some(self.group(false));
+        }
+        if clustered && self.clustered_group.is_none() {
+            self.clustered_group = Some(self.group(true));
         }
         Ok(bytes)
     }
+
+    /// Group 0, of variants that read clusters' lists or of those that do not.
+    fn group(&self, clustered: bool) -> wgpu::BindGroup {
+        let buffers = [
+            Some(&self.frame_uniform),
+            self.objects.transforms.buffer(),
+            self.objects.materials.buffer(),
+            self.instances.buffer(),
+            self.lights.buffer(),
+            self.light_list.buffer(),
+        ];
+        let bindings =
+            (0..).zip(buffers).filter_map(|(binding, buffer)| Some((binding, buffer?.as_entire_binding())));
+        let of_clusters = self.clusters.bindings().filter(|_| clustered).into_iter().flatten();
+        let entries: Vec<_> = bindings
+            .chain(of_clusters)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(if clustered { "frame with clusters" } else { "frame" }),
+            layout: self.pipelines.frame_layout(clustered),
+            entries: &entries,
+        })
+    }
+}
+
+/// Times the stages of a frame.
+struct Clock {
+    last: Instant,
+}
+
+impl Clock {
+    /// Milliseconds since the last call.
+    fn lap(&mut self) -> f64 {
+        let lap = milliseconds(self.last);
+        self.last = Instant::now();
+        lap
+    }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }

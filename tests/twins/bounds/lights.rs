@@ -16,6 +16,13 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
     U * factor * ((13.0 + 2.0 * roundings) * window + (28.0 + 4.0 * roundings) * ratio.powi(4)) + FLUSHED
 }
 
+/// attenuate_inverse_square: 8 u of it, and 4 u (d/range)⁴ times the factor without its window.
+pub fn attenuate_inverse_square(inverse_range_squared: f64, distance_squared: f64) -> f64 {
+    let factor = lumbre_optics::attenuate_inverse_square(0.0, distance_squared);
+    let fourth_power = (distance_squared * inverse_range_squared).min(1.0).powi(2);
+    U * factor * (8.0 * (1.0 - fourth_power) + 4.0 * fourth_power) + FLUSHED
+}
+
 /// spot_factor for a cosine that may be off. Smooth: 15 u, and twice the cosine's error over the width. Exponent: `safe_pow`, and
 /// either side of the edge where the cosine is within its error of it.
 pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine: Off) -> Allowed {

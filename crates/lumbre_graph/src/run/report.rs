@@ -117,7 +117,8 @@ pub struct NonFinite {
 pub struct FrameReport {
     /// The frame, counted from 1 by the executor.
     pub frame: u64,
-    /// Milliseconds of the whole of `execute` on the CPU.
+    /// Milliseconds on the CPU until the frame was submitted: of the whole of `execute`, and of what came before it since
+    /// `Executor::begun_at`.
     pub cpu_ms: Option<f64>,
     /// Milliseconds from the first pass's begin to the last one's end on the GPU.
     pub gpu_ms: Option<f64>,

@@ -6,13 +6,23 @@ use lumbre_scene::{ActiveCamera, Camera, GlobalTransform, Projection};
 
 use crate::RenderError;
 
+/// What a camera sees, as its projection tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum ViewVolume {
+    /// Half the frame's width and height at depth 1, and the near plane's depth in metres.
+    Perspective { half_width: f64, half_height: f64, near: f64 },
+    /// Half the frame's width and height, negative where it is mirrored, and both planes' depths, all in metres.
+    Orthographic { half_width: f64, half_height: f64, near: f64, far: f64 },
+}
+
 /// A camera in the world, with an orthonormal basis and a reversed-Z projection.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CameraView {
     pub eye: DVec3,
     /// Columns: right, up, backward.
     pub basis: DMat3,
     pub exposure: f32,
+    pub volume: ViewVolume,
     clip_from_view: DMat4,
 }
 
@@ -43,7 +53,7 @@ impl CameraView {
         if !(camera.exposure > 0.0 && camera.exposure.is_finite()) {
             return Err(bad("exposure", f64::from(camera.exposure), "greater than 0 and finite"));
         }
-        let clip_from_view = match camera.projection {
+        let (clip_from_view, volume) = match camera.projection {
             Projection::Perspective { vertical_fov, near, .. } => {
                 if !(vertical_fov > 0.0 && vertical_fov < std::f64::consts::PI) {
                     return Err(bad("vertical_fov", vertical_fov, "between 0 and pi radians"));
@@ -51,7 +61,9 @@ impl CameraView {
                 if !(near > 0.0 && near.is_finite()) {
                     return Err(bad("near", near, "greater than 0 metres"));
                 }
-                perspective_reversed(vertical_fov, aspect, near)
+                let half_height = (0.5 * vertical_fov).tan();
+                let volume = ViewVolume::Perspective { half_width: half_height * aspect, half_height, near };
+                (perspective_reversed(vertical_fov, aspect, near), volume)
             }
             Projection::Orthographic { half_width, half_height, near, far } => {
                 if !(half_width != 0.0 && half_width.is_finite()) {
@@ -63,7 +75,8 @@ impl CameraView {
                 if !(far > near && near.is_finite() && far.is_finite()) {
                     return Err(bad("far", far, "greater than `near`"));
                 }
-                orthographic_reversed(half_width, half_height, near, far)
+                let volume = ViewVolume::Orthographic { half_width, half_height, near, far };
+                (orthographic_reversed(half_width, half_height, near, far), volume)
             }
         };
         let axes = transform.0.matrix3;
@@ -71,7 +84,7 @@ impl CameraView {
         let up = axes.y_axis.reject_from_normalized(backward);
         let up = up.try_normalize().unwrap_or_else(|| backward.any_orthonormal_vector());
         let basis = DMat3::from_cols(up.cross(backward), up, backward);
-        Ok(Self { eye, basis, exposure: camera.exposure, clip_from_view })
+        Ok(Self { eye, basis, exposure: camera.exposure, volume, clip_from_view })
     }
 
     /// From frame space, whose origin stands at `origin` in the world, to clip space.

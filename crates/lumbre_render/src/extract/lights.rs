@@ -2,23 +2,25 @@
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_optics::{BakeMode, Light, LightKind};
+use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, SpotCone};
 use lumbre_scene::{GlobalTransform, Name};
 
 use super::emitters::{EmissivePolygon, Emitters};
-use crate::RenderError;
 use crate::growable_buffer::GrowableBuffer;
-use crate::layout::LightData;
+use crate::layout::{InverseSquareLightData, LightData};
+use crate::light_clusters::NUMBERED_LIGHTS;
+use crate::{LightLists, RenderError};
 
-/// What the shaders need to know of a frame's lights.
+/// From so many lights with a range on they are listed by clusters: with two, finding the cluster costs about what it saves.
+const CLUSTERED_LIGHTS: u32 = 3;
+
+/// Lights of one class, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct LightSet {
+pub(crate) struct LightCounts {
     /// Lights that are shaded in full.
     pub dynamic: u32,
     /// These and the lights that are baked into the lightmaps.
     pub all: u32,
-    /// Sum of the ambient lights.
-    pub ambient: Vec3,
     /// Whether a baked light has an ambient colour.
     pub static_ambient: bool,
     pub directional: bool,
@@ -26,6 +28,70 @@ pub(crate) struct LightSet {
     pub spot: bool,
     /// Whether faces of emissive objects shine.
     pub polygon: bool,
+}
+
+/// What the shaders need to know of a frame's lights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LightSet {
+    /// Sum of the ambient lights, which are in no class.
+    pub ambient: Vec3,
+    /// Lights of all classes.
+    pub every: LightCounts,
+    pub unbounded: LightCounts,
+    pub inverse_square: LightCounts,
+    pub ranged: LightCounts,
+}
+
+/// By what a light can be found, and what has to be asked of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LightClass {
+    /// It has no range, or is directional, or a polygon: it is in the lists of objects.
+    Unbounded,
+    /// A point light without a cone, of one colour, with the inverse square within a range: what most lights of a game are.
+    InverseSquare,
+    /// Any other point light with a range: with a cone, an attenuation of its own, or colours that differ.
+    Ranged,
+}
+
+impl LightClass {
+    /// Of a light that is not ambient.
+    fn of(light: &Light) -> Self {
+        let Attenuation { range, constant, linear, quadratic, clamp } = light.attenuation;
+        if light.kind != LightKind::Point || !range.is_finite() {
+            return Self::Unbounded;
+        }
+        let inverse_square = (constant, linear, quadratic, clamp) == (0.0, 0.0, 1.0, false);
+        let one_color = light.ambient == Vec3::ZERO && light.specular == light.diffuse;
+        let everywhere = cone(light).is_none();
+        // What `attenuate_inverse_square` takes.
+        let usual_range = (1e-9..=1e15).contains(&range);
+        match inverse_square && one_color && everywhere && usual_range {
+            true => Self::InverseSquare,
+            false => Self::Ranged,
+        }
+    }
+}
+
+/// The cone of a light, if it narrows it.
+fn cone(light: &Light) -> Option<SpotCone> {
+    light.spot.filter(|cone| !cone.is_everywhere())
+}
+
+impl LightCounts {
+    fn add(&mut self, light: &Light) {
+        self.dynamic += u32::from(light.bake != BakeMode::Static);
+        self.all += 1;
+        self.static_ambient |= light.bake == BakeMode::Static && light.ambient != Vec3::ZERO;
+        self.directional |= light.kind == LightKind::Directional;
+        self.point |= light.kind == LightKind::Point;
+        self.spot |= cone(light).is_some();
+    }
+
+    fn add_polygon(&mut self, polygon: &EmissivePolygon) {
+        self.dynamic += u32::from(!polygon.baked);
+        self.all += 1;
+        self.polygon = true;
+    }
 }
 
 impl LightSet {
@@ -44,10 +110,62 @@ impl LightSet {
         Ok(set)
     }
 
+    /// With lightmaps switched off nothing counts as baked.
+    pub fn without_lightmaps(mut self) -> Self {
+        for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
+            counts.dynamic = counts.all;
+        }
+        self
+    }
+
+    /// Whether fragments find lights with a range by clusters: with fewer, the lists of objects are as short.
+    pub fn are_clustered(&self, lists: LightLists) -> bool {
+        match lists {
+            LightLists::Auto => self.inverse_square.all + self.ranged.all >= CLUSTERED_LIGHTS,
+            LightLists::Clusters => true,
+            LightLists::Objects | LightLists::Everything => false,
+        }
+    }
+
+    /// By which lists the lights of a frame are found, and why, a line for each kind of list. `clustered` of `objects` shown ones have
+    /// fragments that read clusters' lists.
+    pub fn listing(&self, lists: LightLists, clustered: usize, objects: usize) -> Vec<String> {
+        let (every, inverse_square, ranged) = (self.every.all, self.inverse_square.all, self.ranged.all);
+        if every == 0 {
+            return vec!["none: the scene has no lights but ambient ones".to_owned()];
+        }
+        let mut lines = Vec::new();
+        let with_range = inverse_square + ranged;
+        if clustered > 0 {
+            lines.push(format!(
+                "clusters: {with_range} lights with a range ({CLUSTERED_LIGHTS} are enough), for the fragments of {clustered} \
+                 objects under Phong shading: {inverse_square} inverse-square ones of one colour in lean records, {ranged} others"
+            ));
+        }
+        let why = match (lists, self.are_clustered(lists), clustered) {
+            (LightLists::Everything, ..) => "every light for every object, as was asked".to_owned(),
+            (LightLists::Objects, ..) => format!("{every} lights, as was asked"),
+            (_, false, _) => {
+                format!("{every} lights, {with_range} with a range: fewer than {CLUSTERED_LIGHTS}")
+            }
+            (_, true, 0) => {
+                format!("{every} lights: no object is under Phong shading")
+            }
+            (_, true, _) => {
+                let apart = objects - clustered;
+                let unbounded = self.unbounded.all;
+                format!(
+                    "{unbounded} lights without a range or with a shape; and all {every} for {apart} objects that no fragment lights"
+                )
+            }
+        };
+        lines.push(format!("objects: {why}"));
+        lines
+    }
+
     fn add_polygon(&mut self, polygon: &EmissivePolygon) {
-        self.dynamic += u32::from(!polygon.baked);
-        self.all += 1;
-        self.polygon = true;
+        self.every.add_polygon(polygon);
+        self.unbounded.add_polygon(polygon);
     }
 
     fn add(&mut self, light: &Light) {
@@ -55,21 +173,25 @@ impl LightSet {
             self.ambient += light.ambient;
             return;
         }
-        self.dynamic += u32::from(light.bake != BakeMode::Static);
-        self.all += 1;
-        self.static_ambient |= light.bake == BakeMode::Static && light.ambient != Vec3::ZERO;
-        self.directional |= light.kind == LightKind::Directional;
-        self.point |= light.kind == LightKind::Point;
-        self.spot |= light.spot.is_some_and(|cone| !cone.is_everywhere());
+        self.every.add(light);
+        match LightClass::of(light) {
+            LightClass::Unbounded => self.unbounded.add(light),
+            LightClass::InverseSquare if self.inverse_square.all as usize == NUMBERED_LIGHTS => {
+                self.ranged.add(light);
+            }
+            LightClass::InverseSquare => self.inverse_square.add(light),
+            LightClass::Ranged => self.ranged.add(light),
+        }
     }
 }
 
 /// How far a light of the buffer goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightReach {
-    /// In the world.
+    pub class: LightClass,
+    /// Of the ball that holds all it reaches, in the world; of a polygon light, its corner.
     pub center: DVec3,
-    /// Metres; infinite for a light without a range.
+    /// Of that ball, in metres; infinite for a light without a range.
     pub radius: f64,
     /// Baked into the lightmaps in use.
     pub baked: bool,
@@ -87,18 +209,44 @@ pub(crate) struct PolygonReach {
 
 impl LightReach {
     fn new(light: &Light, transform: &GlobalTransform) -> Self {
-        let radius = match light.kind {
-            LightKind::Point => f64::from(light.attenuation.range),
-            LightKind::Ambient | LightKind::Directional => f64::INFINITY,
+        let class = LightClass::of(light);
+        let (center, radius) = match light.kind {
+            LightKind::Point => bounding_sphere(light, transform),
+            LightKind::Ambient | LightKind::Directional => (transform.translation(), f64::INFINITY),
         };
-        let baked = light.bake == BakeMode::Static;
-        Self { center: transform.translation(), radius, baked, polygon: None }
+        Self { class, center, radius, baked: light.bake == BakeMode::Static, polygon: None }
     }
 
     fn of_polygon(EmissivePolygon { light, emitter, baked }: &EmissivePolygon) -> Self {
         let reach = PolygonReach { front: light.area_vector(), emitter: *emitter };
-        Self { center: light.corner, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
+        let (class, center) = (LightClass::Unbounded, light.corner);
+        Self { class, center, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
     }
+}
+
+/// Middle and radius of the smallest ball around all that a point light reaches: the ball of its range, or around a spotlight's part of it.
+fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64) {
+    let (place, range) = (transform.translation(), f64::from(light.attenuation.range));
+    let Some(cone) = cone(light).filter(|_| range.is_finite()) else { return (place, range) };
+    // Rounded to f32 on the device, and strictly inside is lit: a little wider is enough.
+    let cosine = (cone.cosines().outer - 1e-6).max(0.0);
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let axis = transform.forward();
+    match cosine > sine {
+        // Through the apex and the rim of the cap.
+        true => (place + axis * (0.5 * range / cosine), 0.5 * range / cosine),
+        // Around the rim.
+        false => (place + axis * (range * cosine), range * sine),
+    }
+}
+
+/// The lights of a frame: what is counted of them, and one entry of each list for each light, dynamic ones first.
+#[derive(Debug, Default)]
+pub(crate) struct SceneLights {
+    pub set: LightSet,
+    pub reaches: Vec<LightReach>,
+    /// Those of the class, in the order of `reaches`.
+    pub inverse_square: Vec<InverseSquareLightData>,
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
@@ -112,10 +260,10 @@ pub(crate) fn extract_lights(
     buffer: &mut GrowableBuffer<LightData>,
     origin: DVec3,
     left_out: &mut Vec<String>,
-) -> Result<(LightSet, Vec<LightReach>), RenderError> {
-    let mut set = LightSet::default();
+) -> Result<SceneLights, RenderError> {
+    let mut scene = SceneLights::default();
     let polygons = emitters.polygons(world)?;
-    polygons.iter().for_each(|polygon| set.add_polygon(polygon));
+    polygons.iter().for_each(|polygon| scene.set.add_polygon(polygon));
     let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
     let mut found: Vec<_> = query
         .iter(world)
@@ -125,19 +273,32 @@ pub(crate) fn extract_lights(
         })
         .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
-    found.iter().for_each(|(_, light, _)| set.add(light));
+    found.iter().for_each(|(_, light, _)| scene.set.add(light));
     found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
-    let lights = found.iter().map(|(_, light, transform)| {
-        (LightReach::new(light, transform), LightData::new(light, transform, origin))
-    });
-    let polygons = polygons
-        .iter()
-        .map(|polygon| (LightReach::of_polygon(polygon), LightData::polygon(&polygon.light, origin)));
-    let mut all: Vec<(LightReach, LightData)> = lights.chain(polygons).collect();
     // Stable: within both halves the order stays.
-    all.sort_by_key(|(reach, _)| reach.baked);
-    buffer.replace(all.iter().map(|(_, data)| *data));
-    Ok((set, all.into_iter().map(|(reach, _)| reach).collect()))
+    found.sort_by_key(|(_, light, _)| light.bake == BakeMode::Static);
+    let baked = found.iter().position(|(_, light, _)| light.bake == BakeMode::Static).unwrap_or(found.len());
+    let (dynamic, baked) = found.split_at(baked);
+    let mut data = Vec::with_capacity(found.len() + polygons.len());
+    for (lights, of_baked) in [(dynamic, false), (baked, true)] {
+        for (_, light, transform) in lights {
+            let mut reach = LightReach::new(light, transform);
+            if scene.inverse_square.len() == NUMBERED_LIGHTS && reach.class == LightClass::InverseSquare {
+                reach.class = LightClass::Ranged;
+            }
+            if reach.class == LightClass::InverseSquare {
+                scene.inverse_square.push(InverseSquareLightData::new(light, transform, origin));
+            }
+            scene.reaches.push(reach);
+            data.push(LightData::new(light, transform, origin));
+        }
+        for polygon in polygons.iter().filter(|polygon| polygon.baked == of_baked) {
+            scene.reaches.push(LightReach::of_polygon(polygon));
+            data.push(LightData::polygon(&polygon.light, origin));
+        }
+    }
+    buffer.replace(data);
+    Ok(scene)
 }
 
 /// What is wrong with a light that is on, by name; nothing as a rule.
@@ -160,4 +321,60 @@ fn shines(light: &Light, transform: &GlobalTransform) -> bool {
         && light.enabled
         && colors.iter().any(|color| *color != Vec3::ZERO)
         && light.validate("light").is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_scene::Transform;
+
+    use super::*;
+
+    #[test]
+    fn the_ball_around_a_cone_holds_what_it_lights_and_no_more() {
+        let transform = Transform::from_xyz(1.0, 2.0, 3.0).looking_at(DVec3::new(-1.0, 0.5, 2.0), DVec3::Y);
+        let place = GlobalTransform(transform.affine());
+        let axis = place.forward();
+        let side = axis.any_orthonormal_vector();
+        for outer in [0.01_f32, 0.5, 0.785, 0.786, 1.2, 1.57] {
+            let attenuation = Attenuation { range: 4.0, ..Attenuation::INVERSE_SQUARE };
+            let cone = SpotCone::Smooth { inner: 0.0, outer };
+            let (center, radius) =
+                bounding_sphere(&Light { attenuation, ..Light::spot(Vec3::ONE, cone) }, &place);
+            // Its farthest points: the apex, the middle and the rim of the cap.
+            let rim = |angle: f64| axis * angle.cos() + side * angle.sin();
+            let outer = f64::from(outer);
+            let mut farthest: f64 = if outer < 0.786 { center.distance(place.translation()) } else { 0.0 };
+            for step in 0..=100 {
+                let at = place.translation() + rim(outer * (f64::from(step) / 50.0 - 1.0)) * 4.0;
+                farthest = farthest.max(center.distance(at));
+            }
+            assert!(center.distance(place.translation()) <= radius * (1.0 + 1e-12), "{outer}");
+            assert!(farthest <= radius + 1e-9, "{outer}: {farthest} is outside of {radius}");
+            assert!(radius < farthest * (1.0 + 1e-4), "{outer}: {radius} is wider than {farthest}");
+        }
+    }
+
+    #[test]
+    fn lights_are_classed_by_what_has_to_be_asked_of_them() {
+        let ranged = Attenuation { range: 3.0, ..Attenuation::INVERSE_SQUARE };
+        let lamp = Light { attenuation: ranged, ..Light::point(Vec3::ONE) };
+        assert_eq!(LightClass::of(&lamp), LightClass::InverseSquare);
+        let cone = Some(SpotCone::Smooth { inner: 0.1, outer: 0.2 });
+        let constant = Attenuation { constant: 0.1, ..ranged };
+        let clamped = Attenuation { clamp: true, ..ranged };
+        let tiny = Attenuation { range: 1e-12, ..ranged };
+        for other in [
+            Light { spot: cone, ..lamp.clone() },
+            Light { ambient: Vec3::X, ..lamp.clone() },
+            Light { specular: Vec3::ZERO, ..lamp.clone() },
+            Light { attenuation: constant, ..lamp.clone() },
+            Light { attenuation: clamped, ..lamp.clone() },
+            Light { attenuation: tiny, ..lamp.clone() },
+        ] {
+            assert_eq!(LightClass::of(&other), LightClass::Ranged, "{other:?}");
+        }
+        for other in [Light::point(Vec3::ONE), Light { kind: LightKind::Directional, ..lamp }] {
+            assert_eq!(LightClass::of(&other), LightClass::Unbounded, "{other:?}");
+        }
+    }
 }

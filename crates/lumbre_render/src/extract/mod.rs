@@ -7,10 +7,10 @@ mod lights;
 mod objects;
 mod traits;
 
-pub(crate) use camera::{CameraView, find_camera};
+pub(crate) use camera::{CameraView, ViewVolume, find_camera};
 pub(crate) use emitters::Emitters;
 #[cfg(test)]
 pub(crate) use lights::PolygonReach;
-pub(crate) use lights::{LightReach, LightSet, extract_lights};
+pub(crate) use lights::{LightClass, LightReach, LightSet, SceneLights, extract_lights};
 pub(crate) use objects::{Object, Objects};
 pub(crate) use traits::{FrameFeatures, LitPass, Traits};

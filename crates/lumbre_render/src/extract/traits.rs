@@ -6,7 +6,8 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Distribution, FogMode, Fresnel, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{MaterialTextures, SceneSettings};
 
-use super::LightSet;
+use super::lights::{LightCounts, LightSet};
+use crate::light_clusters::UNIFORM_LIGHTS;
 use crate::shader::{Feature, Variant};
 use crate::texture_sets;
 
@@ -43,6 +44,8 @@ pub(crate) struct FrameFeatures {
     /// The frame is kept in half floats.
     pub half: bool,
     pub lights: LightSet,
+    /// Fragments find lights with a range by clusters.
+    pub clustered: bool,
 }
 
 /// The pass that draws an object; in this order.
@@ -117,15 +120,24 @@ impl Traits {
         variant.set(Feature::Lightmap, lightmapped);
         variant.set(Feature::TwoSided, self.double_sided && settings.two_sided);
         variant.set(Feature::Lit, lit);
-        let LightSet { dynamic, all, directional, point, spot, polygon, static_ambient, .. } = frame.lights;
-        variant.set(Feature::DynamicLights, dynamic > 0);
+        let clustered = frame.clustered && lit && shading == Shading::Phong;
+        let LightSet { every, unbounded, inverse_square, ranged, .. } = &frame.lights;
+        let listed = if clustered { unbounded } else { every };
         // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
-        let left = !lightmapped || self.specular || static_ambient;
-        variant.set(Feature::StaticLights, all > dynamic && left);
-        variant.set(Feature::DirectionalLights, directional);
-        variant.set(Feature::PointLights, point);
-        variant.set(Feature::SpotLights, spot);
-        variant.set(Feature::PolygonLights, polygon);
+        let left =
+            |of: &LightCounts| of.all > of.dynamic && (!lightmapped || self.specular || of.static_ambient);
+        variant.set(Feature::DynamicLights, listed.dynamic > 0);
+        variant.set(Feature::StaticLights, left(listed));
+        let reads = |of: &LightCounts| clustered && (of.dynamic > 0 || left(of));
+        variant.set(Feature::InverseSquareClusters, reads(inverse_square));
+        variant.set(Feature::UniformLights, inverse_square.all <= UNIFORM_LIGHTS);
+        variant.set(Feature::RangedClusters, reads(ranged));
+        for kinds in [Some(listed), clustered.then_some(ranged)].into_iter().flatten() {
+            variant.set(Feature::DirectionalLights, kinds.directional);
+            variant.set(Feature::PointLights, kinds.point);
+            variant.set(Feature::SpotLights, kinds.spot);
+            variant.set(Feature::PolygonLights, kinds.polygon);
+        }
         variant.set(Feature::Matt, lit && !self.specular);
         variant.set(Feature::SharpHighlights, self.sharp);
         if self.specular {

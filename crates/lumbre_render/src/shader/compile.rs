@@ -94,6 +94,7 @@ mod tests {
             | Feature::FogDepthCue => vec![Feature::Fog],
             Feature::Fog => vec![Feature::FogLinear],
             Feature::ClampVertices => vec![Feature::Clamp],
+            Feature::UniformLights => vec![Feature::InverseSquareClusters],
             _ => vec![],
         };
         for shading in Shading::ALL {
@@ -125,6 +126,8 @@ mod tests {
             "dpdx",
             "polygon",
             "contour",
+            "cluster",
+            "inverse_square",
         ] {
             assert!(!plain.contains(word), "{word} is left in:\n{plain}");
         }
@@ -140,6 +143,17 @@ mod tests {
         let together =
             valid(&variant(Shading::Phong, &[polygons.as_slice(), &[Feature::PointLights]].concat()));
         assert!(together.contains("polygon_form_factor") && together.contains("attenuate"), "{together}");
+        // Clusters alone: of inverse-square lights nothing is asked that they do not have; with others, all is there.
+        let clusters = [Feature::Lit, Feature::InverseSquareClusters, Feature::UniformLights];
+        let lean = valid(&variant(Shading::Phong, &clusters));
+        assert!(lean.contains("cluster_lists") && lean.contains("attenuate_inverse_square"), "{lean}");
+        for word in ["evaluate_light(", "spot_factor", "attenuate(", "for (", "array<LightParameters>"] {
+            assert!(!lean.contains(word), "{word} is left in:\n{lean}");
+        }
+        let lightmapped = [Feature::Lightmap, Feature::Uv1, Feature::RangedClusters, Feature::SpotLights];
+        let all = valid(&variant(Shading::Phong, &[clusters.as_slice(), &lightmapped].concat()));
+        assert!(all.contains("spot_factor"), "{all}");
+        assert!(all.contains("first_baked"), "baked lights are told apart:\n{all}");
         let dark = valid(&variant(Shading::Phong, &[Feature::Lit]));
         assert!(!dark.contains("for ("), "a scene without lights loops:\n{dark}");
         let lit = valid(&variant(Shading::Phong, &[LIT.as_slice(), &[Feature::SpotLights]].concat()));

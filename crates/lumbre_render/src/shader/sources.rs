@@ -12,6 +12,7 @@ modules!(
     "display",
     "forward",
     "frame",
+    "light_clusters",
     "lighting",
     "lightmap",
     "material_textures",

@@ -96,6 +96,14 @@ features! {
     HalfRange = 33 => "HALF_RANGE",
     /// Has no highlight: every specular coefficient is 0.
     Matt = 34 => "MATT",
+    /// Reads lists of the lights that reach a cluster of pixels.
+    Clusters = 35 => "CLUSTERS",
+    /// Loops over a cluster's inverse-square lights.
+    InverseSquareClusters = 36 => "INVERSE_SQUARE_CLUSTERS",
+    /// These stand in a uniform buffer: there are no more than it holds.
+    UniformLights = 37 => "UNIFORM_LIGHTS",
+    /// Loops over a cluster's other lights with a range.
+    RangedClusters = 38 => "RANGED_CLUSTERS",
 }
 
 /// A variant of the forward shader.
@@ -132,6 +140,8 @@ impl Variant {
             // Unlit: neither lights nor normals, whatever the technique.
             let keep = !(Feature::DynamicLights as u64
                 | Feature::StaticLights as u64
+                | Feature::InverseSquareClusters as u64
+                | Feature::RangedClusters as u64
                 | Feature::LocalViewer as u64
                 | Feature::TwoSided as u64
                 | Feature::Lightmap as u64
@@ -140,15 +150,27 @@ impl Variant {
             (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
         }
         if self.shading != Shading::Phong {
-            // No highlight is evaluated in a pixel.
-            self.bits &= !(Feature::SpecularAntialiasing as u64);
+            // No highlight is evaluated in a pixel, and no vertex is in a cluster.
+            self.bits &= !(Feature::SpecularAntialiasing as u64
+                | Feature::InverseSquareClusters as u64
+                | Feature::RangedClusters as u64);
         }
-        if !self.has(Feature::DynamicLights) && !self.has(Feature::StaticLights) {
+        let clusters = self.has(Feature::InverseSquareClusters) || self.has(Feature::RangedClusters);
+        self.bits &= !(Feature::Clusters as u64);
+        self.set(Feature::Clusters, clusters);
+        if !self.has(Feature::InverseSquareClusters) {
+            self.bits &= !(Feature::UniformLights as u64);
+        }
+        let listed = self.has(Feature::DynamicLights) || self.has(Feature::StaticLights);
+        if !listed && !self.has(Feature::RangedClusters) {
+            // What is left has kinds of its own.
             self.bits &= !(Feature::DirectionalLights as u64
                 | Feature::PointLights as u64
                 | Feature::SpotLights as u64
-                | Feature::PolygonLights as u64
-                | Feature::SharpHighlights as u64
+                | Feature::PolygonLights as u64);
+        }
+        if !listed && !clusters {
+            self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
                 | Feature::LocalViewer as u64
                 | Feature::Matt as u64);

@@ -1,0 +1,86 @@
+//! What a frame of many objects and many lights costs the CPU, stage by stage: boxes on a plane, as many lamps of two metres just above
+//! them, of both a part moves every frame.
+//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1] [--shading phong|gouraud] [--frames 30]`
+//!
+//! `--moving` is a percentage. Medians of the frames, in milliseconds; the frames are small, and their drawing is not counted.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use lumbre_mesh::shapes;
+use lumbre_optics::{Attenuation, Light, Material, Shading};
+use lumbre_render::{CpuStages, FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
+use lumbre_scene::{Camera, Mesh, Transform};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (mut number, mut moving, mut frames, mut shading) = (10_000_u32, 1.0, 30, Shading::Phong);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let value = arguments.next().ok_or("a value is missing")?;
+        match argument.as_str() {
+            "--number" => number = value.parse()?,
+            "--moving" => moving = value.parse()?,
+            "--frames" => frames = value.parse()?,
+            "--shading" => shading = Shading::from_name(&value).ok_or("no such shading")?,
+            _ => return Err(format!("{argument} is unknown").into()),
+        }
+    }
+    let mut world = World::new();
+    let side = f64::from(number).sqrt().ceil();
+    let cube = Arc::new(shapes::cuboid(Vec3::splat(0.4), 1));
+    let at = |index: u32, height: f64| {
+        let (row, column) = ((f64::from(index) / side).floor(), f64::from(index) % side);
+        DVec3::new(column - 0.5 * side, height, row - 0.5 * side)
+    };
+    let mut all = Vec::new();
+    for index in 0..number {
+        let place = Transform::from_translation(at(index, 0.0));
+        all.push(world.spawn((Mesh(cube.clone()), Material::matt(Vec3::ONE), place)).id());
+        let attenuation = Attenuation { range: 2.0, ..Attenuation::INVERSE_SQUARE };
+        let place = Transform::from_translation(at(index, 1.0));
+        all.push(world.spawn((Light { attenuation, ..Light::point(Vec3::ONE) }, place)).id());
+    }
+    let eye = Transform::from_xyz(0.0, 0.6 * side, 0.8 * side).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Camera::default(), eye));
+    let gpu = Gpu::headless()?;
+    let mut renderer = Renderer::new(&gpu);
+    let target = Offscreen::new(&gpu, 320, 180, OffscreenFormat::Rgba8)?;
+    let options = FrameOptions { shading: Some(shading), ..FrameOptions::default() };
+    let count = (all.len() as f64 * moving / 100.0) as usize;
+    let mut stages: Vec<CpuStages> = Vec::new();
+    for frame in 0..=frames {
+        for offset in 0..count {
+            let entity = all[(frame * count + offset) % all.len()];
+            if let Some(mut transform) = world.get_mut::<Transform>(entity) {
+                transform.translation.x += if frame % 2 == 0 { 0.1 } else { -0.1 };
+            }
+        }
+        let report = renderer.render(&mut world, &target.target(), &options)?;
+        renderer.wait()?;
+        if frame == 0 {
+            let statistics = &report.statistics;
+            println!(
+                "{} objects in view, {} lights, {:?}",
+                statistics.objects, statistics.lights, statistics.light_lists
+            );
+            println!("{:.1} lights per object", statistics.lights_per_object);
+            continue;
+        }
+        stages.push(report.statistics.cpu);
+    }
+    let median = |name: &str, of: fn(&CpuStages) -> f64| {
+        let mut values: Vec<f64> = stages.iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        println!("{name:>10} {:8.2} ms (least {:.2})", values[values.len() / 2], values[0]);
+    };
+    median("transforms", |cpu| cpu.transforms_ms);
+    median("objects", |cpu| cpu.objects_ms);
+    median("lights", |cpu| cpu.lights_ms);
+    median("draws", |cpu| cpu.draws_ms);
+    median("clusters", |cpu| cpu.clusters_ms);
+    median("upload", |cpu| cpu.upload_ms);
+    median("encoding", |cpu| cpu.encoding_ms);
+    median("total", |cpu| cpu.total_ms);
+    Ok(())
+}

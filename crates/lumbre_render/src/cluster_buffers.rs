@@ -1,0 +1,111 @@
+//! The GPU's copies of a frame's clusters: their grid, their lists, and the lean records of the lights in them. What stands in the lists
+//! is decided in `light_clusters`.
+
+use crate::extract::{LightClass, SceneLights};
+use crate::growable_buffer::GrowableBuffer;
+use crate::layout::{ClusterGridData, InverseSquareLightData};
+use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters, UNIFORM_LIGHTS};
+use crate::{Gpu, RenderError};
+
+/// Bindings 6 to 9 of group 0.
+#[derive(Debug)]
+pub(crate) struct ClusterBuffers {
+    pub clusters: LightClusters,
+    inverse_square: Vec<BoundingSphere>,
+    ranged: Vec<BoundingSphere>,
+    grid: GrowableBuffer<ClusterGridData>,
+    lists: Option<wgpu::Buffer>,
+    lights: GrowableBuffer<InverseSquareLightData>,
+}
+
+impl ClusterBuffers {
+    pub fn new() -> Self {
+        Self {
+            clusters: LightClusters::default(),
+            inverse_square: Vec::new(),
+            ranged: Vec::new(),
+            grid: GrowableBuffer::uniform("cluster grid", 1),
+            lists: None,
+            lights: GrowableBuffer::uniform("inverse-square lights", UNIFORM_LIGHTS as usize + 1),
+        }
+    }
+
+    /// Makes the lists of a frame.
+    pub fn build(&mut self, view: &ClusteredView, lights: &SceneLights) {
+        self.inverse_square.clear();
+        self.ranged.clear();
+        for (reach, index) in lights.reaches.iter().zip(0..) {
+            let sphere = |light| BoundingSphere { light, center: reach.center, radius: reach.radius };
+            match reach.class {
+                LightClass::Unbounded => {}
+                LightClass::InverseSquare => {
+                    let number = u32::try_from(self.inverse_square.len()).unwrap_or(u32::MAX);
+                    self.inverse_square.push(sphere(number));
+                }
+                LightClass::Ranged => self.ranged.push(sphere(index)),
+            }
+        }
+        self.clusters.build(view, [&self.inverse_square, &self.ranged]);
+        let dynamic = |class: LightClass| {
+            lights.reaches.iter().filter(|reach| !reach.baked && reach.class == class).count()
+        };
+        let number = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        let grid = &mut self.clusters.grid;
+        grid.first_baked_inverse_square = number(dynamic(LightClass::InverseSquare));
+        grid.first_baked_ranged = number(lights.reaches.iter().filter(|reach| !reach.baked).count());
+        self.grid.replace([*grid]);
+        self.lights.replace(lights.inverse_square.iter().copied().chain([InverseSquareLightData::BLACK]));
+    }
+
+    /// Bytes that the next `upload` will send.
+    pub fn pending_bytes(&self) -> u64 {
+        self.grid.pending_bytes()
+            + self.lights.pending_bytes()
+            + size_of_val(self.clusters.values.as_slice()) as u64
+    }
+
+    /// Brings the GPU's copies up to date; true if a buffer is another one than before.
+    ///
+    /// # Errors
+    /// [`RenderError::BufferTooLarge`].
+    pub fn upload(&mut self, gpu: &Gpu) -> Result<bool, RenderError> {
+        let mut renewed = self.grid.upload(gpu)? | self.lights.upload(gpu)?;
+        let bytes: &[u8] = bytemuck::cast_slice(&self.clusters.values);
+        let size = bytes.len() as u64;
+        if self.lists.as_ref().is_none_or(|lists| lists.size() < size) {
+            let limit = gpu.device.limits().max_storage_buffer_binding_size;
+            if size > limit {
+                return Err(RenderError::BufferTooLarge {
+                    what: "lists of lights per cluster",
+                    bytes: size,
+                    limit,
+                });
+            }
+            self.lists = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("lists of lights per cluster"),
+                size: size.next_power_of_two().min(limit),
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+            renewed = true;
+        }
+        if let Some(lists) = &self.lists {
+            gpu.queue.write_buffer(lists, 0, bytes);
+        }
+        Ok(renewed)
+    }
+
+    /// What is bound, by binding; none before the first `upload`.
+    pub fn bindings(&self) -> Option<[(u32, wgpu::BindingResource<'_>); 4]> {
+        let lights = self.lights.buffer()?;
+        let uniform_bytes = u64::from(UNIFORM_LIGHTS + 1) * size_of::<InverseSquareLightData>() as u64;
+        let uniform =
+            wgpu::BufferBinding { buffer: lights, offset: 0, size: wgpu::BufferSize::new(uniform_bytes) };
+        Some([
+            (6, self.grid.buffer()?.as_entire_binding()),
+            (7, self.lists.as_ref()?.as_entire_binding()),
+            (8, wgpu::BindingResource::Buffer(uniform)),
+            (9, lights.as_entire_binding()),
+        ])
+    }
+}

@@ -1,0 +1,584 @@
+//! Clustered forward shading (Olsson, Billeter and Assarsson, High Performance Graphics 2012): the view is cut into tiles of pixels and
+//! slices of depth, and each of these clusters has a list of the lights whose range reaches it, so that a fragment asks those alone.
+//! Exact, not an approximation: a light that is left out of a cluster is 0 in all of it. Built on the CPU, every frame that something
+//! moved in; what the shader reads of it is shaders/light_clusters.wesl. Not the lists of whole objects: those are `light_lists`.
+
+use glam::{DVec3, UVec3};
+
+use crate::extract::{CameraView, ViewVolume};
+use crate::layout::ClusterGridData;
+
+/// Sides of tiles that are tried, in pixels, the finest first. 32 is where lists are short and 64-pixel tiles of a software rasterizer
+/// still hold whole ones; coarser ones are for frames in which the lists would take longer to make than they save.
+const TILE_SIDES: [u32; 7] = [32, 64, 128, 256, 512, 1024, 16384];
+/// Most clusters, and most entries of lists, as far as they can be told beforehand, before a coarser grid is taken.
+const MANY_CLUSTERS: f64 = 131_072.0;
+const MANY_ENTRIES: f64 = 3e6;
+/// Most slices of depth.
+const MOST_SLICES: f64 = 96.0;
+/// By how much of itself a light's range grows, and by how much of the distance from the origin of frame space: the roundings of
+/// points, of the depth and of its logarithm on the device.
+const RANGE_MARGIN: f64 = 1e-4;
+const DISTANCE_MARGIN: f64 = 2e-6;
+/// Slices overlap by this part of one, for the same reason.
+const SLICE_MARGIN: f64 = 2e-3;
+
+/// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
+pub(crate) const UNIFORM_LIGHTS: u32 = 2047;
+/// Most inverse-square lights that 16 bits number, beside a black one; more of them are listed as other lights with a range are.
+pub(crate) const NUMBERED_LIGHTS: usize = 65_535;
+
+/// A ball that holds all points that a light reaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BoundingSphere {
+    /// The number by which the shader knows the light.
+    pub light: u32,
+    /// In the world.
+    pub center: DVec3,
+    /// Metres, finite.
+    pub radius: f64,
+}
+
+/// What a grid is laid over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ClusteredView {
+    pub view: CameraView,
+    /// Origin of frame space in the world.
+    pub origin: DVec3,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Distances along the line of sight between which there is anything to light, in metres.
+    pub depths: [f64; 2],
+}
+
+/// The lists of a frame. Its vectors are kept from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct LightClusters {
+    /// For each cluster where its list begins in here, and where the last one ends; the same for the second class of lights; then the
+    /// lists of the first class, one after the other, two lights in a word, a word for a list that is empty to read, and the lists of the
+    /// second class with one light in a word.
+    pub values: Vec<u32>,
+    pub grid: ClusterGridData,
+    /// Pixels along the side of a tile.
+    pub tile_side: u32,
+    /// Entries of all lists.
+    pub entries: usize,
+    /// The number of a light of the first class that is black.
+    black: u32,
+    spheres: Vec<ViewSphere>,
+    spans: Vec<Span>,
+    rows: Vec<Edge>,
+    slices: Vec<[f64; 2]>,
+}
+
+/// A ball in view space: x to the right, y downwards, depth along the line of sight.
+#[derive(Clone, Copy, Debug)]
+struct ViewSphere {
+    light: u32,
+    x: f64,
+    y: f64,
+    depth: f64,
+    radius: f64,
+}
+
+/// A run of clusters of one row that a light reaches.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    first: u32,
+    count: u32,
+    light: u32,
+}
+
+/// One screen axis of the grid. A coordinate on it is x (or y) divided by depth in perspective, x itself otherwise.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    first: f64,
+    step: f64,
+    count: u32,
+    perspective: bool,
+}
+
+/// The plane at an edge of a row, through the eye in perspective and else along the line of sight: the signed distance of a point from
+/// it is y `normal_y` + depth `normal_depth` - `offset`, positive below.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    normal_y: f64,
+    normal_depth: f64,
+    offset: f64,
+}
+
+/// The depth axis: slices of equal ratio in perspective, so that clusters are about as deep as they are wide, else of equal depth.
+#[derive(Clone, Copy, Debug)]
+struct Depths {
+    count: u32,
+    scale: f64,
+    bias: f64,
+    logarithmic: bool,
+}
+
+impl LightClusters {
+    /// Makes the lists of both classes of lights. Those of the first are numbered from 0, and the number after the last is a black one's.
+    pub fn build(&mut self, view: &ClusteredView, classes: [&[BoundingSphere]; 2]) {
+        self.spheres.clear();
+        for sphere in classes.into_iter().flatten() {
+            self.spheres.push(ViewSphere::new(view, sphere));
+        }
+        let (columns, rows, depths) = self.choose(view);
+        self.grid.size = UVec3::new(columns.count, rows.count, depths.count);
+        self.grid.depth_scale = depths.scale as f32;
+        self.grid.depth_bias = depths.bias as f32;
+        self.grid.logarithmic = u32::from(depths.logarithmic);
+        self.grid.tiles_per_pixel = 1.0 / self.tile_side as f32;
+        self.rows.clear();
+        self.rows.extend((0..=rows.count).map(|row| Edge::new(&rows, row)));
+        self.slices.clear();
+        self.slices.extend((0..depths.count).map(|slice| depths.bounds(slice)));
+        let clusters = (columns.count * rows.count * depths.count) as usize;
+        let first = classes[0].len();
+        self.entries = 0;
+        self.values.clear();
+        self.values.resize(2 * (clusters + 1), 0);
+        self.grid.ranged_offsets = u32::try_from(clusters + 1).unwrap_or(u32::MAX);
+        self.black = saturated(first);
+        self.class(0..first, 0, clusters, [&columns, &rows], &depths, true);
+        self.class(first..self.spheres.len(), clusters + 1, clusters, [&columns, &rows], &depths, false);
+    }
+
+    /// The finest grid whose lists are not too long.
+    fn choose(&mut self, view: &ClusteredView) -> (Axis, Axis, Depths) {
+        let mut near = f64::INFINITY;
+        let mut far = f64::NEG_INFINITY;
+        for sphere in &self.spheres {
+            near = near.min(sphere.depth - sphere.radius);
+            far = far.max(sphere.depth + sphere.radius);
+        }
+        let [near, far] = [near.max(view.depths[0]), far.min(view.depths[1])];
+        let mut grid = None;
+        for side in TILE_SIDES {
+            let axes = Axis::both(view, side);
+            let depths = Depths::new(view, side, near, far);
+            self.tile_side = side;
+            grid = Some((axes[0], axes[1], depths));
+            let clusters = f64::from(axes[0].count) * f64::from(axes[1].count) * f64::from(depths.count);
+            // The volume of a ball is half that of the cube around it.
+            if clusters <= MANY_CLUSTERS && 0.5 * self.cells(&axes, &depths) <= MANY_ENTRIES {
+                break;
+            }
+        }
+        // There is at least one side.
+        grid.unwrap_or_else(|| {
+            let [columns, rows] = Axis::both(view, 32);
+            (columns, rows, Depths::new(view, 32, near, far))
+        })
+    }
+
+    /// Clusters of the boxes around all balls.
+    fn cells(&self, axes: &[Axis; 2], depths: &Depths) -> f64 {
+        let length = |span: Option<[u32; 2]>| span.map_or(0.0, |[first, last]| f64::from(last - first + 1));
+        let cells = self.spheres.iter().map(|sphere| {
+            let slices = length(depths.span(sphere.depth, sphere.radius));
+            if slices == 0.0 {
+                return 0.0;
+            }
+            let columns = length(axes[0].span(sphere.x, sphere.depth, sphere.radius));
+            slices * columns * length(axes[1].span(sphere.y, sphere.depth, sphere.radius))
+        });
+        cells.sum()
+    }
+
+    /// Appends the lists of one class, whose offsets stand at `table`.
+    fn class(
+        &mut self,
+        lights: std::ops::Range<usize>,
+        table: usize,
+        clusters: usize,
+        [columns, rows]: [&Axis; 2],
+        depths: &Depths,
+        packed: bool,
+    ) {
+        self.spans.clear();
+        for sphere in &self.spheres[lights] {
+            let Some([first, last]) = depths.span(sphere.depth, sphere.radius) else { continue };
+            for slice in first..=last {
+                let [near, far] = self.slices[slice as usize];
+                let Some(in_slice) = sphere.between(near, far) else { continue };
+                let Some([top, bottom]) = rows.span(in_slice.y, in_slice.depth, in_slice.radius) else {
+                    continue;
+                };
+                for row in top..=bottom {
+                    let edges = [self.rows[row as usize], self.rows[row as usize + 1]];
+                    let Some(in_row) = in_slice.in_row(edges) else { continue };
+                    let Some([left, right]) = columns.span(in_row.x, in_row.depth, in_row.radius) else {
+                        continue;
+                    };
+                    let first = (slice * rows.count + row) * columns.count + left;
+                    let count = right - left + 1;
+                    self.spans.push(Span { first, count, light: sphere.light });
+                    self.entries += count as usize;
+                    for cluster in first..first + count {
+                        self.values[table + cluster as usize] += 1;
+                    }
+                }
+            }
+        }
+        let begin = self.values.len();
+        if packed {
+            self.fill_pairs(table, clusters, begin);
+        } else {
+            self.fill(table, clusters, begin);
+            // Any light of the class may be evaluated anywhere: it adds nothing where it does not reach.
+            let any = self.spans.first().map_or(0, |span| span.light);
+            self.values.push(any);
+        }
+    }
+
+    /// Writes the lists of the spans: from lengths to ends, and backwards from there, which turns ends into beginnings.
+    fn fill(&mut self, table: usize, clusters: usize, begin: usize) {
+        let mut end = begin;
+        for offset in &mut self.values[table..=table + clusters] {
+            end += *offset as usize;
+            *offset = saturated(end);
+        }
+        self.values.resize(end, 0);
+        for span in self.spans.iter().rev() {
+            for cluster in span.first..span.first + span.count {
+                let offset = &mut self.values[table + cluster as usize];
+                *offset -= 1;
+                let place = *offset as usize;
+                self.values[place] = span.light;
+            }
+        }
+    }
+
+    /// As `fill`, two lights in a word; a list of odd length ends in a black light.
+    fn fill_pairs(&mut self, table: usize, clusters: usize, begin: usize) {
+        let black = self.black | self.black << 16;
+        let mut end = begin;
+        for offset in &mut self.values[table..=table + clusters] {
+            let length = *offset as usize;
+            *offset = saturated(2 * end + length);
+            end += length.div_ceil(2);
+        }
+        // And one more for a list that is empty to read.
+        self.values.resize(end + 1, black);
+        for span in self.spans.iter().rev() {
+            for cluster in span.first..span.first + span.count {
+                let offset = &mut self.values[table + cluster as usize];
+                *offset -= 1;
+                let (word, half) = ((*offset / 2) as usize, 16 * (*offset % 2));
+                self.values[word] = self.values[word] & !(0xffff << half) | span.light << half;
+            }
+        }
+        for offset in &mut self.values[table..=table + clusters] {
+            *offset /= 2;
+        }
+    }
+}
+
+/// A number of words, as far as a u32 goes: beyond it no device has a buffer.
+fn saturated(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
+}
+
+impl ViewSphere {
+    fn new(view: &ClusteredView, sphere: &BoundingSphere) -> Self {
+        let basis = view.view.basis;
+        let from_eye = sphere.center - view.view.eye;
+        let mirrored = match view.view.volume {
+            ViewVolume::Perspective { .. } => [1.0; 2],
+            ViewVolume::Orthographic { half_width, half_height, .. } => {
+                [half_width.signum(), half_height.signum()]
+            }
+        };
+        let from_origin = (sphere.center - view.origin).length();
+        let margin = RANGE_MARGIN * sphere.radius + DISTANCE_MARGIN * (from_origin + sphere.radius);
+        Self {
+            light: sphere.light,
+            x: from_eye.dot(basis.x_axis) * mirrored[0],
+            y: -from_eye.dot(basis.y_axis) * mirrored[1],
+            depth: -from_eye.dot(basis.z_axis),
+            radius: sphere.radius + margin,
+        }
+    }
+
+    /// A ball around what of this one is in a slice: as wide as the disc in which its nearest plane cuts it.
+    fn between(&self, near: f64, far: f64) -> Option<Self> {
+        let depth = self.depth.max(near).min(far);
+        let beyond = self.depth - depth;
+        let squared = self.radius * self.radius - beyond * beyond;
+        (squared > 0.0).then(|| Self { depth, radius: squared.sqrt(), ..*self })
+    }
+
+    /// A ball around what of this one is between the planes of a row.
+    fn in_row(&self, [top, bottom]: [Edge; 2]) -> Option<Self> {
+        let above = top.distance(self);
+        let below = bottom.distance(self);
+        let (edge, distance) = match (above < 0.0, below > 0.0) {
+            (true, _) => (top, above),
+            (_, true) => (bottom, below),
+            _ => return Some(*self),
+        };
+        let squared = self.radius * self.radius - distance * distance;
+        (squared > 0.0).then(|| Self {
+            y: self.y - distance * edge.normal_y,
+            depth: self.depth - distance * edge.normal_depth,
+            radius: squared.sqrt(),
+            ..*self
+        })
+    }
+}
+
+impl Edge {
+    fn new(axis: &Axis, edge: u32) -> Self {
+        let coordinate = axis.first + axis.step * f64::from(edge);
+        if !axis.perspective {
+            return Self { normal_y: 1.0, normal_depth: 0.0, offset: coordinate };
+        }
+        let length = (1.0 + coordinate * coordinate).sqrt();
+        Self { normal_y: 1.0 / length, normal_depth: -coordinate / length, offset: 0.0 }
+    }
+
+    fn distance(&self, sphere: &ViewSphere) -> f64 {
+        sphere.y * self.normal_y + sphere.depth * self.normal_depth - self.offset
+    }
+}
+
+impl Axis {
+    /// Columns and rows of tiles of `side` pixels, from the frame's upper left corner; the last ones may reach beyond the frame.
+    fn both(view: &ClusteredView, side: u32) -> [Self; 2] {
+        let (half, perspective) = match view.view.volume {
+            ViewVolume::Perspective { half_width, half_height, .. } => ([half_width, half_height], true),
+            ViewVolume::Orthographic { half_width, half_height, .. } => {
+                ([half_width.abs(), half_height.abs()], false)
+            }
+        };
+        [0, 1].map(|axis| Self {
+            first: -half[axis],
+            step: 2.0 * half[axis] * f64::from(side) / f64::from(view.size[axis]),
+            count: view.size[axis].div_ceil(side),
+            perspective,
+        })
+    }
+
+    /// The first and the last tile that a ball reaches.
+    fn span(&self, place: f64, depth: f64, radius: f64) -> Option<[u32; 2]> {
+        let (least, most) = match self.perspective {
+            true => tangents(place, depth, radius),
+            false => (place - radius, place + radius),
+        };
+        let first = ((least - self.first) / self.step).floor();
+        let last = ((most - self.first) / self.step).floor();
+        let end = f64::from(self.count - 1);
+        // The casts saturate.
+        (last >= 0.0 && first <= end).then(|| [first.max(0.0) as u32, last.min(end) as u32])
+    }
+}
+
+/// The least and the largest place / depth of a disc, seen from the origin: infinite where its tangent does not meet what is in front.
+fn tangents(place: f64, depth: f64, radius: f64) -> (f64, f64) {
+    let squared = place * place + depth * depth - radius * radius;
+    if squared <= 0.0 {
+        return (f64::NEG_INFINITY, f64::INFINITY);
+    }
+    let length = squared.sqrt();
+    let [least, most] = [depth * length + place * radius, depth * length - place * radius];
+    (
+        if least > 0.0 { (place * length - depth * radius) / least } else { f64::NEG_INFINITY },
+        if most > 0.0 { (place * length + depth * radius) / most } else { f64::INFINITY },
+    )
+}
+
+impl Depths {
+    /// Slices between two depths; what is nearer belongs to the first one and what is farther to the last.
+    fn new(view: &ClusteredView, side: u32, near: f64, far: f64) -> Self {
+        let [columns, rows] = Axis::both(view, side);
+        let width = columns.step.min(rows.step);
+        let one = Self { count: 1, scale: 0.0, bias: 0.0, logarithmic: columns.perspective };
+        if !(far > near) {
+            return one;
+        }
+        if !columns.perspective {
+            let count = ((far - near) / width).ceil().clamp(1.0, MOST_SLICES);
+            let scale = count / (far - near);
+            return Self { count: count as u32, scale, bias: -near * scale, ..one };
+        }
+        let near = near.max(far * 1e-9);
+        let octaves = (far / near).log2();
+        // Slices as deep as tiles are wide; where they were too many, deeper ones.
+        let per_octave = 1.0 / (1.0 + width).log2();
+        let count = (octaves * per_octave).ceil().clamp(1.0, MOST_SLICES);
+        let scale = count / octaves;
+        Self { count: count as u32, scale, bias: -near.log2() * scale, ..one }
+    }
+
+    fn slice(&self, depth: f64) -> f64 {
+        let along = if self.logarithmic { depth.max(f64::MIN_POSITIVE).log2() } else { depth };
+        along * self.scale + self.bias
+    }
+
+    /// The first and the last slice that a ball reaches; none behind the eye.
+    fn span(&self, depth: f64, radius: f64) -> Option<[u32; 2]> {
+        if self.logarithmic && depth + radius <= 0.0 {
+            return None;
+        }
+        let end = f64::from(self.count - 1);
+        let first = (self.slice(depth - radius) - SLICE_MARGIN).floor().clamp(0.0, end);
+        let last = (self.slice(depth + radius) + SLICE_MARGIN).floor().clamp(0.0, end);
+        Some([first as u32, last as u32])
+    }
+
+    /// Where a slice begins and ends.
+    fn bounds(&self, slice: u32) -> [f64; 2] {
+        let depth = |place: f64| {
+            let along = (place - self.bias) / self.scale;
+            if self.logarithmic { along.exp2() } else { along }
+        };
+        let nearest = if self.logarithmic { 0.0 } else { f64::NEG_INFINITY };
+        [
+            if slice == 0 { nearest } else { depth(f64::from(slice) - SLICE_MARGIN) },
+            if slice + 1 == self.count { f64::INFINITY } else { depth(f64::from(slice + 1) + SLICE_MARGIN) },
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_ecs::world::World;
+    use lumbre_scene::{Camera, GlobalTransform, Projection, Transform};
+
+    use super::*;
+
+    struct Random(u64);
+
+    impl Random {
+        fn within(&mut self, least: f64, most: f64) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            least + (most - least) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
+        }
+
+        fn place(&mut self, half: f64) -> DVec3 {
+            DVec3::from([0; 3].map(|_| self.within(-half, half)))
+        }
+    }
+
+    fn view(projection: Projection, size: [u32; 2], depths: [f64; 2]) -> ClusteredView {
+        let mut world = World::new();
+        let place = Transform::from_xyz(3.0, 2.0, 9.0).looking_at(DVec3::new(0.5, 0.0, 0.0), DVec3::Y);
+        let camera =
+            world.spawn((Camera { projection, exposure: 1.0 }, GlobalTransform(place.affine()))).id();
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let view = CameraView::new(&world, camera, aspect).unwrap();
+        ClusteredView { view, origin: DVec3::new(1.0, -2.0, 0.25), size, depths }
+    }
+
+    /// What shaders/light_clusters.wesl does; none outside of the frame.
+    fn cluster_at(clusters: &LightClusters, of: &ClusteredView, point: DVec3) -> Option<usize> {
+        let clip = of.view.clip_from_frame(of.origin) * (point - of.origin).extend(1.0);
+        let [x, y] = [clip.x / clip.w, clip.y / clip.w];
+        if clip.w <= 0.0 || x.abs() >= 1.0 || y.abs() >= 1.0 || clip.z > clip.w || clip.z < 0.0 {
+            return None;
+        }
+        let grid = &clusters.grid;
+        let pixel = |ndc: f64, size: u32| {
+            ((0.5 + 0.5 * ndc) * f64::from(size) * f64::from(grid.tiles_per_pixel)) as u32
+        };
+        let (column, row) = (pixel(x, of.size[0]), pixel(-y, of.size[1]));
+        let depth = (of.view.eye - point).dot(of.view.basis.z_axis) as f32;
+        let along = if grid.logarithmic != 0 { depth.max(1e-30).log2() } else { depth };
+        let slice = (along * grid.depth_scale + grid.depth_bias).clamp(0.0, grid.size.z as f32 - 1.0) as u32;
+        Some(((slice * grid.size.y + row) * grid.size.x + column) as usize)
+    }
+
+    fn list(clusters: &LightClusters, cluster: usize, packed: bool) -> Vec<u32> {
+        let table = if packed { 0 } else { clusters.grid.ranged_offsets as usize };
+        let [begin, end] = [0, 1].map(|next| clusters.values[table + cluster + next] as usize);
+        let words = clusters.values[begin..end].iter();
+        if !packed {
+            return words.copied().collect();
+        }
+        words.flat_map(|word| [word & 0xffff, word >> 16]).filter(|light| *light != clusters.black).collect()
+    }
+
+    #[test]
+    fn a_point_within_a_lights_range_finds_it_in_its_cluster() {
+        let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
+        let narrow = Projection::Perspective { vertical_fov: 0.4, aspect: None, near: 2.0, far: None };
+        let parallel =
+            |half_width| Projection::Orthographic { half_width, half_height: 4.0, near: 0.1, far: 30.0 };
+        for (number, (projection, size)) in [
+            (wide, [640, 360]),
+            (wide, [33, 1]),
+            (narrow, [100, 301]),
+            (parallel(6.0), [320, 200]),
+            (parallel(-6.0), [97, 61]),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let mut random = Random(number as u64);
+            let view = view(projection, size, [-5.0, 1e3]);
+            let mut sphere = |light| BoundingSphere {
+                light,
+                center: random.place(8.0),
+                radius: if light % 50 == 0 { 1e3 } else { 10.0_f64.powf(random.within(-2.0, 0.5)) },
+            };
+            let first: Vec<BoundingSphere> = (0..301).map(&mut sphere).collect();
+            let second: Vec<BoundingSphere> = (500..600).map(&mut sphere).collect();
+            let mut clusters = LightClusters::default();
+            // Twice: what was there before leaves no trace.
+            clusters.build(&view, [&second, &first]);
+            clusters.build(&view, [&first, &second]);
+            let (mut seen, mut listed, mut reaching) = (0, 0, 0);
+            for _ in 0..20_000 {
+                let chosen = &first[random.within(0.0, 301.0) as usize];
+                let inside = random.place(1.0);
+                let point = chosen.center
+                    + inside.normalize_or_zero() * (chosen.radius.min(20.0) * random.within(0.0, 1.0));
+                let Some(cluster) = cluster_at(&clusters, &view, point) else { continue };
+                seen += 1;
+                for (spheres, packed) in [(&first, true), (&second, false)] {
+                    let list = list(&clusters, cluster, packed);
+                    assert!(list.is_sorted_by(|a, b| a < b), "each once: {list:?}");
+                    listed += list.len();
+                    for sphere in
+                        spheres.iter().filter(|sphere| sphere.center.distance(point) < sphere.radius)
+                    {
+                        reaching += 1;
+                        assert!(
+                            list.contains(&sphere.light),
+                            "view {number}: {sphere:?} is missed at {point}"
+                        );
+                    }
+                }
+            }
+            assert!(seen > 100, "view {number}: only {seen} points are in view");
+            // All lights in each list would be 401 for each point; a frame of a single tile has little else.
+            let most = if size[1] < 32 { 401 } else { 100 };
+            assert!(
+                listed < most * seen,
+                "view {number}: {listed} listed for {seen} points, {reaching} reach"
+            );
+        }
+    }
+
+    #[test]
+    fn lists_that_would_grow_too_long_take_a_coarser_grid() {
+        let wide = Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None };
+        let view = view(wide, [1920, 1080], [0.1, 100.0]);
+        let sphere = |light| BoundingSphere { light, center: DVec3::ZERO, radius: 6.0 };
+        let mut clusters = LightClusters::default();
+        clusters.build(&view, [&[sphere(0)], &[]]);
+        assert_eq!(clusters.tile_side, 32);
+        let many: Vec<BoundingSphere> = (0..60_000).map(sphere).collect();
+        clusters.build(&view, [&many, &[]]);
+        assert!(
+            clusters.tile_side > 32 && clusters.entries as f64 <= 2.0 * MANY_ENTRIES,
+            "{}",
+            clusters.entries
+        );
+        // None at all: every list is empty, and there is a word to read.
+        clusters.build(&view, [&[], &[]]);
+        assert_eq!((clusters.entries, list(&clusters, 0, true)), (0, vec![]));
+        assert!((clusters.values[0] as usize) < clusters.values.len());
+    }
+}
