@@ -253,7 +253,7 @@ fn explain_says_how_lights_are_found_and_why() {
     world.spawn((lamp.clone(), Transform::IDENTITY));
     world.spawn((Light::directional(Vec3::ONE), Transform::IDENTITY));
     assert_eq!(told(&mut world, &phong), ["objects: 2 lights, 1 with a range: fewer than 3"]);
-    (0..10).for_each(|_| drop(world.spawn((lamp.clone(), Transform::IDENTITY))));
+    world.spawn_batch((0..10).map(|_| (lamp.clone(), Transform::IDENTITY)));
     let lines = told(&mut world, &phong);
     assert!(lines[0].starts_with("clusters: 11 lights with a range"), "{lines:?}");
     assert!(lines[0].contains("11 inverse-square") && lines[0].contains("13 objects"), "{lines:?}");

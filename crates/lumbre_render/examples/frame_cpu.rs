@@ -4,6 +4,8 @@
 //!
 //! `--moving` is a percentage. Medians of the frames, in milliseconds; the frames are small, and their drawing is not counted.
 
+#![allow(clippy::print_stdout, reason = "it prints its results")]
+
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;

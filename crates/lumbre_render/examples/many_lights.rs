@@ -4,6 +4,8 @@
 //!
 //! Wall clock from the call to the finished frame, the device waited for: the median of the frames, and the least.
 
+#![allow(clippy::print_stdout, reason = "it prints its results")]
+
 use std::sync::Arc;
 use std::time::Instant;
 

@@ -394,7 +394,9 @@ impl Depths {
         let [columns, rows] = Axis::both(view, side);
         let width = columns.step.min(rows.step);
         let one = Self { count: 1, scale: 0.0, bias: 0.0, logarithmic: columns.perspective };
-        if !(far > near) {
+        let extent = far - near;
+        // Without a light or an object there is none.
+        if extent.is_nan() || extent <= 0.0 {
             return one;
         }
         if !columns.perspective {
