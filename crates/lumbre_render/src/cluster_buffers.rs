@@ -1,10 +1,11 @@
 //! The GPU's copies of a frame's clusters: their grid, their lists, and the lean records of the lights in them. What stands in the lists
 //! is decided in `light_clusters`.
 
+use crate::extract::UNIFORM_LIGHTS;
 use crate::extract::{LightClass, SceneLights};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{ClusterGridData, InverseSquareLightData};
-use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters, UNIFORM_LIGHTS};
+use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
 use crate::{Gpu, RenderError};
 
 /// Bindings 6 to 9 of group 0.

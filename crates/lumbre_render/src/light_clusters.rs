@@ -23,11 +23,6 @@ const DISTANCE_MARGIN: f64 = 2e-6;
 /// Slices overlap by this part of one, for the same reason.
 const SLICE_MARGIN: f64 = 2e-3;
 
-/// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
-pub(crate) const UNIFORM_LIGHTS: u32 = 2047;
-/// Most inverse-square lights that 16 bits number, beside a black one; more of them are listed as other lights with a range are.
-pub(crate) const NUMBERED_LIGHTS: usize = 65_535;
-
 /// A ball that holds all points that a light reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundingSphere {

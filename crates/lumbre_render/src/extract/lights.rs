@@ -8,9 +8,12 @@ use lumbre_scene::{GlobalTransform, Name};
 use super::emitters::{EmissivePolygon, Emitters};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{InverseSquareLightData, LightData};
-use crate::light_clusters::NUMBERED_LIGHTS;
 use crate::{LightLists, RenderError};
 
+/// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
+pub(crate) const UNIFORM_LIGHTS: u32 = 2047;
+/// Most inverse-square lights that 16 bits number, beside a black one; more of them are listed as other lights with a range are.
+pub(crate) const NUMBERED_LIGHTS: usize = 65_535;
 /// From so many lights with a range on they are listed by clusters: with two, finding the cluster costs about what it saves.
 const CLUSTERED_LIGHTS: u32 = 3;
 

@@ -6,8 +6,8 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Distribution, FogMode, Fresnel, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{MaterialTextures, SceneSettings};
 
+use super::lights::UNIFORM_LIGHTS;
 use super::lights::{LightCounts, LightSet};
-use crate::light_clusters::UNIFORM_LIGHTS;
 use crate::shader::{Feature, Variant};
 use crate::texture_sets;
 
