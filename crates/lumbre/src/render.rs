@@ -45,7 +45,8 @@ struct PassTimes {
     fragment_invocations: Option<u64>,
     /// Lights that were tested against each object of this pass.
     lights_tested: u32,
-    /// Lights that reach an object in view and that its vertices or fragments evaluate, on average.
+    /// Lights in the list of an object in view, on average: its vertices or fragments evaluate those. What fragments find by clusters beside
+    /// them stands in the frame's `light_lists`.
     lights_shaded: f32,
 }
 

@@ -55,7 +55,18 @@ fn place() -> Place {
 impl Place {
     /// The command, with two threads and a map of 48 texels.
     fn bake(&self, more: &[&str]) -> Command {
-        let mut command = Command::new(LUMBRE);
+        self.bake_by(Command::new(LUMBRE), more)
+    }
+
+    /// The same, with signals as a terminal leaves them: what runs in the background of a script inherits an ignored SIGINT, and one that
+    /// comes before the program has begun would be lost.
+    fn bake_with_signals(&self, more: &[&str]) -> Command {
+        let mut command = Command::new("env");
+        command.args(["--default-signal=INT,TERM", LUMBRE]);
+        self.bake_by(command, more)
+    }
+
+    fn bake_by(&self, mut command: Command, more: &[&str]) -> Command {
         command.arg("bake").arg(&self.level).arg("-o").arg(&self.output);
         command.args(["--map-size", "48", "--error", "0.003", "--threads", "2"]).args(more);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -160,7 +171,7 @@ fn whenever_it_is_interrupted_it_ends_soon_and_goes_on_to_the_same_bytes() {
     for (delay, signal) in
         [(0, "-INT"), (10, "-TERM"), (40, "-INT"), (120, "-TERM"), (350, "-INT"), (900, "-INT")]
     {
-        let mut child = place.bake(&["--resume", "--quiet"]).spawn().unwrap();
+        let mut child = place.bake_with_signals(&["--resume", "--quiet"]).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(delay));
         let told = Command::new("kill").args([signal.to_owned(), child.id().to_string()]).status().unwrap();
         let begun = std::time::Instant::now();
