@@ -1,8 +1,7 @@
 //! The GPU's copies of a frame's clusters: their grid, their lists, and the lean records of the lights in them. What stands in the lists
 //! is decided in `light_clusters`.
 
-use crate::extract::UNIFORM_LIGHTS;
-use crate::extract::{LightClass, SceneLights};
+use crate::extract::{LightClass, SceneLights, UNIFORM_LIGHTS};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{ClusterGridData, InverseSquareLightData};
 use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
@@ -47,13 +46,10 @@ impl ClusterBuffers {
             }
         }
         self.clusters.build(view, [&self.inverse_square, &self.ranged]);
-        let dynamic = |class: LightClass| {
-            lights.reaches.iter().filter(|reach| !reach.baked && reach.class == class).count()
-        };
-        let number = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        // Baked lights stand last.
         let grid = &mut self.clusters.grid;
-        grid.first_baked_inverse_square = number(dynamic(LightClass::InverseSquare));
-        grid.first_baked_ranged = number(lights.reaches.iter().filter(|reach| !reach.baked).count());
+        grid.first_baked_inverse_square = lights.set.inverse_square.dynamic;
+        grid.first_baked_ranged = lights.set.every.dynamic;
         self.grid.replace([*grid]);
         self.lights.replace(lights.inverse_square.iter().copied().chain([InverseSquareLightData::BLACK]));
     }

@@ -106,10 +106,12 @@ impl LightSet {
         let mut set = Self::default();
         Emitters::default().polygons(world)?.iter().for_each(|polygon| set.add_polygon(polygon));
         let mut query = world.query::<(&Light, &GlobalTransform)>();
-        query
-            .iter(world)
-            .filter(|(light, transform)| shines(light, transform))
-            .for_each(|(light, _)| set.add(light));
+        let shining = query.iter(world).filter(|(light, transform)| shines(light, transform));
+        let mut found: Vec<&Light> = shining.map(|(light, _)| light).collect();
+        found.sort_by_key(|light| light.bake == BakeMode::Static);
+        for light in found {
+            set.add(light);
+        }
         Ok(set)
     }
 
@@ -171,20 +173,27 @@ impl LightSet {
         self.unbounded.add_polygon(polygon);
     }
 
-    fn add(&mut self, light: &Light) {
+    /// Counts a light, and says of which class it is; an ambient one is of none. Baked lights are to come last: where numbers run out, the same
+    /// lights have to go without one wherever they are counted.
+    fn add(&mut self, light: &Light) -> Option<LightClass> {
         if light.kind == LightKind::Ambient {
             self.ambient += light.ambient;
-            return;
+            return None;
         }
         self.every.add(light);
-        match LightClass::of(light) {
-            LightClass::Unbounded => self.unbounded.add(light),
+        let class = match LightClass::of(light) {
             LightClass::InverseSquare if self.inverse_square.all as usize == NUMBERED_LIGHTS => {
-                self.ranged.add(light);
+                LightClass::Ranged
             }
-            LightClass::InverseSquare => self.inverse_square.add(light),
-            LightClass::Ranged => self.ranged.add(light),
-        }
+            class => class,
+        };
+        let counts = match class {
+            LightClass::Unbounded => &mut self.unbounded,
+            LightClass::InverseSquare => &mut self.inverse_square,
+            LightClass::Ranged => &mut self.ranged,
+        };
+        counts.add(light);
+        Some(class)
     }
 }
 
@@ -211,8 +220,7 @@ pub(crate) struct PolygonReach {
 }
 
 impl LightReach {
-    fn new(light: &Light, transform: &GlobalTransform) -> Self {
-        let class = LightClass::of(light);
+    fn new(light: &Light, transform: &GlobalTransform, class: LightClass) -> Self {
         let (center, radius) = match light.kind {
             LightKind::Point => bounding_sphere(light, transform),
             LightKind::Ambient | LightKind::Directional => (transform.translation(), f64::INFINITY),
@@ -276,8 +284,6 @@ pub(crate) fn extract_lights(
         })
         .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
-    found.iter().for_each(|(_, light, _)| scene.set.add(light));
-    found.retain(|(_, light, _)| light.kind != LightKind::Ambient);
     // Stable: within both halves the order stays.
     found.sort_by_key(|(_, light, _)| light.bake == BakeMode::Static);
     let baked = found.iter().position(|(_, light, _)| light.bake == BakeMode::Static).unwrap_or(found.len());
@@ -285,14 +291,11 @@ pub(crate) fn extract_lights(
     let mut data = Vec::with_capacity(found.len() + polygons.len());
     for (lights, of_baked) in [(dynamic, false), (baked, true)] {
         for (_, light, transform) in lights {
-            let mut reach = LightReach::new(light, transform);
-            if scene.inverse_square.len() == NUMBERED_LIGHTS && reach.class == LightClass::InverseSquare {
-                reach.class = LightClass::Ranged;
-            }
-            if reach.class == LightClass::InverseSquare {
+            let Some(class) = scene.set.add(light) else { continue };
+            if class == LightClass::InverseSquare {
                 scene.inverse_square.push(InverseSquareLightData::new(light, transform, origin));
             }
-            scene.reaches.push(reach);
+            scene.reaches.push(LightReach::new(light, transform, class));
             data.push(LightData::new(light, transform, origin));
         }
         for polygon in polygons.iter().filter(|polygon| polygon.baked == of_baked) {
@@ -355,6 +358,20 @@ mod tests {
             assert!(farthest <= radius + 1e-9, "{outer}: {farthest} is outside of {radius}");
             assert!(radius < farthest * (1.0 + 1e-4), "{outer}: {radius} is wider than {farthest}");
         }
+    }
+
+    #[test]
+    fn lights_beyond_the_last_number_are_found_without_one() {
+        let attenuation = Attenuation { range: 3.0, ..Attenuation::INVERSE_SQUARE };
+        let lamp = Light { attenuation, ..Light::point(Vec3::ONE) };
+        let mut set = LightSet::default();
+        for _ in 0..NUMBERED_LIGHTS {
+            assert_eq!(set.add(&lamp), Some(LightClass::InverseSquare));
+        }
+        assert_eq!(set.add(&Light { bake: BakeMode::Static, ..lamp }), Some(LightClass::Ranged));
+        assert_eq!((set.inverse_square.dynamic, set.ranged.all, set.ranged.dynamic), (65_535, 1, 0));
+        assert_eq!(set.add(&Light::ambient(Vec3::X)), None);
+        assert_eq!((set.ambient, set.every.all), (Vec3::X, 65_536));
     }
 
     #[test]

@@ -6,8 +6,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Distribution, FogMode, Fresnel, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{MaterialTextures, SceneSettings};
 
-use super::lights::UNIFORM_LIGHTS;
-use super::lights::{LightCounts, LightSet};
+use super::lights::{LightCounts, LightSet, UNIFORM_LIGHTS};
 use crate::shader::{Feature, Variant};
 use crate::texture_sets;
 
@@ -130,7 +129,7 @@ impl Traits {
         variant.set(Feature::StaticLights, left(listed));
         let reads = |of: &LightCounts| clustered && (of.dynamic > 0 || left(of));
         variant.set(Feature::InverseSquareClusters, reads(inverse_square));
-        variant.set(Feature::UniformLights, inverse_square.all <= UNIFORM_LIGHTS);
+        variant.set(Feature::UniformLights, reads(inverse_square) && inverse_square.all <= UNIFORM_LIGHTS);
         variant.set(Feature::RangedClusters, reads(ranged));
         for kinds in [Some(listed), clustered.then_some(ranged)].into_iter().flatten() {
             variant.set(Feature::DirectionalLights, kinds.directional);
