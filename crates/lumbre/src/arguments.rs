@@ -38,7 +38,7 @@ pub enum Command {
 Examples:
   lumbre bake room.glb -o room.baked.glb
   lumbre bake room.glb -o room.baked.glb --error 0.005 --time 120
-  lumbre bake room.glb -o room.baked.glb --ktx2 rgb9e5
+  lumbre bake room.glb -o room.baked.glb --ktx2 b10g11r11
   lumbre bake box.glb -o box.baked.glb --map-size 256 --json > report.json")]
     Bake(Bake),
     /// Draw frames without a window.
@@ -50,7 +50,7 @@ Examples:
     Render(Render),
     /// Say what a scene calls for, which passes run and why the others do not.
     #[command(
-        after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
+        after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --measure\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
     )]
     Explain(Explain),
 }
@@ -82,7 +82,7 @@ pub struct Play {
     #[command(flatten)]
     pub reading: Reading,
     /// Factor on radiance, an exposure value like 12EV, or auto; without this auto for lights in candela or lux that would be white.
-    #[arg(long, value_name = "auto|EV|X", value_parser = exposure)]
+    #[arg(long, value_name = "auto|EV|X", value_parser = exposure, allow_negative_numbers = true)]
     pub exposure: Option<Exposure>,
     /// Leaves a level without lights dark, instead of lighting it from the camera.
     #[arg(long)]
@@ -94,10 +94,10 @@ pub struct Play {
     #[arg(long, value_name = "DIR", default_value = "frames")]
     pub frames_dir: PathBuf,
     /// How many frames the tour has.
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100_000), allow_negative_numbers = true)]
     pub frames: u32,
     /// Width and height of the tour's frames in pixels.
-    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size, allow_negative_numbers = true)]
     pub size: (u32, u32),
     /// Plays back recorded input (JSON) instead of the keyboard and mouse.
     #[arg(long, value_name = "FILE")]
@@ -109,7 +109,7 @@ pub struct Play {
     #[arg(long, value_name = "FILE")]
     pub screenshot: Option<PathBuf>,
     /// Ends after so many frames.
-    #[arg(long, value_name = "FRAMES")]
+    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true)]
     pub quit_after: Option<u32>,
 }
 
@@ -137,40 +137,40 @@ pub struct Bake {
     #[arg(long)]
     pub overwrite: bool,
     /// Radiance of an even sky, W/(m² sr): one number, or red, green and blue; in place of the level's own.
-    #[arg(long, value_name = "X|R,G,B", value_parser = sky)]
+    #[arg(long, value_name = "X|R,G,B", value_parser = sky, allow_negative_numbers = true)]
     pub sky: Option<glam::Vec3>,
     /// Relative RMSE that the lightmap may have by its own estimate, like 0.01 or 1%.
-    #[arg(long, default_value = "0.01", value_parser = share)]
+    #[arg(long, default_value = "0.01", value_parser = share, allow_negative_numbers = true)]
     pub error: f64,
     /// Seconds after which no more samples are taken; the map is complete all the same.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub time: Option<Duration>,
     /// Texels along a metre of surface; chosen from the scene's area without this.
-    #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "map_size")]
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, conflicts_with = "map_size")]
     pub texels_per_meter: Option<f64>,
     /// Side of each mesh's own map in texels.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=8192))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=8192), allow_negative_numbers = true)]
     pub map_size: Option<u32>,
     /// Continues an interrupted bake from its checkpoint, if there is one.
     #[arg(long)]
     pub resume: bool,
     /// Seconds between writes of the checkpoint: what a crash costs.
-    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = seconds, allow_negative_numbers = true)]
     pub checkpoint_every: Duration,
     /// Memory that the bake may take beside the level, like 512MiB or 2GB; it makes do with fewer patches and rays.
-    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = bytes, allow_negative_numbers = true)]
     pub memory: Option<u64>,
     /// How much work may go into it.
     #[arg(long, value_enum, default_value_t = BakeQuality::Final)]
     pub quality: BakeQuality,
     /// Worker threads; as many as there are cores without this.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     pub threads: Option<u16>,
     /// Free texels between charts: 2 for bilinear filtering, 4 for bicubic.
-    #[arg(long, value_name = "TEXELS", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=64))]
+    #[arg(long, value_name = "TEXELS", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=64), allow_negative_numbers = true)]
     pub gap: u32,
-    /// Lets small meshes share atlases of at most N x N texels.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=8192))]
+    /// Lets small meshes share atlases of at most N x N texels, or not, with 0; 2048 without this, and 0 with --map-size.
+    #[arg(long, value_name = "N", value_parser = atlas_size, allow_negative_numbers = true)]
     pub atlas_size: Option<u32>,
     /// Leaves the seams between charts as they are.
     #[arg(long)]
@@ -187,11 +187,11 @@ pub struct Bake {
     /// How the radiosity system is solved.
     #[arg(long, value_enum, default_value_t = BakeSolver::ConjugateGradients)]
     pub solver: BakeSolver,
-    /// Writes each lightmap as a KTX2 image too, as Bevy reads it.
-    #[arg(long, value_name = "rgb9e5|b10g11r11", value_parser = packed_format)]
-    pub ktx2: Option<PackedFormat>,
+    /// Format of the KTX2 images that are written beside OpenEXR's, as Bevy reads them.
+    #[arg(long, value_name = "rgb9e5|b10g11r11|none", default_value = "rgb9e5", value_parser = ktx2)]
+    pub ktx2: Ktx2,
     /// Leaves KTX2 images without Zstandard compression.
-    #[arg(long, requires = "ktx2")]
+    #[arg(long)]
     pub ktx2_raw: bool,
     /// How OpenEXR images hold their texels.
     #[arg(long, value_enum, default_value_t = ExrTexels::Float)]
@@ -200,7 +200,7 @@ pub struct Bake {
     #[arg(long, value_enum, default_value_t = BakeProbes::Auto)]
     pub probes: BakeProbes,
     /// Metres between probes at most; chosen from the scene's size without this.
-    #[arg(long, value_name = "X", value_parser = positive)]
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub probe_spacing: Option<f64>,
     /// Prints the report as JSON.
     #[arg(long)]
@@ -209,6 +209,10 @@ pub struct Bake {
     #[arg(long)]
     pub quiet: bool,
 }
+
+/// What KTX2 images hold, if they are written.
+#[derive(Clone, Copy, Debug)]
+pub struct Ktx2(pub Option<PackedFormat>);
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BakeProbes {
@@ -264,12 +268,12 @@ pub struct Render {
     #[arg(short, long, value_name = "OUT.png|OUT.exr")]
     pub output: PathBuf,
     /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_negative_numbers = true)]
     pub size: (u32, u32),
     #[command(flatten)]
     pub frame: Frame,
     /// Draws so many frames and writes the last one.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), allow_negative_numbers = true)]
     pub frames: u32,
     /// Writes what each frame and each of its passes cost, as JSON.
     #[arg(long, value_name = "OUT.json")]
@@ -285,6 +289,15 @@ pub struct Explain {
     /// For people, for programs, for Graphviz.
     #[arg(long, value_enum, default_value_t = ExplainFormat::Text)]
     pub format: ExplainFormat,
+    /// Says also what the scene does not call for, every pass and resource with the reason, and every shader variant.
+    #[arg(long)]
+    pub all: bool,
+    /// Draws frames with each effect and without it, for about so many seconds, and says what it costs and what the picture owes to it.
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true, default_missing_value = "10", value_parser = seconds, allow_negative_numbers = true)]
+    pub measure: Option<Duration>,
+    /// Width and height of the frame in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_negative_numbers = true)]
+    pub size: (u32, u32),
     #[command(flatten)]
     pub frame: Frame,
 }
@@ -300,7 +313,7 @@ pub enum ExplainFormat {
 }
 
 /// Choices about how a frame is drawn.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct Frame {
     /// Camera by name or index; the first without this, and one that sees the whole scene if it has none.
     #[arg(long, value_name = "NAME|INDEX")]
@@ -328,7 +341,7 @@ pub struct Frame {
     pub msaa: bool,
     /// Factor on radiance, an exposure value like 12EV, or auto, instead of the camera's; without this auto in a PNG of lights in candela or lux that
     /// would be white.
-    #[arg(long, value_name = "auto|EV|X", value_parser = exposure)]
+    #[arg(long, value_name = "auto|EV|X", value_parser = exposure, allow_negative_numbers = true)]
     pub exposure: Option<Exposure>,
     /// Leaves a scene without lights dark, instead of lighting it from the camera.
     #[arg(long)]
@@ -436,9 +449,18 @@ fn flat_rule(text: &str) -> Result<FlatRule, String> {
     named(FlatRule::from_name(text), FlatRule::ALL.iter().map(|choice| choice.name()))
 }
 
-fn packed_format(text: &str) -> Result<PackedFormat, String> {
-    let found = PackedFormat::ALL.into_iter().find(|format| format.name() == text);
-    named(found, PackedFormat::ALL.iter().map(|format| format.name()))
+fn ktx2(text: &str) -> Result<Ktx2, String> {
+    let formats = PackedFormat::ALL.into_iter().map(|format| (format.name(), Ktx2(Some(format))));
+    let choices: Vec<_> = formats.chain([("none", Ktx2(None))]).collect();
+    let found = choices.iter().find(|(name, _)| *name == text).map(|(_, choice)| *choice);
+    named(found, choices.iter().map(|(name, _)| *name))
+}
+
+fn atlas_size(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(side) if side == 0 || (16..=8192).contains(&side) => Ok(side),
+        _ => Err("a number of texels from 16 to 8192 is wanted, or 0 for no atlases".into()),
+    }
 }
 
 fn on_or_off(text: &str) -> Result<bool, String> {

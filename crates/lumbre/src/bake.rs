@@ -21,7 +21,7 @@ use lumbre::scene::{
 };
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
-use crate::bake_record::{Asked, BakeRecord, hash_of_files};
+use crate::bake_record::{Asked, BakeRecord, folder_of_bake, hash_of_files};
 use crate::interruption::Interruption;
 use crate::lightmap_report::{FileLine, summary_of_files, warnings_of_files};
 use crate::loading::{Loaded, extension, load_source};
@@ -75,6 +75,9 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     print(&report, &lightmaps, asked.json)
 }
 
+/// Side of the atlases that small meshes share, in texels: what every device can bind, and most levels fit into a few of them.
+const ATLAS_SIDE: u32 = 2048;
+
 fn options(asked: &Bake) -> BakeOptions {
     let density = match (asked.texels_per_meter, asked.map_size) {
         (Some(density), _) => Density::TexelsPerMeter(density),
@@ -98,7 +101,11 @@ fn options(asked: &Bake) -> BakeOptions {
         },
         probe_spacing: asked.probe_spacing,
         gap: asked.gap,
-        atlas_size: asked.atlas_size,
+        atlas_size: match (asked.atlas_size, asked.map_size) {
+            (Some(0), _) | (None, Some(_)) => None,
+            (Some(side), _) => Some(side),
+            (None, None) => Some(ATLAS_SIDE),
+        },
         seams: !asked.no_seams,
         resolution_error: !asked.no_resolution_error,
         form_factors: match asked.form_factors {
@@ -120,14 +127,13 @@ fn save_options(asked: &Bake) -> SaveOptions {
             ExrTexels::Float => None,
             ExrTexels::Half => Some(LightmapEncoding::Rgb16Float),
         },
-        ktx2: asked.ktx2,
+        ktx2: asked.ktx2.0,
         supercompression: if asked.ktx2_raw { Supercompression::None } else { Supercompression::Zstandard },
     }
 }
 
-/// `room.baked.glb` has the samples of its texels in `room.baked.bake.samples`.
 fn samples_path(output: &Path) -> PathBuf {
-    output.with_extension("bake.samples")
+    folder_of_bake(output).join("samples")
 }
 
 /// The samples of the output that is there, if they can be read.

@@ -66,9 +66,13 @@ pub fn hash_of_files<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> io::Re
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// `room.baked.glb` has its record in `room.baked.bake.json`.
+/// `room.baked.glb` has what the next bake of it starts from in the folder `room.baked.bake`, which may be deleted.
+pub fn folder_of_bake(output: &Path) -> PathBuf {
+    output.with_extension("bake")
+}
+
 fn place(output: &Path) -> PathBuf {
-    output.with_extension("bake.json")
+    folder_of_bake(output).join("record.json")
 }
 
 impl BakeRecord {
@@ -94,6 +98,8 @@ impl BakeRecord {
     }
 
     /// Writes the record of what was just written.
+    ///
+    /// What the bake before wrote into the folder of the lightmaps and this one did not goes.
     pub fn write(
         output: &Path,
         asked: Asked,
@@ -118,7 +124,28 @@ impl BakeRecord {
         let mut text = serde_json::to_vec_pretty(&record)?;
         text.push(b'\n');
         let path = place(output);
-        replace(&path, &text).with_context(|| format!("{} could not be written", path.display()))
+        remove_former_lightmaps(&path, output, &record.files);
+        std::fs::create_dir_all(folder_of_bake(output))
+            .and_then(|()| replace(&path, &text))
+            .with_context(|| format!("{} could not be written", path.display()))
+    }
+}
+
+/// Removes the lightmaps of the bake whose record is there that are not among the new files. Those that are no more as they were written
+/// are somebody else's.
+fn remove_former_lightmaps(record: &Path, output: &Path, files: &[FileRecord]) {
+    let former = std::fs::read(record).ok().and_then(|text| serde_json::from_slice::<BakeRecord>(&text).ok());
+    let folder = output.with_extension("lightmaps");
+    for file in former.into_iter().flat_map(|former| former.files) {
+        let path = output.with_file_name(&file.name);
+        let new = files.iter().any(|new| new.name == file.name);
+        if !new
+            && path.parent() == Some(&folder)
+            && hash_of_files([&path]).is_ok_and(|hash| hash == file.blake3)
+        {
+            // One picture too many does no harm.
+            let _ = std::fs::remove_file(path);
+        }
     }
 }
 

@@ -1,25 +1,57 @@
-//! `lumbre explain`: what a scene calls for, and what it does not.
+//! `lumbre explain`: what a scene calls for, what it does not, and what each effect costs.
 
 use std::io::Write;
 
-use lumbre::render::{Display, explain};
+use anyhow::Context;
+use bevy_ecs::world::World;
+use lumbre::render::{Display, FrameOptions, Gpu, effect_costs, explain, removable_effects};
+use lumbre::scene::{add_default_light, is_without_light};
 
-use crate::arguments::{Explain, ExplainFormat};
-use crate::loading::{frame_options, load};
+use crate::arguments::{Explain, ExplainFormat, Frame};
+use crate::loading::{frame_options, load, load_quietly};
+
+/// What else there is to ask.
+const HINT: &str =
+    "\n--all gives the reasons, passes, resources and variants; --measure what each effect costs\n";
 
 /// Runs the command.
 pub fn run(asked: &Explain) -> anyhow::Result<()> {
+    let (width, height) = asked.size;
     let mut world = load(&asked.input, &asked.reading)?.world;
-    let (width, height) = (1280, 720);
-    let display = asked.frame.display.unwrap_or(Display::Srgb);
-    let aspect = f64::from(width) / f64::from(height);
-    let options = frame_options(&mut world, &asked.frame, display, aspect, &asked.input)?;
-    let explanation = explain(&mut world, &options, width, height)?;
+    let options = options(asked, &asked.frame, &mut world)?;
+    let mut explanation = explain(&mut world, &options, width, height)?;
+    if let Some(time) = asked.measure {
+        let gpu = Gpu::headless()?;
+        let effects = removable_effects(&explanation.census);
+        let mut again = || again(asked);
+        let cost = effect_costs(&gpu, &mut again, &effects, [width, height], time)
+            .with_context(|| format!("{} could not be drawn", asked.input.display()))?;
+        explanation.cost = Some(cost);
+    }
     let text = match asked.format {
-        ExplainFormat::Text => explanation.to_text(),
+        ExplainFormat::Text if asked.all => explanation.to_text(),
+        ExplainFormat::Text => explanation.to_short_text() + HINT,
         ExplainFormat::Json => serde_json::to_string_pretty(&explanation)? + "\n",
         ExplainFormat::Dot => explanation.frame.to_dot(),
     };
     std::io::stdout().lock().write_all(text.as_bytes())?;
     Ok(())
+}
+
+fn options(asked: &Explain, frame: &Frame, world: &mut World) -> anyhow::Result<FrameOptions> {
+    let (width, height) = asked.size;
+    let display = frame.display.unwrap_or(Display::Srgb);
+    frame_options(world, frame, display, f64::from(width) / f64::from(height), &asked.input)
+}
+
+/// The scene with the options of its frame once more, without the notes that have been given already.
+fn again(asked: &Explain) -> anyhow::Result<(World, FrameOptions)> {
+    let mut world = load_quietly(&asked.input, &asked.reading)?.world;
+    let options = options(asked, &Frame { no_default_light: true, ..asked.frame.clone() }, &mut world)?;
+    if let Some(camera) =
+        options.camera.filter(|_| !asked.frame.no_default_light && is_without_light(&mut world))
+    {
+        add_default_light(&mut world, camera);
+    }
+    Ok((world, options))
 }

@@ -26,6 +26,14 @@ pub fn load(path: &Path, reading: &Reading) -> anyhow::Result<Loaded> {
     Ok(loaded(world, report, path))
 }
 
+/// [`load`] without a word: for a file that has been loaded before.
+pub fn load_quietly(path: &Path, reading: &Reading) -> anyhow::Result<Loaded> {
+    let mut world = World::new();
+    let report = scene::load_with(&mut world, path, &load_options(reading))?;
+    world.insert_resource(FileOrder(report.nodes.clone()));
+    Ok(Loaded { world, report })
+}
+
 /// [`load`], and the file itself, to be written again with light.
 pub fn load_source(path: &Path, reading: &Reading) -> anyhow::Result<(SourceFile, Loaded)> {
     let mut world = World::new();

@@ -20,6 +20,7 @@ use clap::Parser;
 use crate::arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
+    silence_device_selection();
     // Bad usage ends in here, with exit status 2.
     let arguments = Arguments::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_env("LUMBRE_LOG").unwrap_or_else(|_| {
@@ -52,4 +53,14 @@ fn main() -> ExitCode {
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
     let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<std::io::Error>());
     causes.any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+/// Where there is no desktop's runtime folder, Mesa's layer that asks the desktop for the preferred device makes the Wayland library complain
+/// on standard error, once for every device that is opened.
+#[allow(unsafe_code, reason = "changing the environment is unsafe where other threads may read it")]
+fn silence_device_selection() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os("NODEVICE_SELECT").is_none() {
+        // SAFETY: this is the first thing that `main` does; there is no other thread yet.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
 }

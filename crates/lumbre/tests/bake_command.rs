@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use bevy_ecs::world::World;
@@ -68,7 +68,7 @@ impl Place {
 
     fn bake_by(&self, mut command: Command, more: &[&str]) -> Command {
         command.arg("bake").arg(&self.level).arg("-o").arg(&self.output);
-        command.args(["--map-size", "48", "--error", "0.003", "--threads", "2"]).args(more);
+        command.args(["--map-size", "48", "--error", "0.01", "--threads", "2"]).args(more);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
@@ -77,12 +77,22 @@ impl Place {
         self.output.with_file_name("level.glb.checkpoint")
     }
 
-    /// Name and content of everything beside the output, the record aside: it holds times.
+    /// Name and content of everything beside the output and in the folders there, the record aside: it holds times.
     fn files(&self) -> BTreeMap<String, Vec<u8>> {
-        let entries = fs::read_dir(self.output.parent().unwrap()).unwrap().map(|entry| entry.unwrap());
-        let files =
-            entries.map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()));
-        files.filter(|(name, _)| name != "level.bake.json").collect()
+        let output = self.output.parent().unwrap();
+        let (mut files, mut folders) = (BTreeMap::new(), vec![output.to_owned()]);
+        while let Some(folder) = folders.pop() {
+            for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+                let name = path.strip_prefix(output).unwrap().to_str().unwrap().to_owned();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if name != "level.bake/record.json" {
+                    // One that is being written may have got its name in between.
+                    files.extend(fs::read(&path).ok().map(|content| (name, content)));
+                }
+            }
+        }
+        files
     }
 }
 
@@ -98,15 +108,20 @@ fn done(command: &mut Command) -> Output {
 
 /// What an undisturbed bake writes.
 fn expected() -> BTreeMap<String, Vec<u8>> {
-    let place = place();
-    done(&mut place.bake(&[]));
-    let files = place.files();
+    static EXPECTED: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    let bake = || {
+        let place = place();
+        done(&mut place.bake(&[]));
+        place.files()
+    };
+    let files = EXPECTED.get_or_init(bake);
+    // Three maps in two formats each, the level, and the samples.
     assert!(
-        files.len() == 5 && files.contains_key("level.bake.samples") && files.contains_key("level.glb"),
+        files.len() == 8 && files.contains_key("level.bake/samples") && files.contains_key("level.glb"),
         "{:?}",
         files.keys()
     );
-    files
+    files.clone()
 }
 
 #[test]
@@ -229,7 +244,7 @@ fn an_unchanged_level_is_left_as_it_is() {
     fs::remove_file(&map).unwrap();
     assert!(!again(&[]).0 && place.files() == files);
     // Rubbish for a record.
-    fs::write(place.output.with_file_name("level.bake.json"), "{").unwrap();
+    fs::write(place.output.with_file_name("level.bake/record.json"), "{").unwrap();
     assert!(!again(&[]).0 && again(&[]).0);
     // What the light does not depend on is in the baked file, too.
     level(&place.level, 7.0);
@@ -238,10 +253,30 @@ fn an_unchanged_level_is_left_as_it_is() {
 }
 
 #[test]
+fn lightmaps_have_a_folder_of_their_own_and_no_picture_outlives_its_node() {
+    let place = place();
+    let lightmaps = |more: &[&str]| {
+        let mut command = Command::new(LUMBRE);
+        command.arg("bake").arg(&place.level).arg("-o").arg(&place.output);
+        done(command.args(["--texels-per-meter", "4", "--error", "0.1"]).args(more));
+        let names = place.files().into_keys();
+        names.filter_map(|name| Some(name.strip_prefix("level.lightmaps/")?.to_owned())).collect::<Vec<_>>()
+    };
+    assert_eq!(lightmaps(&["--atlas-size", "0", "--ktx2", "none"]), ["0.exr", "1.exr", "2.exr"]);
+    // What an artist has put there is the artist's.
+    fs::write(place.output.with_file_name("level.lightmaps/1.exr"), "mine").unwrap();
+    assert_eq!(lightmaps(&[]), ["1.exr", "atlas-1.exr", "atlas-1.ktx2"]);
+    assert_eq!(fs::read(place.output.with_file_name("level.lightmaps/1.exr")).unwrap(), b"mine");
+    let mut world = World::new();
+    assert_eq!(lumbre::scene::load(&mut world, &place.output).unwrap().notes, []);
+    assert_eq!(world.query::<&lumbre::scene::Lightmap>().iter(&world).count(), 3);
+}
+
+#[test]
 fn a_box_that_moves_leaves_what_it_cannot_affect() {
     let place = place();
     done(&mut place.bake(&[]));
-    let samples = place.output.with_file_name("level.bake.samples");
+    let samples = place.output.with_file_name("level.bake/samples");
     let bake = |x: f64, more: &[&str]| {
         level_with_box_at(&place.level, 6.0, x);
         let mut arguments = vec!["--json"];
@@ -255,7 +290,7 @@ fn a_box_that_moves_leaves_what_it_cannot_affect() {
     let count = |of: &str| rebake[of].as_u64().unwrap();
     assert!(rebake["changed"].as_array().is_some_and(|changed| changed.len() == 1), "{rebake}");
     assert!(count("gathered") < count("texels") && count("relit") < count("texels"), "{rebake}");
-    assert!(rebake["neglected"].as_f64().unwrap() < 0.003, "{rebake}");
+    assert!(rebake["neglected"].as_f64().unwrap() < 0.01, "{rebake}");
     // The same in words.
     level_with_box_at(&place.level, 6.0, 0.3);
     let said = String::from_utf8(done(&mut place.bake(&[])).stdout).unwrap();
@@ -269,7 +304,7 @@ fn a_box_that_moves_leaves_what_it_cannot_affect() {
     fs::write(&samples, &whole[..whole.len() - 9]).unwrap();
     let (rebake, said) = bake(0.4, &[]);
     assert!(rebake.is_null(), "{rebake}");
-    assert!(said.contains("level.bake.samples: it is damaged or cut short; everything is baked"), "{said}");
+    assert!(said.contains("level.bake/samples: it is damaged or cut short; everything is baked"), "{said}");
     assert!(bake(0.5, &[]).0["whole"] == "", "the next bake has samples again");
     let (rebake, _) = bake(0.6, &["--no-reuse"]);
     assert!(rebake.is_null() && !samples.exists(), "{rebake}");
@@ -355,7 +390,7 @@ fn a_full_disk_leaves_nothing_half_written() {
     // Writes beyond 4 or 8 KiB of a file fail as on a full disk.
     limited.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\"", LUMBRE, "bake"]);
     limited.arg(&place.level).arg("-o").arg(&place.output);
-    limited.args(["--map-size", "48", "--error", "0.003", "--checkpoint-every", "0.001"]);
+    limited.args(["--map-size", "48", "--error", "0.01", "--checkpoint-every", "0.001"]);
     let output = limited.output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let said = stderr(&output);
@@ -374,7 +409,7 @@ fn when_the_time_is_up_there_is_a_map_and_the_reason() {
     assert_eq!((&report["ended"], &report["error_reached"]), (&"time".into(), &false.into()));
     let curve = report["curve"].as_array().unwrap();
     assert_eq!(curve.last().unwrap()["error"], report["estimated_error"]);
-    assert_eq!(place.files().len(), 4);
+    assert_eq!(place.files().len(), 7, "without samples: {:?}", place.files().keys());
     // With as little time it would not be better; with more it would.
     assert!(stderr(&done(&mut place.bake(&["--time", "0.0005"]))).contains("unchanged"));
     let more = done(&mut place.bake(&[]));

@@ -171,7 +171,13 @@ fn a_bake_is_loaded_explained_and_drawn() {
     assert!(report["estimated_error"].as_f64().unwrap() < 0.2);
     assert!(!stderr(&output).contains('\r'), "a progress bar in a pipe: {}", stderr(&output));
 
-    let before = stdout(&lumbre(&["explain", text(&path)]));
+    let short = stdout(&lumbre(&["explain", text(&path)]));
+    assert!(short.contains("+ meshes: 3 meshes to draw\n") && short.contains("--all"), "{short}");
+    assert!(short.lines().count() < 20 && short.contains("without lightmap"), "{short}");
+    let measured = stdout(&lumbre(&["explain", text(&path), "--measure=0.1", "--size", "64x48"]));
+    let of_emission = measured.lines().find(|line| line.contains("+ emission: 1 mesh")).unwrap_or(&measured);
+    assert!(of_emission.contains(" ms, ") && of_emission.ends_with(" % of the picture)"), "{measured}");
+    let before = stdout(&lumbre(&["explain", text(&path), "--all"]));
     assert!(before.contains("the scene has no lightmapped mesh"), "{before}");
     assert!(!before.contains("LIGHTMAP"), "{before}");
     let after = lumbre(&["explain", text(&baked), "--format", "json"]);

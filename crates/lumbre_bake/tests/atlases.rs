@@ -115,7 +115,7 @@ fn atlases_survive_the_file_and_the_same_bits_come_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.glb");
     lumbre_scene::save(&mut world, &path).unwrap();
-    let files = std::fs::read_dir(folder.path())
+    let files = std::fs::read_dir(folder.path().join("scene.lightmaps"))
         .unwrap()
         .filter_map(|file| file.ok()?.file_name().into_string().ok());
     let names: Vec<String> = files.filter(|name| name.ends_with(".exr")).collect();

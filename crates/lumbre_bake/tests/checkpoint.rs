@@ -23,7 +23,7 @@ use corner::corner;
 fn options() -> BakeOptions {
     BakeOptions {
         density: Density::MapSize(24),
-        error: 0.004,
+        error: 0.01,
         quality: Quality::Final,
         threads: Some(2),
         ..BakeOptions::default()

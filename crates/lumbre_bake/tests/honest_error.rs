@@ -156,21 +156,25 @@ fn model(path: &str, density: Density) {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn cornell_box() {
     model("models/cornell_box.glb", Density::MapSize(40));
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn alcove() {
     model("conformance/bake/alcove.glb", Density::TexelsPerMeter(10.0));
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn two_rooms_joined_by_a_doorway() {
     judge("rooms", || held_out::scenes::rooms(0, 1.0), Density::TexelsPerMeter(6.0), &FINAL);
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn a_hall_with_columns() {
     judge("hall", || held_out::scenes::hall(0, 1.0), Density::TexelsPerMeter(4.0), &FINAL);
 }

@@ -169,6 +169,7 @@ fn many_lamps_as_their_sum() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
     // The room with the sun in it: by bare paths, by paths that are led through its window and to the sun on the floor, and by those that end
     // at their first bounce.
@@ -198,6 +199,7 @@ fn guided_paths_and_light_gathered_before_change_nothing_but_noise() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn light_between_a_lamp_and_the_ceiling_that_it_lies_against_is_seen_by_nobody() {
     let (build, layout) = scenes::find("cellar_0").expect("a level of the tests");
     let mut world = build(layout, 1.0);

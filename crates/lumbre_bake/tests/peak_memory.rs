@@ -29,6 +29,7 @@ fn the_estimate_is_an_upper_bound_and_not_a_wild_one() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn two_hundred_thousand_patches_fit_in_four_gibibytes() {
     let found = peak_memory(&["130", "128", "--memory", "4294967296"]);
     assert!(found["patches"].as_u64().unwrap() >= 200_000, "{found}");

@@ -325,7 +325,7 @@ fn the_demo_level_as_bevy_finds_it() {
         let mut lit = 0;
         for (name, image) in &ours {
             let node = name.strip_suffix(".lightmap.exr").expect("a map is named after its node");
-            let name = format!("{stem}.{node}.ktx2");
+            let name = format!("{stem}.lightmaps/{node}.ktx2");
             check_bytes(&path.with_file_name(&name), format, image.width, image.height);
             let texture = &client.textures[&name];
             assert_eq!(

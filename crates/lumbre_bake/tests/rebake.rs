@@ -142,6 +142,7 @@ fn a_crate_that_moves_in_the_dark_room_leaves_the_lit_one_alone() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn a_lamp_that_changes_its_hue_alone_is_not_missed() {
     let lit = |color: Vec3| {
         let mut world = rooms(LAMP, &[IN_THE_DARK]);
@@ -155,6 +156,7 @@ fn a_lamp_that_changes_its_hue_alone_is_not_missed() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn the_back_of_a_screen_hides_what_it_stands_before() {
     let screened = |screen: bool| {
         let mut world = rooms(LAMP, &[]);
@@ -177,6 +179,7 @@ fn the_back_of_a_screen_hides_what_it_stands_before() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn a_crate_that_moves_in_the_lit_room_leaves_the_dark_ones_far_end_alone() {
     let moved = (IN_THE_LIGHT.0 + Vec3::new(-0.3, 0.0, -0.2), RED);
     let report = changed(rooms(LAMP, &[IN_THE_DARK, IN_THE_LIGHT]), || rooms(LAMP, &[IN_THE_DARK, moved]));
@@ -184,6 +187,7 @@ fn a_crate_that_moves_in_the_lit_room_leaves_the_dark_ones_far_end_alone() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn crates_come_and_go() {
     let report = changed(rooms(LAMP, &[IN_THE_LIGHT]), || rooms(LAMP, &[IN_THE_LIGHT, IN_THE_DARK]));
     assert_eq!(report.rebake.map(|r| r.changed), Some(vec!["crate 1 (new)".to_owned()]));
@@ -192,6 +196,7 @@ fn crates_come_and_go() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn a_crate_that_is_painted_changes_light_by_bounces_only() {
     let painted = (IN_THE_DARK.0, WHITE);
     let report = changed(rooms(LAMP, &[IN_THE_DARK]), || rooms(LAMP, &[painted]));
@@ -199,6 +204,7 @@ fn a_crate_that_is_painted_changes_light_by_bounces_only() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn a_lamp_that_moves_lights_everything_anew() {
     let moved = LAMP + Vec3::new(0.5, 0.0, 0.3);
     let report = changed(rooms(LAMP, &[IN_THE_DARK]), || rooms(moved, &[IN_THE_DARK]));
@@ -256,6 +262,7 @@ fn a_world_is_baked_again_and_again_as_it_is() {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn small_steps_add_up_to_no_more_than_is_stated() {
     let at = |step: i32| (IN_THE_DARK.0 + Vec3::new(0.1 * step as f32, 0.0, 0.0), RED);
     let (_, _, mut samples) = baked(rooms(LAMP, &[at(0)]), None, &options());

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use bevy_ecs::prelude::*;
-use lumbre_graph::{Explanation, TextureDescriptor};
+use lumbre_graph::{Explanation, PassExplanation, TextureDescriptor};
 use lumbre_optics::{Material, ReflectionModel, Shading};
 use lumbre_scene::{
     Census, Hidden, HiddenCone, Lightmap, MaterialTextures, Mesh, SceneSettings, hidden_cones,
 };
 
+use crate::effect_costs::FrameCost;
 use crate::extract::{FrameFeatures, LightSet, Traits};
 use crate::frame_graph::{FramePlan, declare};
 use crate::shader::Feature;
@@ -28,6 +29,8 @@ pub struct SceneExplanation {
     pub light_lists: Vec<String>,
     /// Each shader variant in use with the number of objects it draws.
     pub variants: BTreeMap<String, usize>,
+    /// What each effect costs, where somebody has measured it (see [`crate::effect_costs`]).
+    pub cost: Option<FrameCost>,
 }
 
 /// Explains the frame that these options would draw of `world`, in a target of this size.
@@ -84,17 +87,66 @@ pub fn explain(
         Some(Shading::Phong) => Vec::new(),
         _ => hidden_cones(world),
     };
-    Ok(SceneExplanation { census: Census::of(world), hidden_cones, frame, light_lists, variants })
+    Ok(SceneExplanation { census: Census::of(world), hidden_cones, frame, light_lists, variants, cost: None })
 }
 
 impl SceneExplanation {
-    /// For people.
+    /// For people in a hurry: what runs. [`Self::to_text`] says also what does not, and why.
+    pub fn to_short_text(&self) -> String {
+        let lines = self.census.lines();
+        let mut text = self.heading();
+        for line in lines.iter().filter(|line| line.called_for) {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "  + {}: {}{}", line.effect, line.reason, self.cost_of(line.effect));
+        }
+        for cone in &self.hidden_cones {
+            let _ = writeln!(text, "  + cones between vertices: {cone}");
+        }
+        let without: Vec<_> = lines.iter().filter(|line| !line.called_for).map(|line| line.effect).collect();
+        let _ = writeln!(text, "  - not called for: {}", without.join(", "));
+        let (run, skipped): (Vec<_>, Vec<_>) =
+            self.frame.passes.iter().partition(|pass| pass.group.is_some());
+        let names = |passes: Vec<&PassExplanation>, between: &str| {
+            passes.iter().map(|pass| pass.name.as_str()).collect::<Vec<_>>().join(between)
+        };
+        let _ = write!(text, "\nThe frame\n  {}", names(run, " -> "));
+        if !skipped.is_empty() {
+            let _ = write!(text, "; without {}", names(skipped, ", "));
+        }
+        let objects: usize = self.variants.values().sum();
+        let _ = writeln!(text, "\n  {} shader variants for {objects} objects", self.variants.len());
+        text
+    }
+
+    fn heading(&self) -> String {
+        match &self.cost {
+            None => "The scene\n".to_owned(),
+            Some(FrameCost { device, size: [width, height], milliseconds, rounds, .. }) => format!(
+                "The scene: {milliseconds:.1} ms a frame of {width} x {height} on {device}; with each effect what it adds to that and how much the \
+                 picture changes without it (median and spread of {rounds} rounds)\n"
+            ),
+        }
+    }
+
+    fn cost_of(&self, effect: &str) -> String {
+        let cost = self.cost.iter().flat_map(|cost| &cost.effects).find(|cost| cost.effect == effect);
+        cost.map_or(String::new(), |cost| {
+            format!(
+                " ({:+.1} ± {:.1} ms, {:.1} % of the picture)",
+                cost.milliseconds,
+                cost.spread,
+                100.0 * cost.difference
+            )
+        })
+    }
+
+    /// For people: every effect and every pass, with the reason why it runs or does not.
     pub fn to_text(&self) -> String {
-        let mut text = String::from("The scene\n");
+        let mut text = self.heading();
         for line in self.census.lines() {
             let mark = if line.called_for { '+' } else { '-' };
             // Writing to a String cannot fail.
-            let _ = writeln!(text, "  {mark} {}: {}", line.effect, line.reason);
+            let _ = writeln!(text, "  {mark} {}: {}{}", line.effect, line.reason, self.cost_of(line.effect));
         }
         for cone in &self.hidden_cones {
             let _ = writeln!(text, "  + cones between vertices: {cone}");

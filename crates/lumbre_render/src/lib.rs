@@ -33,6 +33,7 @@
 mod cluster_buffers;
 mod display;
 mod draws;
+mod effect_costs;
 mod error;
 mod explain;
 mod extract;
@@ -56,6 +57,7 @@ mod texture_sets;
 mod textures;
 mod window_surface;
 
+pub use effect_costs::{EffectCost, FrameCost, Removable, effect_costs, removable_effects};
 pub use error::RenderError;
 pub use explain::{SceneExplanation, explain};
 pub use frame_report::{CpuStages, FrameReport, LightListing, Statistics};

@@ -248,7 +248,9 @@ fn saving_with_choices() {
     let half = loaded_lightmap(&path);
     assert_eq!(half.encoding, LightmapEncoding::Rgb16Float);
     // A level that names the KTX2 image instead shows the same light.
-    let text = std::fs::read_to_string(&path).unwrap().replace("level.floor.exr", "level.floor.ktx2");
+    let text = std::fs::read_to_string(&path)
+        .unwrap()
+        .replace("level.lightmaps/floor.exr", "level.lightmaps/floor.ktx2");
     std::fs::write(&path, text).unwrap();
     let packed = loaded_lightmap(&path);
     assert_eq!((packed.width, packed.height), (16, 8));
@@ -345,8 +347,10 @@ fn an_irradiance_volume_comes_back_in_its_place() {
     }
     assert_eq!(files[0], files[1], "what is encoded once loses nothing more");
     let named = folder.path().join("twice.glb");
-    let names: Vec<_> =
-        std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let names: Vec<_> = std::fs::read_dir(folder.path().join("twice.lightmaps"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     for path in names.iter().filter(|path| path.extension().is_some_and(|extension| extension == "ktx2")) {
         std::fs::write(path, b"no image").unwrap();
     }

@@ -203,7 +203,7 @@ fn everything_comes_back() {
         // The lightmap once, the data of a .gltf, and nothing temporary.
         let bin = if name.ends_with(".gltf") { 1 } else { 0 };
         assert_eq!(names_in(folder.path()).len(), 2 + bin, "{:?}", names_in(folder.path()));
-        assert!(folder.path().join("level one.crate.exr").is_file());
+        assert!(folder.path().join("level one.lightmaps/crate.exr").is_file());
 
         let mut again = World::new();
         let loaded = load(&mut again, &path).unwrap_or_else(|error| panic!("{error}"));

@@ -4,14 +4,15 @@
 //!   magic      8 bytes   "LUMBRESA"
 //!   version    u32       VERSION; everything is little endian
 //!   checksum  32 bytes   BLAKE3 of all that follows
+//!   length     u64       bytes of what the rest holds, which is a Zstandard frame: two thirds of it, as most of its digits are noise
 //!   content, identity, sampling, lights (32 bytes each), sky, centre, scale, density
 //!   objects, each: hash, name, box, emission, exitance, layout, texels, each some 150 bytes
 //! ```
 //!
-//! Nothing is allocated by a count that the bytes do not hold; a file that is cut short or damaged is named so.
+//! Nothing is allocated by a count that the bytes do not hold, nor more than the length; a file that is cut short or damaged is named so.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -26,8 +27,10 @@ use crate::transport::direct::Direct;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
 /// The version of the format: another is not read.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const CHECKSUM: usize = 32;
+/// Of Zstandard: higher ones take longer and save no more.
+const LEVEL: i32 = 1;
 
 /// Why samples cannot be read or written. A bake can do without them.
 #[derive(Debug, thiserror::Error)]
@@ -219,7 +222,9 @@ impl Samples {
         if blake3::hash(rest).as_bytes() != checksum {
             return Err(SamplesError::Damaged);
         }
-        let mut cursor = Cursor(rest);
+        let (length, frame) = rest.split_first_chunk::<8>().ok_or(SamplesError::Damaged)?;
+        let unpacked = unpacked(frame, u64::from_le_bytes(*length)).ok_or(SamplesError::Damaged)?;
+        let mut cursor = Cursor(&unpacked);
         let content = Content::read(&mut cursor).filter(|_| cursor.0.is_empty());
         let content = content.filter(|content| {
             let Canonical { center, scale } = content.space;
@@ -236,6 +241,7 @@ impl Samples {
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
         let mut content = Vec::new();
         self.0.write(&mut content);
+        let content = packed(&content)?;
         let beside = tape::temporary(path);
         let written = (|| {
             let mut file = loop {
@@ -261,6 +267,24 @@ impl Samples {
         }
         Ok(written?)
     }
+}
+
+/// A length and what is of that length, compressed.
+fn packed(content: &[u8]) -> io::Result<Vec<u8>> {
+    let mut packed = (content.len() as u64).to_le_bytes().to_vec();
+    packed.extend(zstd::bulk::compress(content, LEVEL)?);
+    Ok(packed)
+}
+
+/// What a frame holds, if that is as long as it should be.
+fn unpacked(frame: &[u8], length: u64) -> Option<Vec<u8>> {
+    let mut unpacked = Vec::new();
+    zstd::stream::read::Decoder::new(frame)
+        .ok()?
+        .take(length.saturating_add(1))
+        .read_to_end(&mut unpacked)
+        .ok()?;
+    (unpacked.len() as u64 == length).then_some(unpacked)
 }
 
 /// Whether a path still leads to an open file.

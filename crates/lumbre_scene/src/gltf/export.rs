@@ -170,7 +170,7 @@ pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
 pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Result<SaveReport, SaveError> {
     let binary = is_glb(path)?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut lightmaps = LightmapFiles::new(stem.clone(), options.encoding);
+    let mut lightmaps = LightmapFiles::new(&stem, options.encoding);
     let nodes = Nodes::collect(world, &mut lightmaps)?;
     let scene = export_scene::settings(world)?;
 
@@ -207,13 +207,14 @@ pub(crate) fn is_glb(path: &Path) -> Result<bool, SaveError> {
     }
 }
 
-/// Writes the images of lightmaps and irradiance volumes beside the file that shows them.
+/// Writes the images of lightmaps and irradiance volumes into their folder beside the file that shows them.
 pub(crate) fn write_lightmaps(
     lightmaps: &LightmapFiles,
     path: &Path,
     options: &SaveOptions,
     files: &mut Files,
 ) -> Result<Vec<LightmapFile>, SaveError> {
+    let folder = path.with_file_name(&lightmaps.folder);
     let mut written = Vec::new();
     for (name, image) in &lightmaps.images {
         let failed = |error: LightmapFileError| SaveError::Image {
@@ -226,7 +227,7 @@ pub(crate) fn write_lightmaps(
             written.push(LightmapFile { path, encoding, bytes: bytes.len() as u64, error });
             Ok::<_, SaveError>(())
         };
-        let image_path = path.with_file_name(name);
+        let image_path = folder.join(name);
         let encoding = options.encoding.unwrap_or(image.encoding);
         let name = if encoding == LightmapEncoding::Rgb16Float { "rgb16f" } else { "rgb32f" };
         write(image_path.clone(), name, lightmap_to_open_exr(image, encoding).map_err(failed)?)?;
@@ -243,7 +244,7 @@ pub(crate) fn write_lightmaps(
                 image: name.clone(),
                 problem: error.to_string(),
             })?;
-        let path = path.with_file_name(name);
+        let path = folder.join(name);
         files.write(&path, &image)?;
         written.push(LightmapFile { path, encoding: format.name(), bytes: image.len() as u64, error });
     }
@@ -320,9 +321,10 @@ fn extensions_in(value: &Value, used: &mut HashSet<String>) {
     }
 }
 
-/// Lightmap images to be written, each once, under names that do not collide.
+/// Lightmap images to be written, each once, into a folder of their own under names that do not collide.
 pub(crate) struct LightmapFiles {
-    stem: String,
+    /// The folder's name, beside the file that shows them.
+    folder: String,
     encoding: Option<LightmapEncoding>,
     known: HashMap<*const LightmapImage, usize>,
     images: Vec<(String, Arc<LightmapImage>)>,
@@ -331,9 +333,10 @@ pub(crate) struct LightmapFiles {
 }
 
 impl LightmapFiles {
-    pub(crate) fn new(stem: String, encoding: Option<LightmapEncoding>) -> Self {
+    /// Of a file `<stem>.glb` the folder is `<stem>.lightmaps`.
+    pub(crate) fn new(stem: &str, encoding: Option<LightmapEncoding>) -> Self {
         let (images, volumes, names) = Default::default();
-        Self { stem, encoding, known: HashMap::new(), images, volumes, names }
+        Self { folder: format!("{stem}.lightmaps"), encoding, known: HashMap::new(), images, volumes, names }
     }
 
     /// The extension object for a node that shows an image.
@@ -346,7 +349,9 @@ impl LightmapFiles {
         let known = match self.known.get(&Arc::as_ptr(image)) {
             Some(&known) => known,
             None => {
-                let name = self.file_name(node, index, "exr");
+                // An atlas is that of several nodes.
+                let atlas = image.name.split('.').next().filter(|name| name.starts_with("atlas-"));
+                let name = self.file_name(atlas.or(node), index, "exr");
                 self.known.insert(Arc::as_ptr(image), self.images.len());
                 self.images.push((name, image.clone()));
                 self.images.len() - 1
@@ -357,7 +362,7 @@ impl LightmapFiles {
             LightmapEncoding::Rgb16Float => "rgb16f",
             LightmapEncoding::Rgb9E5 => "rgb9e5",
         };
-        json!({"image": uri::percent_encoded(&self.images[known].0), "texCoord": 1, "encoding": encoding})
+        json!({"image": self.uri(&self.images[known].0), "texCoord": 1, "encoding": encoding})
     }
 
     /// The extension object for a node with an irradiance volume.
@@ -368,10 +373,14 @@ impl LightmapFiles {
         index: usize,
     ) -> Value {
         let name = self.file_name(node, index, "ktx2");
-        let reference =
-            json!({"image": uri::percent_encoded(&name), "encoding": PackedFormat::Rgb9E5.name()});
+        let reference = json!({"image": self.uri(&name), "encoding": PackedFormat::Rgb9E5.name()});
         self.volumes.push((name, volume.clone()));
         reference
+    }
+
+    /// Where an image lies, as the file that shows it names it.
+    fn uri(&self, name: &str) -> String {
+        uri::percent_encoded_path(&Path::new(&self.folder).join(name))
     }
 
     /// A name that no other image of the file has, whatever its extension.
@@ -381,9 +390,8 @@ impl LightmapFiles {
         let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
         let label: String =
             node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
-        let stem = &self.stem;
-        let candidates = std::iter::once(format!("{stem}.{label}"))
-            .chain((index..).map(|number| format!("{stem}.{label}.{number}")));
+        let candidates =
+            std::iter::once(label.clone()).chain((index..).map(|number| format!("{label}.{number}")));
         // Case counts on some file systems only.
         let name =
             candidates.into_iter().find(|name| self.names.insert(name.to_lowercase())).unwrap_or_default();

@@ -60,7 +60,7 @@ pub fn save_baked(
     let data = NewData { buffer, start, bytes: Vec::new() };
     let mut baked = Baked {
         patch: Patch::new(source.root.clone()),
-        lightmaps: LightmapFiles::new(stem.clone(), options.encoding),
+        lightmaps: LightmapFiles::new(&stem, options.encoding),
         primitives: Primitives::new(&buffers, data),
         used: HashSet::new(),
         source,

@@ -19,6 +19,8 @@ pub(crate) struct Files {
     held: Option<File>,
     /// Folders that were looked through for what was left over.
     tidied: HashSet<PathBuf>,
+    /// Folders that were not there.
+    made: Vec<PathBuf>,
 }
 
 /// The process in a name that [`Files`] gives to what is not finished: `.NAME.PROCESS-ATTEMPT.partial`.
@@ -51,7 +53,7 @@ fn tidy(folder: &Path) {
 }
 
 impl Files {
-    /// Writes a file beside `path`.
+    /// Writes a file beside `path`, into a folder that is made if its own folder is there.
     pub(crate) fn write(&mut self, path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
         let failed = |source| SaveError::Write { path: path.to_owned(), source };
         let Some(name) = path.file_name() else {
@@ -65,7 +67,11 @@ impl Files {
             _ => Path::new("."),
         };
         if self.tidied.insert(folder.to_owned()) {
-            tidy(folder);
+            match fs::create_dir(folder) {
+                Ok(()) => self.made.push(folder.to_owned()),
+                // It is there already, or writing says what is wrong with it.
+                Err(_) => tidy(folder),
+            }
         }
         for attempt in 0..100 {
             let mut hidden = OsString::from(".");
@@ -117,6 +123,10 @@ impl Drop for Files {
             // Nothing more can be done about a file that cannot be removed either.
             let _ = fs::remove_file(temporary);
         }
+        for folder in &self.made {
+            // Only if nothing is in it.
+            let _ = fs::remove_dir(folder);
+        }
     }
 }
 
@@ -155,6 +165,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut files = Files::default();
         files.write(&folder.path().join("room.glb"), b"new").unwrap();
+        files.write(&folder.path().join("room.lightmaps/floor.exr"), b"new").unwrap();
         drop(files);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }

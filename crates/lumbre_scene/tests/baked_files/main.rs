@@ -159,8 +159,8 @@ fn files_beside_are_referred_to_or_copied() {
     compare("beside", &input, &level.join("room.baked.gltf"));
     let own = [
         "room.baked.bake.bin",
-        "room.baked.cube.exr",
         "room.baked.gltf",
+        "room.baked.lightmaps",
         "room.bin",
         "room.gltf",
         "textures",
@@ -191,7 +191,7 @@ fn files_beside_are_referred_to_or_copied() {
     fs::remove_dir_all(&out).unwrap();
     fs::create_dir(&out).unwrap();
     baked(&input, &out.join("room.glb"));
-    assert_eq!(names(&out), ["room.cube.exr", "room.glb", "textures"]);
+    assert_eq!(names(&out), ["room.glb", "room.lightmaps", "textures"]);
     assert!(load(&mut World::new(), &out.join("room.glb")).is_ok());
 }
 

@@ -1,0 +1,271 @@
+//! What each effect of a scene costs and gives: milliseconds of a frame and how much the picture changes, measured by drawing frames with it
+//! and without it. Not a prediction, and not a choice of what is drawn.
+
+use std::time::{Duration, Instant};
+
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use lumbre_optics::{AlphaMode, Light, LightKind, Material, Shading, Surface};
+use lumbre_scene::{Census, EmissiveLight, MaterialTextures, SceneSettings};
+
+use crate::{Display, FrameOptions, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer};
+
+/// An effect that a scene calls for and that a frame can do without.
+#[derive(Clone, Copy, Debug)]
+pub struct Removable {
+    /// The effect, as a line of the census names it.
+    pub effect: &'static str,
+    without: fn(&mut World, &mut FrameOptions),
+}
+
+impl Removable {
+    /// Takes the effect out of a World, or out of the options of its frame.
+    pub fn remove(&self, world: &mut World, options: &mut FrameOptions) {
+        (self.without)(world, options);
+    }
+}
+
+/// The effects that a scene calls for and that can be left out, in the order of the census.
+pub fn removable_effects(census: &Census) -> Vec<Removable> {
+    let called_for: Vec<_> = census.lines().into_iter().filter(|line| line.called_for).collect();
+    let is_called_for = |effect: &Removable| called_for.iter().any(|line| line.effect == effect.effect);
+    EFFECTS.iter().copied().filter(is_called_for).collect()
+}
+
+const EFFECTS: &[Removable] = &[
+    // Against the next cheaper shading.
+    Removable { effect: "Gouraud shading", without: |_, options| options.shading = Some(Shading::Flat) },
+    Removable { effect: "Phong shading", without: |_, options| options.shading = Some(Shading::Gouraud) },
+    Removable {
+        effect: "global ambient",
+        without: |world, _| settings(world, |settings| settings.ambient = Vec3::ZERO),
+    },
+    Removable {
+        effect: "ambient lights",
+        without: |world, _| switch_off(world, |kind, _| kind == LightKind::Ambient),
+    },
+    Removable {
+        effect: "directional lights",
+        without: |world, _| switch_off(world, |kind, cone| kind == LightKind::Directional && !cone),
+    },
+    Removable {
+        effect: "point lights",
+        without: |world, _| switch_off(world, |kind, cone| kind == LightKind::Point && !cone),
+    },
+    Removable {
+        effect: "spot lights",
+        without: |world, _| switch_off(world, |kind, cone| kind != LightKind::Ambient && cone),
+    },
+    Removable { effect: "polygon lights", without: |world, _| remove::<EmissiveLight>(world) },
+    Removable {
+        effect: "specular",
+        without: |world, _| each_surface(world, |surface| surface.specular = Vec3::ZERO),
+    },
+    Removable {
+        effect: "emission",
+        without: |world, _| each_surface(world, |surface| surface.emission = Vec3::ZERO),
+    },
+    Removable { effect: "lightmaps", without: |_, options| options.lightmaps = false },
+    Removable { effect: "textures", without: |world, _| remove::<MaterialTextures>(world) },
+    Removable {
+        effect: "alpha mask",
+        without: |world, _| opaque(world, |mode| matches!(mode, AlphaMode::Mask { .. })),
+    },
+    Removable {
+        effect: "alpha blending",
+        without: |world, _| opaque(world, |mode| mode == AlphaMode::Blend),
+    },
+    Removable {
+        effect: "two-sided",
+        without: |world, _| each_material(world, |material| material.double_sided = false),
+    },
+    Removable { effect: "fog", without: |world, _| settings(world, |settings| settings.fog = None) },
+];
+
+fn settings(world: &mut World, change: impl FnOnce(&mut SceneSettings)) {
+    change(&mut world.get_resource_or_insert_with(SceneSettings::default));
+}
+
+/// Switches lights off by their kind and whether they have a cone.
+fn switch_off(world: &mut World, which: impl Fn(LightKind, bool) -> bool) {
+    for mut light in world.query::<&mut Light>().iter_mut(world) {
+        let has_cone = light.spot.is_some_and(|cone| !cone.is_everywhere());
+        light.enabled &= !which(light.kind, has_cone);
+    }
+}
+
+fn each_material(world: &mut World, change: impl Fn(&mut Material)) {
+    world.query::<&mut Material>().iter_mut(world).for_each(|mut material| change(&mut material));
+}
+
+fn each_surface(world: &mut World, change: impl Fn(&mut Surface)) {
+    each_material(world, |material| {
+        change(&mut material.front);
+        material.back.iter_mut().for_each(&change);
+    });
+}
+
+fn opaque(world: &mut World, which: impl Fn(AlphaMode) -> bool) {
+    each_material(world, |material| {
+        if which(material.alpha_mode) {
+            material.alpha_mode = AlphaMode::Opaque;
+        }
+    });
+}
+
+fn remove<C: Component>(world: &mut World) {
+    let having: Vec<Entity> = world.query_filtered::<Entity, With<C>>().iter(world).collect();
+    for entity in having {
+        world.entity_mut(entity).remove::<C>();
+    }
+}
+
+/// What an effect costs, and what the picture owes to it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct EffectCost {
+    /// The effect, as a line of the census names it.
+    pub effect: &'static str,
+    /// Milliseconds that a frame takes longer with it: the median over the rounds. Below zero if the frame is slower without it.
+    pub milliseconds: f64,
+    /// Half of the range that the middle half of the rounds lies in, in milliseconds.
+    pub spread: f64,
+    /// Root mean square of how much the radiance of a pixel and channel differs without it, relative to their mean with it.
+    pub difference: f64,
+}
+
+/// What a frame costs, and what its effects have to do with it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct FrameCost {
+    /// The device that it was measured on, and its driver.
+    pub device: String,
+    /// Width and height of the frame in pixels.
+    pub size: [u32; 2],
+    /// Milliseconds of a frame with all effects, from the call until the device has finished: the median.
+    pub milliseconds: f64,
+    /// Rounds that were measured; in each every frame is drawn once.
+    pub rounds: usize,
+    /// What each effect that can be left out costs.
+    pub effects: Vec<EffectCost>,
+}
+
+/// A frame that is drawn again and again.
+struct Drawn {
+    world: World,
+    options: FrameOptions,
+    renderer: Renderer,
+}
+
+impl Drawn {
+    fn new(gpu: &Gpu, (world, options): (World, FrameOptions)) -> Self {
+        Self { world, options, renderer: Renderer::new(gpu) }
+    }
+
+    fn milliseconds(&mut self, target: &Offscreen) -> Result<f64, RenderError> {
+        let begun = Instant::now();
+        self.renderer.render(&mut self.world, &target.target(), &self.options)?;
+        self.renderer.wait()?;
+        Ok(begun.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Red, green and blue of each pixel, as radiance.
+    fn radiance(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<Vec<Vec3>, RenderError> {
+        let target = Offscreen::new(gpu, size[0], size[1], OffscreenFormat::LinearFloat)?;
+        let options = FrameOptions {
+            display: Display::Linear,
+            exposure: Some(1.0),
+            full_precision: true,
+            ..self.options.clone()
+        };
+        Renderer::new(gpu).render(&mut self.world, &target.target(), &options)?;
+        Ok(target.read_linear(gpu)?.iter().map(|pixel| pixel.truncate()).collect())
+    }
+}
+
+/// Fewest rounds: with less there is no spread to speak of.
+const FEWEST_ROUNDS: usize = 5;
+/// Most rounds: what varies after these varies with the hour.
+const MOST_ROUNDS: usize = 101;
+
+/// Measures a scene's frame with all its effects, and without each of `effects` in turn. `scene` makes the scene with the options of its
+/// frame anew, once for each of them. Rounds go on for about `time`, interleaved, so that what else the machine does meets all alike.
+///
+/// # Errors
+/// [`RenderError`], as drawing a frame has it, or what `scene` returns.
+pub fn effect_costs<E: From<RenderError>>(
+    gpu: &Gpu,
+    scene: &mut dyn FnMut() -> Result<(World, FrameOptions), E>,
+    effects: &[Removable],
+    size: [u32; 2],
+    time: Duration,
+) -> Result<FrameCost, E> {
+    let mut frames = vec![Drawn::new(gpu, scene()?)];
+    for effect in effects {
+        let (mut world, mut options) = scene()?;
+        effect.remove(&mut world, &mut options);
+        frames.push(Drawn::new(gpu, (world, options)));
+    }
+
+    let pictures = frames.iter_mut().map(|frame| frame.radiance(gpu, size)).collect::<Result<Vec<_>, _>>()?;
+
+    let target = Offscreen::new(gpu, size[0], size[1], OffscreenFormat::Rgba8)?;
+    // Pipelines are made, and buffers grow, in the first frames.
+    for frame in &mut frames {
+        frame.milliseconds(&target)?;
+        frame.milliseconds(&target)?;
+    }
+    let begun = Instant::now();
+    let mut rounds: Vec<Vec<f64>> = Vec::new();
+    while rounds.len() < FEWEST_ROUNDS || (begun.elapsed() < time && rounds.len() < MOST_ROUNDS) {
+        rounds.push(frames.iter_mut().map(|frame| frame.milliseconds(&target)).collect::<Result<_, _>>()?);
+    }
+
+    let cost = |(index, effect): (usize, &Removable)| {
+        let differences = rounds.iter().map(|round| round[0] - round[index + 1]).collect();
+        let [low, milliseconds, high] = quartiles(differences);
+        let difference = relative_difference(&pictures[0], &pictures[index + 1]);
+        EffectCost { effect: effect.effect, milliseconds, spread: 0.5 * (high - low), difference }
+    };
+    Ok(FrameCost {
+        device: gpu.describe(),
+        size,
+        milliseconds: quartiles(rounds.iter().map(|round| round[0]).collect())[1],
+        rounds: rounds.len(),
+        effects: effects.iter().enumerate().map(cost).collect(),
+    })
+}
+
+/// The values that a quarter, half and three quarters of at least one number lie below.
+fn quartiles(mut numbers: Vec<f64>) -> [f64; 3] {
+    numbers.sort_by(f64::total_cmp);
+    let last = numbers.len() - 1;
+    [1, 2, 3].map(|quarter| numbers[quarter * last / 4])
+}
+
+/// Root mean square of the difference of two pictures, relative to the mean of the first; 0 for equal ones.
+fn relative_difference(with: &[Vec3], without: &[Vec3]) -> f64 {
+    let numbers = 3.0 * with.len() as f64;
+    let squares = with.iter().zip(without).map(|(a, b)| (a.as_dvec3() - b.as_dvec3()).length_squared());
+    let rms = (squares.sum::<f64>() / numbers).sqrt();
+    let mean = with.iter().map(|pixel| pixel.as_dvec3().element_sum()).sum::<f64>() / numbers;
+    if rms == 0.0 { 0.0 } else { rms / mean.max(f64::MIN_POSITIVE) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_of_few_and_many() {
+        assert_eq!(quartiles(vec![3.0]), [3.0; 3]);
+        assert_eq!(quartiles(vec![5.0, 1.0, 2.0, 4.0, 3.0]), [2.0, 3.0, 4.0]);
+    }
+
+    #[test]
+    fn pictures_differ_relative_to_their_mean() {
+        let (grey, white) = (vec![Vec3::splat(0.5); 4], vec![Vec3::ONE; 4]);
+        assert_eq!(relative_difference(&grey, &grey), 0.0);
+        assert_eq!(relative_difference(&grey, &white), 1.0);
+        assert_eq!(relative_difference(&white, &grey), 0.5);
+        assert!(relative_difference(&[Vec3::ZERO; 4], &white).is_finite());
+    }
+}
