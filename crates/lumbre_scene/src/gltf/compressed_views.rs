@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use super::document::{Document, element, extension, shortened};
+use super::buffer_view;
+use super::document::{Document, extension, shortened};
 use super::error::LoadProblem;
 use super::extensions::{MeshoptBuffer, MeshoptView};
 use super::limits::Budget;
@@ -63,19 +64,10 @@ pub(crate) fn decode(
         }
         budget.charge(view.byte_length, 1, || place.clone())?;
         let field = || format!("{place}.{EXTENSION}.buffer");
-        let buffer = element(contents, "buffers", source.buffer, field)?;
-        let end = source.byte_offset.checked_add(source.byte_length);
-        let range =
-            end.and_then(|end| Some(usize::try_from(source.byte_offset).ok()?..usize::try_from(end).ok()?));
-        let bytes = range.and_then(|range| buffer.get(range)).ok_or_else(|| LoadProblem::BufferView {
-            view: index,
-            offset: source.byte_offset,
-            end: end.unwrap_or(u64::MAX),
-            buffer: source.buffer,
-            length: buffer.len() as u64,
-        })?;
+        let place_in_buffer = (source.buffer, source.byte_offset, source.byte_length);
+        let bytes = buffer_view::range(contents, index, place_in_buffer, field)?;
         let made = meshopt::decode(mode, filter, source.count as usize, source.byte_stride as usize, bytes);
-        let made = made.map_err(|problem| LoadProblem::Compressed { place: place.clone(), problem })?;
+        let made = made.map_err(|problem| LoadProblem::Compressed { place: place.clone(), problem: problem.to_owned() })?;
         decoded.insert(index, made);
     }
     Ok(decoded)

@@ -218,6 +218,8 @@ pub(crate) struct Channel {
 #[derive(Deserialize, Debug)]
 pub(crate) struct Target {
     pub node: Option<usize>,
+    #[serde(default)]
+    pub extensions: Extensions,
 }
 
 /// `KHR_lights_punctual.lights[i]`.

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3, Vec4};
 use lumbre_mesh::TriangleMesh;
 
 use super::accessor::Buffers;
+use super::decoders;
 use super::document::Primitive;
 use super::error::{LoadProblem, Notes};
 use super::limits::Budget;
@@ -41,10 +42,15 @@ pub(crate) fn triangle_mesh(
     if primitive.targets.is_some() {
         notes.add(place, "morph targets are not supported; the base shape is used");
     }
-    if primitive.extensions.contains_key("KHR_draco_mesh_compression") {
+    if primitive.extensions.contains_key("KHR_draco_mesh_compression")
+        && let Some(decoder) = decoders::missing("KHR_draco_mesh_compression")
+    {
         notes.add(
             place,
-            "KHR_draco_mesh_compression is not supported; its uncompressed form is used if there is one",
+            format!(
+                "its uncompressed form is used: this program was built without the Draco decoder (feature `{}`)",
+                decoder.feature
+            ),
         );
     }
     let mut attributes = Attributes { buffers, primitive, place, index, budget };

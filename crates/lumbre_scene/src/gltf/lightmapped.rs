@@ -8,6 +8,7 @@ use lumbre_mesh::TriangleMesh;
 use serde_json::{Map, Value};
 
 use super::accessor::Buffers;
+use super::compressed_primitives::EXTENSION as COMPRESSED;
 use super::error::{LoadProblem, Notes};
 use super::export::SaveError;
 use super::import_mesh::corners;
@@ -96,9 +97,15 @@ impl<'a> Primitives<'a> {
         if equal(&second, &made.uv1) {
             return Ok(primitive);
         }
-        if source.extensions.contains_key("KHR_draco_mesh_compression") {
+        let compressed = source.extensions.contains_key(COMPRESSED);
+        if compressed {
             if let Some(Value::Object(extensions)) = primitive.get_mut("extensions") {
-                extensions.shift_remove("KHR_draco_mesh_compression");
+                extensions.shift_remove(COMPRESSED);
+                if extensions.is_empty()
+                    && let Some(primitive) = primitive.as_object_mut()
+                {
+                    primitive.shift_remove("extensions");
+                }
             }
             self.notes
                 .add(&place, "its lightmap coordinates are not in the Draco data; written uncompressed");
@@ -106,7 +113,7 @@ impl<'a> Primitives<'a> {
 
         let split = split(&corners, made, positions.len());
         let whole = split.vertices.complete && split.vertices.sources.len() == positions.len();
-        if !whole {
+        if !whole || compressed {
             self.choose_vertices(patch, (mesh, index), &place, &mut primitive, positions.len(), &split);
         }
         let coordinates: Vec<[f32; 2]> = split.coordinates.iter().map(Vec2::to_array).collect();

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use serde_json::{Value, json};
 
-use super::accessor::{Buffers, Format};
+use super::accessor::Buffers;
+use super::accessor_format::Format;
 use super::error::LoadProblem;
 use super::patch::{Patch, place};
 
@@ -108,7 +109,8 @@ impl NewData {
         let size = raw.format.size();
         let zero = vec![0; size];
         let replacements: HashMap<u32, &[u8]> = raw.sparse.iter().copied().collect();
-        if !chosen.complete {
+        // What is decoded need not be what the compressed file stated.
+        if !chosen.complete || buffers.is_decoded(accessor) {
             let elements = chosen.sources.iter().map(|source| {
                 let replaced = replacements.get(source).copied();
                 replaced.or_else(|| raw.base(*source as usize)).unwrap_or(&zero)
