@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
+#[path = "support/encoded.rs"]
+mod encoded;
 mod support;
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -11,6 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
+use encoded::*;
 use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::File;
@@ -46,72 +49,6 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// The pictures' sides.
-const SIZE: (u32, u32) = (22, 17);
-
-macro_rules! encoded {
-    ($name:literal, $decoded:literal) => {
-        (
-            $name,
-            include_bytes!(concat!("encoded/", $name)) as &[u8],
-            include_bytes!(concat!("encoded/", $name, $decoded)) as &[u8],
-        )
-    };
-}
-
-/// Name, file and what the reference decoder finds in it.
-type Encoded = (&'static str, &'static [u8], &'static [u8]);
-
-const MESHES: [Encoded; 3] = [
-    encoded!("edgebreaker.drc", ".json"),
-    encoded!("edgebreaker_valence.drc", ".json"),
-    encoded!("sequential.drc", ".json"),
-];
-
-const PICTURES: [Encoded; 7] = [
-    encoded!("uastc.ktx2", ".rgba"),
-    encoded!("uastc_zstandard.ktx2", ".rgba"),
-    encoded!("etc1s.ktx2", ".rgba"),
-    encoded!("etc1s_alpha.ktx2", ".rgba"),
-    encoded!("lossy.webp", ".rgba"),
-    encoded!("lossy_alpha.webp", ".rgba"),
-    encoded!("lossless.webp", ".rgba"),
-];
-
-/// A file whose only mesh is compressed, with the accessors that the reference decoder's numbers ask for.
-fn compressed_mesh(bytes: &[u8], expected: &Value) -> File {
-    let mut file = File::new();
-    let view = file.view(bytes);
-    let (points, corners) =
-        (expected["points"].as_u64().unwrap(), expected["indices"].as_array().unwrap().len());
-    let accessor = |file: &mut File, component: u32, shape: &str, normalized: bool| {
-        file.push(
-            "accessors",
-            json!({"componentType": component, "type": shape, "count": points, "normalized": normalized}),
-        )
-    };
-    let attributes = json!({
-        "POSITION": accessor(&mut file, 5126, "VEC3", false),
-        "NORMAL": accessor(&mut file, 5126, "VEC3", false),
-        "TEXCOORD_0": accessor(&mut file, 5126, "VEC2", false),
-        "COLOR_0": accessor(&mut file, 5121, "VEC4", true),
-        "JOINTS_0": accessor(&mut file, 5123, "VEC4", false),
-        "_HEAT": accessor(&mut file, 5126, "SCALAR", false),
-    });
-    let indices =
-        file.push("accessors", json!({"componentType": 5123, "type": "SCALAR", "count": corners}));
-    let compressed = json!({"bufferView": view, "attributes": expected["ids"]});
-    file.push(
-        "meshes",
-        json!({"primitives": [{"attributes": attributes, "indices": indices,
-            "extensions": {"KHR_draco_mesh_compression": compressed}}]}),
-    );
-    file.node(json!({"name": "tube", "mesh": 0}));
-    file.root["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
-    file.root["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
-    file
-}
-
 fn numbers(value: &Value) -> Vec<f32> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap() as f32).collect()
 }
@@ -122,6 +59,7 @@ fn the_mesh(world: &mut World) -> std::sync::Arc<lumbre_mesh::TriangleMesh> {
 
 #[test]
 fn draco_meshes_are_what_the_reference_decoder_finds() {
+    let _alone = MEASURING.lock();
     for (name, bytes, expected) in MESHES {
         let expected: Value = serde_json::from_slice(expected).unwrap();
         let (mut world, report) = compressed_mesh(bytes, &expected).load().unwrap();
@@ -146,43 +84,13 @@ fn draco_meshes_are_what_the_reference_decoder_finds() {
     }
 }
 
-/// A square with a picture.
-fn pictured(bytes: &[u8], kind: &str, extension: Option<&str>) -> File {
-    let mut file = File::new();
-    let view = file.view(bytes);
-    let image = file.push("images", json!({"bufferView": view, "mimeType": kind}));
-    let texture = match extension {
-        Some(extension) => json!({"extensions": {extension: {"source": image}}}),
-        None => json!({"source": image}),
-    };
-    let texture = file.push("textures", texture);
-    let material = file
-        .push("materials", json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": texture}, "metallicFactor": 0}}));
-    file.square(|file, primitive| {
-        primitive["material"] = material.into();
-        primitive["attributes"]["TEXCOORD_0"] = file.floats("VEC2", 2, &[0., 1., 1., 1., 1., 0., 0., 0.]).into();
-    });
-    if let Some(extension) = extension {
-        file.root["extensionsUsed"] = json!([extension]);
-        file.root["extensionsRequired"] = json!([extension]);
-    }
-    file
-}
-
-fn encoded_picture(name: &str, bytes: &[u8]) -> File {
-    if name.ends_with(".webp") {
-        pictured(bytes, "image/webp", Some("EXT_texture_webp"))
-    } else {
-        pictured(bytes, "image/ktx2", Some("KHR_texture_basisu"))
-    }
-}
-
 fn the_picture(world: &mut World) -> std::sync::Arc<Image> {
     world.query::<&MaterialTextures>().single(world).unwrap().base_color.clone().unwrap().image
 }
 
 #[test]
 fn pictures_are_what_the_reference_decoders_find() {
+    let _alone = MEASURING.lock();
     for (name, bytes, expected) in PICTURES {
         let (mut world, _) = encoded_picture(name, bytes).load().unwrap_or_else(|error| panic!("{error}"));
         let image = the_picture(&mut world);
@@ -213,6 +121,7 @@ fn plain_ktx2(format: u32, channels: usize, zstandard: bool) -> (Vec<u8>, Vec<u8
 
 #[test]
 fn uncompressed_ktx2_pictures() {
+    let _alone = MEASURING.lock();
     for (format, channels) in [(23, 3), (29, 3), (37, 4), (43, 4)] {
         for zstandard in [false, true] {
             let (bytes, texels) = plain_ktx2(format, channels, zstandard);
@@ -228,6 +137,7 @@ fn uncompressed_ktx2_pictures() {
 
 #[test]
 fn damaged_files_are_refused_by_their_place() {
+    let _alone = MEASURING.lock();
     let (_, bytes, expected) = MESHES[0];
     let expected: Value = serde_json::from_slice(expected).unwrap();
     let problem = |change: &dyn Fn(&mut File)| {
@@ -239,16 +149,31 @@ fn damaged_files_are_refused_by_their_place() {
         file.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"][key] = value;
     };
     for (change, said) in [
-        (&(|file: &mut File| file.binary[0] = b'X') as &dyn Fn(&mut File), "meshes[0].primitives[0]: its Draco data"),
+        (
+            &(|file: &mut File| file.binary[0] = b'X') as &dyn Fn(&mut File),
+            "meshes[0].primitives[0]: its Draco data",
+        ),
         (&|file: &mut File| file.binary.truncate(300), "bufferViews[0]"),
         (&|file: &mut File| at(file, "bufferView", 9.into()), "bufferViews[9]"),
-        (&|file: &mut File| at(file, "attributes", json!({"POSITION": 77})), "attribute 77 is not in its Draco data"),
-        (&|file: &mut File| at(file, "attributes", json!({"POSITION": 2})), "its type has 3 numbers, but its Draco data have 2"),
+        (
+            &|file: &mut File| at(file, "attributes", json!({"POSITION": 77})),
+            "attribute 77 is not in its Draco data",
+        ),
+        (
+            &|file: &mut File| at(file, "attributes", json!({"POSITION": 2})),
+            "its type has 3 numbers, but its Draco data have 2",
+        ),
         (&|file: &mut File| at(file, "attributes", json!("x")), "KHR_draco_mesh_compression"),
-        (&|file: &mut File| file.root["accessors"][0]["count"] = 29.into(), "another attribute in the same Draco data 28"),
+        (
+            &|file: &mut File| file.root["accessors"][0]["count"] = 29.into(),
+            "another attribute in the same Draco data 28",
+        ),
         (&|file: &mut File| file.root["accessors"][6]["count"] = 30.into(), "faces"),
         (&|file: &mut File| file.root["accessors"][6]["componentType"] = 5126.into(), "cannot be an index"),
-        (&|file: &mut File| file.root["accessors"][4]["componentType"] = 5121.into(), "componentType cannot hold"),
+        (
+            &|file: &mut File| file.root["accessors"][4]["componentType"] = 5121.into(),
+            "componentType cannot hold",
+        ),
         (&|file: &mut File| file.root["accessors"][0]["componentType"] = 5123.into(), "real numbers"),
         (&|file: &mut File| file.root["meshes"][0]["primitives"][0]["mode"] = 5.into(), "mode"),
     ] {
@@ -281,10 +206,52 @@ fn damaged_files_are_refused_by_their_place() {
         (84, u32::MAX, "level 0"),
     ] {
         let text = changed(at, value);
-        assert!(text.starts_with("images[0]: cannot be decoded as KTX2") && text.contains(said), "{said}: {text}");
+        assert!(
+            text.starts_with("images[0]: cannot be decoded as KTX2") && text.contains(said),
+            "{said}: {text}"
+        );
     }
     let problem = pictured(b"GIF89a0000000000000", "image/gif", None).problem().to_string();
     assert!(problem.contains("neither PNG nor JPEG, WebP or KTX2"), "{problem}");
+}
+
+#[test]
+fn instances_are_nodes() {
+    let _alone = MEASURING.lock();
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let rotations = [0., 0., 0., 1., 0., half, 0., half, 0., 0., 0., 1.];
+    let (mut world, report) = instanced(&[0., 0., 0., 5., 0., 0., 0., 7., 0.], &rotations).load().unwrap();
+    let mut seen: Vec<_> = world
+        .query_filtered::<&GlobalTransform, With<Mesh>>()
+        .iter(&world)
+        .map(|transform| transform.0.transform_point3(glam::DVec3::X))
+        .collect();
+    seen.sort_by(|a, b| a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x)));
+    // The node of the instances stands at (0, 1, 0); a quarter turn about y takes x to -z.
+    let expected = [(1., 1., 0.), (5., 1., -1.), (1., 8., 0.)].map(glam::DVec3::from);
+    assert_eq!(seen.len(), 3);
+    for (seen, expected) in seen.iter().zip(expected) {
+        assert!((*seen - expected).length() < 1e-6, "{seen} {expected}");
+    }
+    assert_eq!(report.nodes.len(), 4);
+    assert!(report.notes.iter().any(|note| note.text.contains("3 instances")), "{:?}", report.notes);
+
+    let problem = instanced(&[0.0; 9], &[0., 0., 0., 1.]).problem().to_string();
+    assert!(
+        problem.contains("nodes[0] (instanced): EXT_mesh_gpu_instancing.ROTATION")
+            && problem.contains("has 1 elements")
+    );
+    let problem = instanced(&[f32::NAN; 3], &[0., 0., 0., 1.]).problem().to_string();
+    assert!(problem.contains("NaN"), "{problem}");
+    let mut many = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3));
+    for accessor in many.root["accessors"].as_array_mut().unwrap() {
+        if accessor["count"] == 3 {
+            accessor.as_object_mut().unwrap().remove("bufferView");
+            accessor["count"] = 5_000_000.into();
+        }
+    }
+    let problem = many.problem();
+    assert!(matches!(problem, LoadProblem::TooLarge { .. }), "{problem}");
 }
 
 /// SplitMix64.
@@ -318,21 +285,23 @@ const SLOWEST: Duration = Duration::from_secs(5);
 
 #[test]
 fn no_mutant_panics_hangs_or_fills_the_memory() {
+    let instances = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3)).glb();
     let meshes = MESHES.map(|(name, bytes, expected)| (name, bytes, Some(expected)));
     let pictures = PICTURES.map(|(name, bytes, _)| (name, bytes, None));
+    let _alone = MEASURING.lock();
     let limits = LoadLimits { image_side: 256, ..LoadLimits::default() };
-    for (name, original, expected) in meshes.into_iter().chain(pictures) {
+    let whole = [("instances", &instances[..], None)];
+    for (name, original, expected) in meshes.into_iter().chain(pictures).chain(whole) {
         let expected: Option<Value> = expected.map(|expected| serde_json::from_slice(expected).unwrap());
         let (mut loaded, mut refused, mut largest, mut slowest) = (0, 0, 0, Duration::ZERO);
         // Ten thousand and more for each of the three decoders.
         for seed in 0..3_500u64 {
             let bytes = mutant(original, seed);
             let file = match &expected {
-                Some(expected) => compressed_mesh(&bytes, expected),
-                None => encoded_picture(name, &bytes),
+                Some(expected) => compressed_mesh(&bytes, expected).glb(),
+                None if name == "instances" => bytes,
+                None => encoded_picture(name, &bytes).glb(),
             };
-            let file = file.glb();
-            let guard = MEASURING.lock();
             let before = USED.load(Ordering::Relaxed);
             PEAK.store(before, Ordering::Relaxed);
             let start = Instant::now();
@@ -346,7 +315,6 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
             }
             slowest = slowest.max(start.elapsed());
             let peak = PEAK.load(Ordering::Relaxed).saturating_sub(before);
-            drop(guard);
             largest = largest.max(peak);
             assert!(peak < BOUND, "{name}, seed {seed}: {peak} bytes at once");
             assert!(slowest < SLOWEST, "{name}, seed {seed}: {slowest:?}");

@@ -3,9 +3,7 @@
 //! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and what is
 //! decoded counts against one limit for the whole file.
 
-use super::accessor_format::{
-    Format, Reader, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, number, whole,
-};
+use super::accessor_format::{Format, Reader, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, number, whole};
 use super::buffer_view::range_of_view;
 use super::compressed::Decoded;
 use super::document::{Accessor, Document, Sparse, element};

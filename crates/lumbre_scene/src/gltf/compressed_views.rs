@@ -67,7 +67,10 @@ pub(crate) fn decode(
         let place_in_buffer = (source.buffer, source.byte_offset, source.byte_length);
         let bytes = buffer_view::range(contents, index, place_in_buffer, field)?;
         let made = meshopt::decode(mode, filter, source.count as usize, source.byte_stride as usize, bytes);
-        let made = made.map_err(|problem| LoadProblem::Compressed { place: place.clone(), problem: problem.to_owned() })?;
+        let made = made.map_err(|problem| LoadProblem::Compressed {
+            place: place.clone(),
+            problem: problem.to_owned(),
+        })?;
         decoded.insert(index, made);
     }
     Ok(decoded)

@@ -58,6 +58,7 @@ pub(crate) struct Primitive {
 #[derive(Deserialize, Debug)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Accessor {
+    pub name: Option<String>,
     pub buffer_view: Option<usize>,
     #[serde(default)]
     pub byte_offset: u64,

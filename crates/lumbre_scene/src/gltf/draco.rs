@@ -15,10 +15,10 @@ pub(crate) use without_decoder::decode;
 mod with_decoder {
     use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 
+    use super::MOST_BYTES_PER_POINT;
     use crate::gltf::accessor_format::{
         BYTE, FLOAT, Format, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
     };
-    use super::MOST_BYTES_PER_POINT;
     use crate::gltf::guarded::guarded;
 
     /// A decoded mesh.
@@ -62,10 +62,9 @@ mod with_decoder {
 
         /// The values of an attribute at every point, in the format of an accessor.
         pub(crate) fn attribute(&self, number: u32, format: Format) -> Result<Vec<u8>, String> {
-            let attribute = self
-                .0
-                .attribute_by_unique_id(number)
-                .ok_or_else(|| format!("attribute {number} is not in its Draco data; export the file again"))?;
+            let attribute = self.0.attribute_by_unique_id(number).ok_or_else(|| {
+                format!("attribute {number} is not in its Draco data; export the file again")
+            })?;
             let components = usize::from(attribute.num_components());
             if components != format.components {
                 return Err(format!(

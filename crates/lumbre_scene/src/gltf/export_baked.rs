@@ -9,6 +9,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light};
 use serde_json::{Map, Value, json};
 
+use super::compressed_primitives::EXTENSION as COMPRESSED;
 use super::document::{Document, extension};
 use super::error::Notes;
 use super::export::{LightmapFiles, SaveError, SaveOptions, SaveReport, is_glb, write_lightmaps};
@@ -18,7 +19,6 @@ use super::export_nodes::transform_keys;
 use super::extensions::LightReference;
 use super::hierarchy::hierarchy;
 use super::lightmapped::Primitives;
-use super::compressed_primitives::EXTENSION as COMPRESSED;
 use super::patch::{EXTENSION, Patch, place, record_copied, without_unused};
 use super::source::SourceFile;
 use super::vertex_data::NewData;

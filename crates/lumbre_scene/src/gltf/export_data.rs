@@ -7,7 +7,9 @@ use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
 use serde_json::{Value, json};
 
+use super::error::Notes;
 use super::export::SaveError;
+use super::texture_sets::LIGHTMAP_COORDINATES;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
 
 const ARRAY_BUFFER: u32 = 34962;
@@ -23,6 +25,7 @@ pub(crate) struct Data {
     pub samplers: Vec<Value>,
     pub textures: Vec<Value>,
     pub uses_texture_transform: bool,
+    pub notes: Notes,
     geometries: HashMap<*const TriangleMesh, Value>,
     known_images: HashMap<*const Image, usize>,
     known_samplers: Vec<Sampler>,
@@ -74,7 +77,14 @@ impl Data {
         }
         attributes.insert("POSITION".to_owned(), positions.into());
         if !mesh.normals.is_empty() {
-            let accessor = self.floats(mesh.normals.iter().flat_map(|v| v.to_array()), "VEC3", count);
+            // A triangle without an area has no normal, but glTF has no vertex without one.
+            let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
+            if missing > 0 {
+                self.notes.add(place, format!("{missing} normals are zero; they are written as (0, 1, 0)"));
+            }
+            let written = |normal: &Vec3| if *normal == Vec3::ZERO { Vec3::Y } else { *normal };
+            let normals = mesh.normals.iter().flat_map(|normal| written(normal).to_array());
+            let accessor = self.floats(normals, "VEC3", count);
             attributes.insert("NORMAL".to_owned(), accessor.into());
         }
         for (name, uv) in [("TEXCOORD_0", &mesh.uv0), ("TEXCOORD_1", &mesh.uv1)] {
@@ -82,6 +92,12 @@ impl Data {
                 let accessor = self.floats(uv.iter().flat_map(|v| v.to_array()), "VEC2", count);
                 attributes.insert(name.to_owned(), accessor.into());
             }
+        }
+        if let (None, Some(second)) = (attributes.get("TEXCOORD_0"), attributes.get("TEXCOORD_1").cloned()) {
+            if let Some(accessor) = second.as_u64() {
+                self.accessors[accessor as usize]["name"] = LIGHTMAP_COORDINATES.into();
+            }
+            attributes.insert("TEXCOORD_0".to_owned(), second);
         }
         if !mesh.colors.is_empty() {
             let accessor = self.floats(mesh.colors.iter().flat_map(|v| v.to_array()), "VEC4", count);

@@ -11,9 +11,9 @@ use super::document::{self, Document, shortened};
 use super::error::{LoadError, LoadProblem, Note, Notes};
 use super::limits::LoadLimits;
 use super::options::LoadOptions;
+use super::patch::Patch;
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
 use super::uri::{self, Base};
-use super::patch::Patch;
 use super::{compressed, compressed_views, container, instancing};
 use crate::{
     ActiveCamera, DynamicObject, EmissiveLight, Extras, Hidden, MaterialTextures, Mesh, StaticObject,

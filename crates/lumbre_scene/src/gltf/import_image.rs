@@ -239,8 +239,7 @@ fn decode_common(
         reader.limits(bounds);
         Ok(reader)
     };
-    let undecodable =
-        |error: String| refused(format!("cannot be decoded: {error}; save it again as PNG"));
+    let undecodable = |error: String| refused(format!("cannot be decoded: {error}; save it again as PNG"));
     let first = reader()?;
     let is_webp = first.format() == Some(ImageFormat::WebP);
     let size = first.into_dimensions().map_err(|error| undecodable(error.to_string()))?;
@@ -259,7 +258,12 @@ fn decode_common(
 }
 
 /// Whether an image may have so many texels.
-fn check_size((width, height): (u32, u32), most_texels: u64, length: usize, limits: &LoadLimits) -> Result<(), String> {
+fn check_size(
+    (width, height): (u32, u32),
+    most_texels: u64,
+    length: usize,
+    limits: &LoadLimits,
+) -> Result<(), String> {
     let side = limits.image_side;
     if u64::from(width) * u64::from(height) > most_texels || width > side || height > side {
         return Err(format!(

@@ -2,12 +2,14 @@
 
 use glam::{Vec2, Vec3, Vec4};
 use lumbre_mesh::TriangleMesh;
+use serde_json::Value;
 
 use super::accessor::Buffers;
 use super::decoders;
 use super::document::Primitive;
 use super::error::{LoadProblem, Notes};
 use super::limits::Budget;
+use super::texture_sets::LIGHTMAP_COORDINATES;
 
 const TRIANGLES: u32 = 4;
 const TRIANGLE_STRIP: u32 = 5;
@@ -60,7 +62,9 @@ pub(crate) fn triangle_mesh(
     };
     let vertices = positions.len();
     let normals = attributes.read_unchecked("NORMAL", &["VEC3"], [0.0; 3], vertices)?;
-    let uv0 = attributes.read("TEXCOORD_0", &["VEC2"], [0.0; 2], Some(vertices))?;
+    let stand_in = attributes.first_coordinates_stand_in();
+    let uv0 =
+        if stand_in { None } else { attributes.read("TEXCOORD_0", &["VEC2"], [0.0; 2], Some(vertices))? };
     let uv1 = attributes.read("TEXCOORD_1", &["VEC2"], [0.0; 2], Some(vertices))?;
     let colors = attributes.read("COLOR_0", &["VEC3", "VEC4"], [1.0; 4], Some(vertices))?;
     for unused in ["TEXCOORD_2", "COLOR_1", "JOINTS_0"] {
@@ -148,6 +152,16 @@ struct Attributes<'a> {
 }
 
 impl Attributes<'_> {
+    /// Whether the first set of texture coordinates is there because a lightmap's must not be alone.
+    fn first_coordinates_stand_in(&self) -> bool {
+        let attributes = &self.primitive.attributes;
+        let Some(first) = attributes.get("TEXCOORD_0").and_then(Value::as_u64) else { return false };
+        let accessor =
+            usize::try_from(first).ok().and_then(|first| self.buffers.document.accessors.get(first));
+        attributes.get("TEXCOORD_1").and_then(Value::as_u64) == Some(first)
+            && accessor.and_then(|accessor| accessor.name.as_deref()) == Some(LIGHTMAP_COORDINATES)
+    }
+
     fn read<const N: usize>(
         &mut self,
         name: &str,

@@ -64,57 +64,58 @@ fn instances(
     budget: &mut Budget,
 ) -> Result<Vec<Map<String, Value>>, LoadProblem> {
     let mut instances: Option<Vec<Map<String, Value>>> = None;
-    let mut state = |key: &str, accessor: usize, values: Vec<Value>, budget: &mut Budget| {
-        let count = values.len();
+    for (attribute, key) in [("TRANSLATION", "translation"), ("ROTATION", "rotation"), ("SCALE", "scale")] {
+        let Some(&accessor) = instancing.attributes.get(attribute) else { continue };
+        let used_by = format!("{name}: {EXTENSION}.{attribute}");
+        let values = if key == "rotation" {
+            Values::Rotations(buffers.floats(accessor, &used_by, &["VEC4"], [0.0; 4], budget)?)
+        } else {
+            Values::Vectors(buffers.floats(accessor, &used_by, &["VEC3"], [0.0; 3], budget)?)
+        };
+        let refused = |problem| LoadProblem::Accessor { accessor, used_by: used_by.clone(), problem };
+        let count = values.count();
         if instances.is_none() {
-            budget.charge(count as u64, NODE, || format!("{name}: {EXTENSION}"))?;
+            budget.charge(count as u64, NODE, || used_by.clone())?;
         }
         let instances = instances.get_or_insert_with(|| vec![Map::new(); count]);
         if instances.len() != count {
-            return Err(LoadProblem::Accessor {
-                accessor,
-                used_by: format!("{name}: {EXTENSION}"),
-                problem: format!(
-                    "has {count} elements, but another attribute of the instances {}; export the file again",
-                    instances.len()
-                ),
-            });
+            return Err(refused(format!(
+                "has {count} elements, but another attribute of the instances {}; export the file again",
+                instances.len()
+            )));
         }
-        for (instance, value) in instances.iter_mut().zip(values) {
-            instance.insert(key.to_owned(), value);
+        for (at, instance) in instances.iter_mut().enumerate() {
+            let value = values.get(at);
+            if !value.iter().all(|number| number.is_finite()) {
+                return Err(refused(format!("element {at} is NaN or infinite; export the file again")));
+            }
+            let value: Vec<f64> = value.iter().copied().map(f64::from).collect();
+            instance.insert(key.to_owned(), json!(value));
         }
-        Ok(())
-    };
-    for (attribute, key) in [("TRANSLATION", "translation"), ("SCALE", "scale")] {
-        if let Some(&accessor) = instancing.attributes.get(attribute) {
-            let used_by = format!("{name}: {EXTENSION}.{attribute}");
-            let values = buffers.floats(accessor, &used_by, &["VEC3"], [0.0; 3], budget)?;
-            let values = numbers(values, accessor, &used_by)?;
-            state(key, accessor, values, budget)?;
-        }
-    }
-    if let Some(&accessor) = instancing.attributes.get("ROTATION") {
-        let used_by = format!("{name}: {EXTENSION}.ROTATION");
-        let values = buffers.floats(accessor, &used_by, &["VEC4"], [0.0; 4], budget)?;
-        let values = numbers(values, accessor, &used_by)?;
-        state("rotation", accessor, values, budget)?;
     }
     // One without any of the three stands where its node does.
     Ok(instances.unwrap_or_else(|| vec![Map::new()]))
 }
 
-fn numbers<const N: usize>(
-    values: Vec<[f32; N]>,
-    accessor: usize,
-    used_by: &str,
-) -> Result<Vec<Value>, LoadProblem> {
-    match values.iter().position(|value| !value.iter().all(|number| number.is_finite())) {
-        Some(at) => Err(LoadProblem::Accessor {
-            accessor,
-            used_by: used_by.to_owned(),
-            problem: format!("element {at} is NaN or infinite; export the file again"),
-        }),
-        None => Ok(values.iter().map(|value| json!(value.map(f64::from).to_vec())).collect()),
+/// What an attribute holds of every instance.
+enum Values {
+    Vectors(Vec<[f32; 3]>),
+    Rotations(Vec<[f32; 4]>),
+}
+
+impl Values {
+    fn count(&self) -> usize {
+        match self {
+            Self::Vectors(values) => values.len(),
+            Self::Rotations(values) => values.len(),
+        }
+    }
+
+    fn get(&self, at: usize) -> &[f32] {
+        match self {
+            Self::Vectors(values) => values.get(at).map_or(&[], |value| &value[..]),
+            Self::Rotations(values) => values.get(at).map_or(&[], |value| &value[..]),
+        }
     }
 }
 

@@ -49,7 +49,8 @@ fn compressed_bytes(document: &Document) -> u64 {
         primitive.extensions.get("KHR_draco_mesh_compression")?.get("bufferView")?.as_u64()
     });
     let distinct: std::collections::HashSet<u64> = views.collect();
-    let lengths = distinct.into_iter().filter_map(|view| document.buffer_views.get(usize::try_from(view).ok()?));
+    let lengths =
+        distinct.into_iter().filter_map(|view| document.buffer_views.get(usize::try_from(view).ok()?));
     lengths.fold(0u64, |total, view| total.saturating_add(view.byte_length))
 }
 

@@ -12,8 +12,8 @@ use super::accessor::Buffers;
 use super::document::{self, Document, element, extension};
 use super::error::{LoadProblem, Notes};
 use super::extensions::{
-    AnimationPointer, CameraExtension, IrradianceVolumeExtension, LightReference, LightmapExtension, ObjectExtension,
-    ShadingExtension,
+    AnimationPointer, CameraExtension, IrradianceVolumeExtension, LightReference, LightmapExtension,
+    ObjectExtension, ShadingExtension,
 };
 use super::hierarchy::{Hierarchy, hierarchy, transform};
 use super::import_image::Images;
@@ -352,11 +352,8 @@ fn animated_lights(document: &Document) -> Result<HashSet<usize>, LoadProblem> {
     for (index, animation) in document.animations.iter().enumerate() {
         for channel in &animation.channels {
             let place = format!("animations[{index}].channels");
-            let pointer = extension::<AnimationPointer>(
-                &channel.target.extensions,
-                "KHR_animation_pointer",
-                &place,
-            )?;
+            let pointer =
+                extension::<AnimationPointer>(&channel.target.extensions, "KHR_animation_pointer", &place)?;
             let light = pointer.and_then(|pointer| {
                 let light = pointer.pointer.strip_prefix("/extensions/KHR_lights_punctual/lights/")?;
                 light.split('/').next()?.parse::<usize>().ok()

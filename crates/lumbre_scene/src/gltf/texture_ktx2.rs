@@ -83,7 +83,11 @@ impl<'a> Ktx2Picture<'a> {
             ("levelCount", field::LEVELS, 16),
         ] {
             if word(index) > most {
-                return wrong(name, word(index), &format!("at most {most} (a picture, not an array or a cube)"));
+                return wrong(
+                    name,
+                    word(index),
+                    &format!("at most {most} (a picture, not an array or a cube)"),
+                );
             }
         }
         let (offset, length) = (word(field::DESCRIPTOR), word(field::DESCRIPTOR + 1));
@@ -92,7 +96,9 @@ impl<'a> Ktx2Picture<'a> {
         let coding = match (word(field::FORMAT), model) {
             (0, Some(ETC1S)) => Coding::Etc1s,
             (0, Some(UASTC)) => Coding::Uastc,
-            (0, _) => return wrong("colorModel", model.unwrap_or_default().into(), "163 (ETC1S) or 166 (UASTC)"),
+            (0, _) => {
+                return wrong("colorModel", model.unwrap_or_default().into(), "163 (ETC1S) or 166 (UASTC)");
+            }
             // R8G8B8 and R8G8B8A8, linear and sRGB.
             (23 | 29, _) => Coding::Plain(3),
             (37 | 43, _) => Coding::Plain(4),
@@ -100,7 +106,9 @@ impl<'a> Ktx2Picture<'a> {
                 return wrong("vkFormat", other, "UASTC, ETC1S (0), R8G8B8 (23, 29) or R8G8B8A8 (37, 43)");
             }
         };
-        let long = |offset: usize| u64::from(ktx2::word(bytes, offset)) | u64::from(ktx2::word(bytes, offset + 4)) << 32;
+        let long = |offset: usize| {
+            u64::from(ktx2::word(bytes, offset)) | u64::from(ktx2::word(bytes, offset + 4)) << 32
+        };
         let [start, length, unpacked] = [0, 8, 16].map(|offset| long(ktx2::HEADER_BYTES + offset));
         let level = ktx2::part(bytes, "level 0", start, length)?;
         let scheme = word(field::SUPERCOMPRESSION);
