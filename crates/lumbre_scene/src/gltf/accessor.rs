@@ -3,6 +3,8 @@
 //! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and what is
 //! decoded counts against one limit for the whole file.
 
+use gltf::json::buffer::View;
+
 use super::accessor_format::{Format, Reader, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, number, whole};
 use super::buffer_view::range_of_view;
 use super::compressed::Decoded;
@@ -62,10 +64,10 @@ impl<'a> Buffers<'a> {
     ) -> Result<(&[u8], Option<u64>), LoadProblem> {
         let view = element(&self.document.buffer_views, "bufferViews", index, place)?;
         if let Some(decoded) = self.decoded.views.get(&index) {
-            return Ok((decoded, view.byte_stride));
+            return Ok((decoded, stride(view)));
         }
         let bytes = range_of_view(self.document, &self.bytes, index)?;
-        Ok((bytes, view.byte_stride))
+        Ok((bytes, stride(view)))
     }
 
     /// `count` elements starting at an offset in a view, or why they are not all inside it.
@@ -245,4 +247,9 @@ impl<'a> Buffers<'a> {
             _ => Err(reader.error("a sparse index is not below its count; export the file again")),
         }
     }
+}
+
+/// Bytes from an element of a view to the next, where the view says.
+fn stride(view: &View) -> Option<u64> {
+    view.byte_stride.map(|stride| stride.0 as u64)
 }

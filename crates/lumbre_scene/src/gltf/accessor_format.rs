@@ -1,14 +1,9 @@
 //! What the elements of an accessor look like, and which accessor a message is about. Not their bytes.
 
+pub(crate) use gltf::json::accessor::{BYTE, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
+
 use super::document::{Accessor, Document, element, shortened};
 use super::error::LoadProblem;
-
-pub(crate) const BYTE: u32 = 5120;
-pub(crate) const UNSIGNED_BYTE: u32 = 5121;
-pub(crate) const SHORT: u32 = 5122;
-pub(crate) const UNSIGNED_SHORT: u32 = 5123;
-pub(crate) const UNSIGNED_INT: u32 = 5125;
-pub(crate) const FLOAT: u32 = 5126;
 
 /// What elements look like: vectors, or matrices of `columns` columns, each beginning at a multiple of four bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,7 +13,8 @@ pub(crate) fn range_of_view<'a>(
 ) -> Result<&'a [u8], LoadProblem> {
     let view = element(&document.buffer_views, "bufferViews", index, || format!("bufferViews[{index}]"))?;
     let place = || format!("bufferViews[{index}].buffer");
-    range(contents, index, (view.buffer, view.byte_offset, view.byte_length), place)
+    let offset = view.byte_offset.unwrap_or_default().0;
+    range(contents, index, (view.buffer.value(), offset, view.byte_length.0), place)
 }
 
 /// So many bytes of a buffer from an offset, on behalf of a view.

@@ -18,7 +18,8 @@ pub(crate) type DecodedViews = HashMap<usize, Vec<u8>>;
 /// Whether a buffer only says how long the decoded views would be.
 pub(crate) fn is_fallback(document: &Document, buffer: usize) -> Result<bool, LoadProblem> {
     let Some(own) = document.buffers.get(buffer) else { return Ok(false) };
-    let found = extension::<MeshoptBuffer>(&own.extensions, EXTENSION, &format!("buffers[{buffer}]"))?;
+    let Some(extensions) = &own.extensions else { return Ok(false) };
+    let found = extension::<MeshoptBuffer>(&extensions.others, EXTENSION, &format!("buffers[{buffer}]"))?;
     Ok(own.uri.is_none() && found.is_some_and(|found| found.fallback))
 }
 
@@ -31,7 +32,8 @@ pub(crate) fn decode(
     let mut decoded = DecodedViews::new();
     for (index, view) in document.buffer_views.iter().enumerate() {
         let place = format!("bufferViews[{index}]");
-        let Some(source) = extension::<MeshoptView>(&view.extensions, EXTENSION, &place)? else { continue };
+        let Some(extensions) = &view.extensions else { continue };
+        let Some(source) = extension::<MeshoptView>(&extensions.others, EXTENSION, &place)? else { continue };
         let refused = |field: &str, value: String, expected: &str| LoadProblem::Value {
             place: place.clone(),
             field: format!("{EXTENSION}.{field}"),
@@ -58,11 +60,11 @@ pub(crate) fn decode(
             }
         };
         let length = source.count.checked_mul(source.byte_stride);
-        if length != Some(view.byte_length) {
+        if length != Some(view.byte_length.0) {
             let value = format!("{} elements of {} bytes", source.count, source.byte_stride);
             return Err(refused("count", value, "they have to fill the buffer view; export the file again"));
         }
-        budget.charge(view.byte_length, 1, || place.clone())?;
+        budget.charge(view.byte_length.0, 1, || place.clone())?;
         let field = || format!("{place}.{EXTENSION}.buffer");
         let place_in_buffer = (source.buffer, source.byte_offset, source.byte_length);
         let bytes = buffer_view::range(contents, index, place_in_buffer, field)?;

@@ -4,16 +4,16 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
+use gltf::json::buffer::{ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
+use gltf::json::texture;
 use lumbre_mesh::TriangleMesh;
 use serde_json::{Value, json};
 
+use super::accessor_format::{FLOAT, UNSIGNED_INT, UNSIGNED_SHORT};
 use super::error::Notes;
 use super::export::SaveError;
 use super::texture_sets::LIGHTMAP_COORDINATES;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
-
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// Data of the file so far; equal things are written once.
 #[derive(Default)]
@@ -48,7 +48,7 @@ impl Data {
         let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
         let view = self.view(&bytes, Some(ARRAY_BUFFER));
         self.accessors
-            .push(json!({"bufferView": view, "componentType": 5126, "count": count, "type": shape}));
+            .push(json!({"bufferView": view, "componentType": FLOAT, "count": count, "type": shape}));
         self.accessors.len() - 1
     }
 
@@ -111,7 +111,7 @@ impl Data {
             mesh.indices.iter().flat_map(|index| index.to_le_bytes()).collect()
         };
         let view = self.view(&bytes, Some(ELEMENT_ARRAY_BUFFER));
-        let component = if short { 5123 } else { 5125 };
+        let component = if short { UNSIGNED_SHORT } else { UNSIGNED_INT };
         let length = mesh.indices.len();
         self.accessors
             .push(json!({"bufferView": view, "componentType": component, "count": length, "type": "SCALAR"}));
@@ -191,18 +191,18 @@ impl Data {
 
 fn sampler(sampler: &Sampler) -> Value {
     let wrap = |wrap: Wrap| match wrap {
-        Wrap::Repeat => 10497,
-        Wrap::MirroredRepeat => 33648,
-        Wrap::ClampToEdge => 33071,
+        Wrap::Repeat => texture::REPEAT,
+        Wrap::MirroredRepeat => texture::MIRRORED_REPEAT,
+        Wrap::ClampToEdge => texture::CLAMP_TO_EDGE,
     };
     let minify = match (sampler.minify_linear, sampler.mipmap) {
-        (false, Mipmap::None) => 9728,
-        (true, Mipmap::None) => 9729,
-        (false, Mipmap::Nearest) => 9984,
-        (true, Mipmap::Nearest) => 9985,
-        (false, Mipmap::Linear) => 9986,
-        (true, Mipmap::Linear) => 9987,
+        (false, Mipmap::None) => texture::NEAREST,
+        (true, Mipmap::None) => texture::LINEAR,
+        (false, Mipmap::Nearest) => texture::NEAREST_MIPMAP_NEAREST,
+        (true, Mipmap::Nearest) => texture::LINEAR_MIPMAP_NEAREST,
+        (false, Mipmap::Linear) => texture::NEAREST_MIPMAP_LINEAR,
+        (true, Mipmap::Linear) => texture::LINEAR_MIPMAP_LINEAR,
     };
-    let magnify = if sampler.magnify_linear { 9729 } else { 9728 };
+    let magnify = if sampler.magnify_linear { texture::LINEAR } else { texture::NEAREST };
     json!({"wrapS": wrap(sampler.wrap_u), "wrapT": wrap(sampler.wrap_v), "magFilter": magnify, "minFilter": minify})
 }

@@ -156,23 +156,24 @@ pub(crate) fn contents<'a>(
                 return Err(LoadProblem::Uri { place, uri: String::new(), problem });
             }
         };
+        let byte_length = buffer.byte_length.0;
         let found = content.len() as u64;
-        if found < buffer.byte_length {
-            let problem = LoadProblem::Truncated { what: place.clone(), needed: buffer.byte_length, found };
+        if found < byte_length {
+            let problem = LoadProblem::Truncated { what: place.clone(), needed: byte_length, found };
             // Four is what everything in a .glb is padded to.
-            if buffer.byte_length - found >= 4 {
+            if byte_length - found >= 4 {
                 return Err(problem);
             }
             notes.repair(&place, problem, "zeros stand for the padding that is missing")?;
             let mut padded = content.into_owned();
-            padded.resize(buffer.byte_length as usize, 0);
+            padded.resize(byte_length as usize, 0);
             contents.push(Cow::Owned(padded));
             continue;
         }
         contents.push(match content {
-            Cow::Borrowed(content) => Cow::Borrowed(&content[..buffer.byte_length as usize]),
+            Cow::Borrowed(content) => Cow::Borrowed(&content[..byte_length as usize]),
             Cow::Owned(mut content) => {
-                content.truncate(buffer.byte_length as usize);
+                content.truncate(byte_length as usize);
                 Cow::Owned(content)
             }
         });

@@ -4,6 +4,9 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use glam::Vec2;
+use gltf::json;
+use gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
+use gltf::json::validation::Checked;
 use image::{ImageFormat, ImageReader};
 
 use super::accessor::Buffers;
@@ -129,7 +132,9 @@ impl Images<'_> {
                 fetched = uri::fetch(uri, self.base, place)?;
                 &fetched
             }
-            (None, Some(view)) => self.buffers.view(view, || format!("images[{index}].bufferView"))?.0,
+            (None, Some(view)) => {
+                self.buffers.view(view.value(), || format!("images[{index}].bufferView"))?.0
+            }
             (None, None) => {
                 let problem = "has neither uri nor bufferView; export the file again".to_owned();
                 return Err(LoadProblem::Image { place: place.to_owned(), problem });
@@ -273,24 +278,27 @@ fn check_size(
     Ok(())
 }
 
-fn sampler(source: &super::document::Sampler) -> Sampler {
-    let wrap = |value: Option<u32>| match value {
-        Some(33071) => Wrap::ClampToEdge,
-        Some(33648) => Wrap::MirroredRepeat,
-        _ => Wrap::Repeat,
+fn sampler(source: &json::texture::Sampler) -> Sampler {
+    // What is not a number of glTF counts as not said.
+    let wrap = |value: Checked<WrappingMode>| match value {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,
+        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
     };
     let (minify_linear, mipmap) = match source.min_filter {
-        Some(9728) => (false, Mipmap::None),
-        Some(9729) => (true, Mipmap::None),
-        Some(9984) => (false, Mipmap::Nearest),
-        Some(9985) => (true, Mipmap::Nearest),
-        Some(9986) => (false, Mipmap::Linear),
-        _ => (true, Mipmap::Linear),
+        Some(Checked::Valid(MinFilter::Nearest)) => (false, Mipmap::None),
+        Some(Checked::Valid(MinFilter::Linear)) => (true, Mipmap::None),
+        Some(Checked::Valid(MinFilter::NearestMipmapNearest)) => (false, Mipmap::Nearest),
+        Some(Checked::Valid(MinFilter::LinearMipmapNearest)) => (true, Mipmap::Nearest),
+        Some(Checked::Valid(MinFilter::NearestMipmapLinear)) => (false, Mipmap::Linear),
+        Some(Checked::Valid(MinFilter::LinearMipmapLinear) | Checked::Invalid) | None => {
+            (true, Mipmap::Linear)
+        }
     };
     Sampler {
         wrap_u: wrap(source.wrap_s),
         wrap_v: wrap(source.wrap_t),
-        magnify_linear: source.mag_filter != Some(9728),
+        magnify_linear: source.mag_filter != Some(Checked::Valid(MagFilter::Nearest)),
         minify_linear,
         mipmap,
     }

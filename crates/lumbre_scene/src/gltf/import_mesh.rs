@@ -1,6 +1,7 @@
 //! Primitives of glTF meshes into triangle meshes: strips and fans, missing and broken normals. Not materials.
 
 use glam::{Vec2, Vec3, Vec4};
+use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use lumbre_mesh::TriangleMesh;
 use serde_json::Value;
 
@@ -10,10 +11,6 @@ use super::document::Primitive;
 use super::error::{LoadProblem, Notes};
 use super::limits::Budget;
 use super::texture_sets::LIGHTMAP_COORDINATES;
-
-const TRIANGLES: u32 = 4;
-const TRIANGLE_STRIP: u32 = 5;
-const TRIANGLE_FAN: u32 = 6;
 
 /// Squared length beyond which a normal is not taken as unit: what f32 and 16-bit exporters leave, and not more.
 const UNIT_TOLERANCE: f32 = 1e-5;

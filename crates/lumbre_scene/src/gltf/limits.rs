@@ -51,7 +51,7 @@ fn compressed_bytes(document: &Document) -> u64 {
     let distinct: std::collections::HashSet<u64> = views.collect();
     let lengths =
         distinct.into_iter().filter_map(|view| document.buffer_views.get(usize::try_from(view).ok()?));
-    lengths.fold(0u64, |total, view| total.saturating_add(view.byte_length))
+    lengths.fold(0u64, |total, view| total.saturating_add(view.byte_length.0))
 }
 
 /// What is left of a limit.

@@ -3,18 +3,17 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
+use gltf::json::buffer::{ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
 use serde_json::{Value, json};
 
 use super::accessor::Buffers;
-use super::accessor_format::{FLOAT, Format, SHORT};
+use super::accessor_format::{self, FLOAT, Format, SHORT};
 use super::error::LoadProblem;
 use super::patch::{Patch, place};
 
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-const UNSIGNED_BYTE: u64 = 5121;
-const UNSIGNED_SHORT: u64 = 5123;
-const UNSIGNED_INT: u64 = 5125;
+const UNSIGNED_BYTE: u64 = accessor_format::UNSIGNED_BYTE as u64;
+const UNSIGNED_SHORT: u64 = accessor_format::UNSIGNED_SHORT as u64;
+const UNSIGNED_INT: u64 = accessor_format::UNSIGNED_INT as u64;
 
 /// Bytes that a file's last buffer gets, and the views into them.
 pub(crate) struct NewData {
