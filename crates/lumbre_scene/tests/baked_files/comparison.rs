@@ -179,7 +179,8 @@ pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
         ["buffers", "0", "byteLength"] => at(after, place).as_u64() > at(before, place).as_u64(),
         ["buffers", "0", "uri"] => at(after, place).is_null() || at(before, place).is_null(),
         ["nodes", node, "children" | "mesh" | "extensions", ..]
-            if !before["nodes"][node.parse::<usize>().unwrap()]["extensions"]["EXT_mesh_gpu_instancing"].is_null() =>
+            if !before["nodes"][node.parse::<usize>().unwrap()]["extensions"]["EXT_mesh_gpu_instancing"]
+                .is_null() =>
         {
             true
         }
@@ -211,7 +212,12 @@ pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
         ["extensions"] => after["extensions"].as_object().unwrap().keys().eq(["LUMBRE_bake"]),
         ["extensionsUsed" | "extensionsRequired", ..] => {
             let names = |value: &Value, key: &str| -> Vec<String> {
-                value[key].as_array().into_iter().flatten().map(|name| name.as_str().unwrap().to_owned()).collect()
+                value[key]
+                    .as_array()
+                    .into_iter()
+                    .flatten()
+                    .map(|name| name.as_str().unwrap().to_owned())
+                    .collect()
             };
             let (old, new) = (names(before, parts[0]), names(after, parts[0]));
             new.iter().all(|name| old.contains(name) || name.starts_with("LUMBRE_"))
