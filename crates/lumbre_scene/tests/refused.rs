@@ -176,10 +176,10 @@ fn hierarchies() {
 #[test]
 fn extensions() {
     let mut file = square();
-    file.root["extensionsRequired"] = json!(["KHR_lights_punctual", "KHR_draco_mesh_compression"]);
+    file.root["extensionsRequired"] = json!(["KHR_lights_punctual", "KHR_gaussian_splatting"]);
     let problem = file.problem();
     assert!(
-        problem.to_string().contains("KHR_draco_mesh_compression")
+        problem.to_string().contains("KHR_gaussian_splatting")
             && problem.to_string().contains("KHR_texture_transform")
     );
     assert_matches!(problem, LoadProblem::RequiredExtension { .. });

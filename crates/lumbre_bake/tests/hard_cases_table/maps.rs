@@ -283,8 +283,8 @@ fn an_accessor_that_is_not_a_number() -> Outcome {
 
 fn required_extension_unknown() -> Outcome {
     let mut file = good();
-    file.root["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
-    Outcome::text("KHR_draco_mesh_compression", refusal(&file.glb()))
+    file.root["extensionsRequired"] = json!(["KHR_gaussian_splatting"]);
+    Outcome::text("KHR_gaussian_splatting", refusal(&file.glb()))
 }
 
 fn no_mutant_is_taken_for_a_level() -> Outcome {

@@ -3,24 +3,21 @@
 //! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and what is
 //! decoded counts against one limit for the whole file.
 
-use super::compressed_views::DecodedViews;
+use gltf::json::buffer::View;
+
+use super::accessor_format::{Format, Reader, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, number, whole};
+use super::buffer_view::range_of_view;
+use super::compressed::Decoded;
 use super::document::{Accessor, Document, Sparse, element};
 use super::error::LoadProblem;
 use super::limits::Budget;
-
-const BYTE: u32 = 5120;
-const UNSIGNED_BYTE: u32 = 5121;
-const SHORT: u32 = 5122;
-const UNSIGNED_SHORT: u32 = 5123;
-const UNSIGNED_INT: u32 = 5125;
-const FLOAT: u32 = 5126;
 
 /// The bytes of a file's buffers, with the JSON that divides them.
 pub(crate) struct Buffers<'a> {
     pub document: &'a Document,
     pub bytes: Vec<std::borrow::Cow<'a, [u8]>>,
-    /// Views that were compressed.
-    pub decoded: std::borrow::Cow<'a, DecodedViews>,
+    /// What was compressed.
+    pub decoded: std::borrow::Cow<'a, Decoded>,
 }
 
 /// Elements in a buffer view, `count` of them, already known to lie inside it.
@@ -34,47 +31,6 @@ impl<'a> Elements<'a> {
     fn get(&self, index: usize, size: usize) -> &'a [u8] {
         let start = index.saturating_mul(self.stride);
         self.bytes.get(start..start.saturating_add(size)).unwrap_or_default()
-    }
-}
-
-/// What elements look like: vectors, or matrices of `columns` columns, each beginning at a multiple of four bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Format {
-    pub component: u32,
-    /// Of a vector or a column.
-    pub components: usize,
-    pub columns: usize,
-}
-
-impl Format {
-    pub(crate) fn component_size(self) -> usize {
-        match self.component {
-            BYTE | UNSIGNED_BYTE => 1,
-            SHORT | UNSIGNED_SHORT => 2,
-            _ => 4,
-        }
-    }
-
-    /// Bytes from a column to the next.
-    fn column_size(self) -> usize {
-        let size = self.component_size() * self.components;
-        if self.columns > 1 { size.next_multiple_of(4) } else { size }
-    }
-
-    pub(crate) fn size(self) -> usize {
-        self.column_size() * self.columns
-    }
-
-    /// The components of an element as they stand, without normalization.
-    pub(crate) fn raw(self, element: &[u8]) -> impl Iterator<Item = f64> {
-        let columns = element.chunks(self.column_size()).take(self.columns);
-        let own = self.component_size() * self.components;
-        columns
-            .flat_map(move |column| column.get(..own).unwrap_or_default().chunks_exact(self.component_size()))
-            .map(move |bytes| match self.component {
-                UNSIGNED_INT => f64::from(whole(bytes)),
-                component => f64::from(number(bytes, component, false)),
-            })
     }
 }
 
@@ -95,6 +51,11 @@ impl<'a> RawElements<'a> {
 }
 
 impl<'a> Buffers<'a> {
+    /// Whether an accessor's elements were compressed with its primitive.
+    pub(crate) fn is_decoded(&self, accessor: usize) -> bool {
+        self.decoded.accessors.contains_key(&accessor)
+    }
+
     /// The bytes of a buffer view and its stride.
     pub(crate) fn view(
         &self,
@@ -102,21 +63,11 @@ impl<'a> Buffers<'a> {
         place: impl FnOnce() -> String,
     ) -> Result<(&[u8], Option<u64>), LoadProblem> {
         let view = element(&self.document.buffer_views, "bufferViews", index, place)?;
-        if let Some(decoded) = self.decoded.get(&index) {
-            return Ok((decoded, view.byte_stride));
+        if let Some(decoded) = self.decoded.views.get(&index) {
+            return Ok((decoded, stride(view)));
         }
-        let buffer = element(&self.bytes, "buffers", view.buffer, || format!("bufferViews[{index}].buffer"))?;
-        let end = view.byte_offset.checked_add(view.byte_length);
-        let range =
-            end.and_then(|end| Some(usize::try_from(view.byte_offset).ok()?..usize::try_from(end).ok()?));
-        let bytes = range.and_then(|range| buffer.get(range)).ok_or_else(|| LoadProblem::BufferView {
-            view: index,
-            offset: view.byte_offset,
-            end: end.unwrap_or(u64::MAX),
-            buffer: view.buffer,
-            length: buffer.len() as u64,
-        })?;
-        Ok((bytes, view.byte_stride))
+        let bytes = range_of_view(self.document, &self.bytes, index)?;
+        Ok((bytes, stride(view)))
     }
 
     /// `count` elements starting at an offset in a view, or why they are not all inside it.
@@ -164,7 +115,7 @@ impl<'a> Buffers<'a> {
         fill: [f32; N],
         budget: &mut Budget,
     ) -> Result<Vec<[f32; N]>, LoadProblem> {
-        let (reader, accessor, format) = self.reader(index, used_by, shapes)?;
+        let (reader, accessor, format) = Reader::of(self.document, index, used_by, shapes)?;
         if format.component == UNSIGNED_INT {
             return Err(
                 reader.error("componentType 5125 (unsigned int) is only for indices; use 5126 (float)")
@@ -190,7 +141,7 @@ impl<'a> Buffers<'a> {
         vertices: usize,
         budget: &mut Budget,
     ) -> Result<Vec<u32>, LoadProblem> {
-        let (reader, accessor, format) = self.reader(index, used_by, &["SCALAR"])?;
+        let (reader, accessor, format) = Reader::of(self.document, index, used_by, &["SCALAR"])?;
         if !matches!(format.component, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT) {
             return Err(reader.error(format!(
                 "componentType {} cannot be an index; use 5121, 5123 or 5125",
@@ -207,36 +158,18 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    fn reader<'b>(
-        &'b self,
-        index: usize,
-        used_by: &'b str,
-        shapes: &[&str],
-    ) -> Result<(Reader<'b>, &'b Accessor, Format), LoadProblem> {
-        let accessor = element(&self.document.accessors, "accessors", index, || used_by.to_owned())?;
-        let reader = Reader { index, used_by };
-        if !shapes.contains(&accessor.shape.as_str()) {
-            let shape = super::document::shortened(&accessor.shape);
-            return Err(
-                reader.error(format!("type is {shape:?}, but this use needs {}", shapes.join(" or ")))
-            );
+    /// The elements of the buffer view that an accessor names, or what was decoded for it; nothing where there is neither.
+    fn base(
+        &self,
+        reader: &Reader<'_>,
+        accessor: &Accessor,
+        format: &Format,
+    ) -> Result<Option<Elements<'_>>, LoadProblem> {
+        if let Some(bytes) = self.decoded.accessors.get(&reader.index) {
+            return Ok(Some(Elements { bytes, stride: format.size() }));
         }
-        let (components, columns) = match accessor.shape.as_str() {
-            "SCALAR" => (1, 1),
-            "VEC2" => (2, 1),
-            "VEC3" => (3, 1),
-            "MAT2" => (2, 2),
-            "MAT3" => (3, 3),
-            "MAT4" => (4, 4),
-            _ => (4, 1),
-        };
-        let component = accessor.component_type;
-        if !matches!(component, BYTE | UNSIGNED_BYTE | SHORT | UNSIGNED_SHORT | UNSIGNED_INT | FLOAT) {
-            return Err(
-                reader.error(format!("componentType {component} does not exist in glTF; use 5120 to 5126"))
-            );
-        }
-        Ok((reader, accessor, Format { component, components, columns }))
+        let Some(view) = accessor.buffer_view else { return Ok(None) };
+        self.elements(view, accessor.byte_offset, accessor.count, format, true, reader).map(Some)
     }
 
     fn decode<T: Copy>(
@@ -248,14 +181,9 @@ impl<'a> Buffers<'a> {
         decode: impl Fn(&[u8]) -> T,
         budget: &mut Budget,
     ) -> Result<Vec<T>, LoadProblem> {
-        let base = match accessor.buffer_view {
-            Some(view) => {
-                Some(self.elements(view, accessor.byte_offset, accessor.count, format, true, reader)?)
-            }
-            None => None,
-        };
+        let base = self.base(reader, accessor, format)?;
         budget.charge(accessor.count, size_of::<T>(), || {
-            format!("accessors[{}] ({})", reader.index, reader.used_by)
+            format!("accessors[{}] ({})", reader.index, reader.used_by())
         })?;
         let mut values = match &base {
             Some(base) => base
@@ -306,13 +234,8 @@ impl<'a> Buffers<'a> {
     /// The elements of an accessor of any type, unread.
     pub(crate) fn raw(&self, index: usize, used_by: &str) -> Result<RawElements<'_>, LoadProblem> {
         const SHAPES: [&str; 7] = ["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"];
-        let (reader, accessor, format) = self.reader(index, used_by, &SHAPES)?;
-        let base = match accessor.buffer_view {
-            Some(view) => {
-                Some(self.elements(view, accessor.byte_offset, accessor.count, &format, true, &reader)?)
-            }
-            None => None,
-        };
+        let (reader, accessor, format) = Reader::of(self.document, index, used_by, &SHAPES)?;
+        let base = self.base(&reader, accessor, &format)?;
         let sparse = match &accessor.sparse {
             Some(sparse) => self.replacements(&reader, accessor, sparse, &format)?.collect(),
             None => Vec::new(),
@@ -326,36 +249,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// An accessor in use, for messages.
-struct Reader<'a> {
-    index: usize,
-    used_by: &'a str,
-}
-
-impl Reader<'_> {
-    fn error(&self, problem: impl Into<String>) -> LoadProblem {
-        LoadProblem::Accessor {
-            accessor: self.index,
-            used_by: self.used_by.to_owned(),
-            problem: problem.into(),
-        }
-    }
-}
-
-/// A little-endian unsigned integer of one to four bytes.
-fn whole(bytes: &[u8]) -> u32 {
-    bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
-}
-
-/// One component; normalized integers by the glTF 2.0 specification, section 3.11.
-fn number(bytes: &[u8], component: u32, normalized: bool) -> f32 {
-    let raw = whole(bytes);
-    let (value, largest) = match component {
-        BYTE => (f32::from(raw as u8 as i8), 127.0),
-        UNSIGNED_BYTE => (f32::from(raw as u8), 255.0),
-        SHORT => (f32::from(raw as u16 as i16), 32767.0),
-        UNSIGNED_SHORT => (f32::from(raw as u16), 65535.0),
-        _ => return f32::from_bits(raw),
-    };
-    if normalized { (value / largest).max(-1.0) } else { value }
+/// Bytes from an element of a view to the next, where the view says.
+fn stride(view: &View) -> Option<u64> {
+    view.byte_stride.map(|stride| stride.0 as u64)
 }

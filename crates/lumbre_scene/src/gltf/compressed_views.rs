@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use super::document::{Document, element, extension, shortened};
+use super::buffer_view;
+use super::document::{Document, extension, shortened};
 use super::error::LoadProblem;
 use super::extensions::{MeshoptBuffer, MeshoptView};
 use super::limits::Budget;
@@ -17,7 +18,8 @@ pub(crate) type DecodedViews = HashMap<usize, Vec<u8>>;
 /// Whether a buffer only says how long the decoded views would be.
 pub(crate) fn is_fallback(document: &Document, buffer: usize) -> Result<bool, LoadProblem> {
     let Some(own) = document.buffers.get(buffer) else { return Ok(false) };
-    let found = extension::<MeshoptBuffer>(&own.extensions, EXTENSION, &format!("buffers[{buffer}]"))?;
+    let Some(extensions) = &own.extensions else { return Ok(false) };
+    let found = extension::<MeshoptBuffer>(&extensions.others, EXTENSION, &format!("buffers[{buffer}]"))?;
     Ok(own.uri.is_none() && found.is_some_and(|found| found.fallback))
 }
 
@@ -30,7 +32,8 @@ pub(crate) fn decode(
     let mut decoded = DecodedViews::new();
     for (index, view) in document.buffer_views.iter().enumerate() {
         let place = format!("bufferViews[{index}]");
-        let Some(source) = extension::<MeshoptView>(&view.extensions, EXTENSION, &place)? else { continue };
+        let Some(extensions) = &view.extensions else { continue };
+        let Some(source) = extension::<MeshoptView>(&extensions.others, EXTENSION, &place)? else { continue };
         let refused = |field: &str, value: String, expected: &str| LoadProblem::Value {
             place: place.clone(),
             field: format!("{EXTENSION}.{field}"),
@@ -57,25 +60,19 @@ pub(crate) fn decode(
             }
         };
         let length = source.count.checked_mul(source.byte_stride);
-        if length != Some(view.byte_length) {
+        if length != Some(view.byte_length.0) {
             let value = format!("{} elements of {} bytes", source.count, source.byte_stride);
             return Err(refused("count", value, "they have to fill the buffer view; export the file again"));
         }
-        budget.charge(view.byte_length, 1, || place.clone())?;
+        budget.charge(view.byte_length.0, 1, || place.clone())?;
         let field = || format!("{place}.{EXTENSION}.buffer");
-        let buffer = element(contents, "buffers", source.buffer, field)?;
-        let end = source.byte_offset.checked_add(source.byte_length);
-        let range =
-            end.and_then(|end| Some(usize::try_from(source.byte_offset).ok()?..usize::try_from(end).ok()?));
-        let bytes = range.and_then(|range| buffer.get(range)).ok_or_else(|| LoadProblem::BufferView {
-            view: index,
-            offset: source.byte_offset,
-            end: end.unwrap_or(u64::MAX),
-            buffer: source.buffer,
-            length: buffer.len() as u64,
-        })?;
+        let place_in_buffer = (source.buffer, source.byte_offset, source.byte_length);
+        let bytes = buffer_view::range(contents, index, place_in_buffer, field)?;
         let made = meshopt::decode(mode, filter, source.count as usize, source.byte_stride as usize, bytes);
-        let made = made.map_err(|problem| LoadProblem::Compressed { place: place.clone(), problem })?;
+        let made = made.map_err(|problem| LoadProblem::Compressed {
+            place: place.clone(),
+            problem: problem.to_owned(),
+        })?;
         decoded.insert(index, made);
     }
     Ok(decoded)

@@ -1,8 +1,10 @@
 //! The JSON of a glTF 2.0 file as plain data, indices and numbers unchecked. Not its buffers, and not what it means.
 //!
-//! Written here rather than taken from the `gltf` crate, which panics on some malformed files and keeps numbers as f32.
-//! Every list is read element by element, so that an error names the element.
+//! Buffers, their views, images and samplers are the `gltf` crate's own types. The others are written here: that crate keeps numbers as f32, knows
+//! neither textures without a `source` nor animations without a `node`, and forgets the values and names that it does not know
+//! (docs/decisions.md). Every list is read element by element, so that an error names the element.
 
+use gltf::json;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -58,6 +60,7 @@ pub(crate) struct Primitive {
 #[derive(Deserialize, Debug)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Accessor {
+    pub name: Option<String>,
     pub buffer_view: Option<usize>,
     #[serde(default)]
     pub byte_offset: u64,
@@ -92,27 +95,6 @@ pub(crate) struct SparseValues {
     pub buffer_view: usize,
     #[serde(default)]
     pub byte_offset: u64,
-}
-
-#[derive(Deserialize, Debug)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct BufferView {
-    pub buffer: usize,
-    #[serde(default)]
-    pub byte_offset: u64,
-    pub byte_length: u64,
-    pub byte_stride: Option<u64>,
-    #[serde(default)]
-    pub extensions: Extensions,
-}
-
-#[derive(Deserialize, Debug)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct Buffer {
-    pub uri: Option<String>,
-    pub byte_length: u64,
-    #[serde(default)]
-    pub extensions: Extensions,
 }
 
 #[derive(Deserialize, Debug, Default)]
@@ -162,23 +144,6 @@ pub(crate) struct Texture {
 }
 
 #[derive(Deserialize, Debug)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct Image {
-    pub name: Option<String>,
-    pub uri: Option<String>,
-    pub buffer_view: Option<usize>,
-}
-
-#[derive(Deserialize, Debug)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct Sampler {
-    pub mag_filter: Option<u32>,
-    pub min_filter: Option<u32>,
-    pub wrap_s: Option<u32>,
-    pub wrap_t: Option<u32>,
-}
-
-#[derive(Deserialize, Debug)]
 pub(crate) struct Camera {
     pub name: Option<String>,
     #[serde(rename = "type")]
@@ -218,6 +183,8 @@ pub(crate) struct Channel {
 #[derive(Deserialize, Debug)]
 pub(crate) struct Target {
     pub node: Option<usize>,
+    #[serde(default)]
+    pub extensions: Extensions,
 }
 
 /// `KHR_lights_punctual.lights[i]`.
@@ -249,12 +216,12 @@ pub(crate) struct Document {
     pub nodes: Vec<Node>,
     pub meshes: Vec<Mesh>,
     pub accessors: Vec<Accessor>,
-    pub buffer_views: Vec<BufferView>,
-    pub buffers: Vec<Buffer>,
+    pub buffer_views: Vec<json::buffer::View>,
+    pub buffers: Vec<json::Buffer>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
-    pub images: Vec<Image>,
-    pub samplers: Vec<Sampler>,
+    pub images: Vec<json::Image>,
+    pub samplers: Vec<json::texture::Sampler>,
     pub cameras: Vec<Camera>,
     pub animations: Vec<Animation>,
     pub skins: usize,

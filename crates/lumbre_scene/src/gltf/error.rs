@@ -87,6 +87,19 @@ pub enum LoadProblem {
         /// The names of those that are supported.
         supported: String,
     },
+    /// The file cannot be shown without an extension whose decoder was left out of this program.
+    #[error(
+        "requires the extension {name}, whose decoder was left out of this program; build it with the feature `{feature}` of lumbre_scene, \
+         or convert the file: {remedy}"
+    )]
+    SwitchedOff {
+        /// Its name.
+        name: String,
+        /// The cargo feature that brings the decoder.
+        feature: &'static str,
+        /// A command that writes the file without the extension.
+        remedy: &'static str,
+    },
     /// An index points at nothing.
     #[error("{place} refers to {list}[{index}], but the file has {count} {list}")]
     Reference {
@@ -146,10 +159,10 @@ pub enum LoadProblem {
     /// Compressed data cannot be decoded.
     #[error("{place}: {problem}; compress the file again, or export it without compression")]
     Compressed {
-        /// The buffer view.
+        /// The buffer view or primitive.
         place: String,
         /// What is wrong with the data.
-        problem: &'static str,
+        problem: String,
     },
     /// A URI that is not followed, or that holds no data.
     #[error("{place}: the URI {uri:?} {problem}")]

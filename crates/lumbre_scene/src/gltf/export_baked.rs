@@ -9,6 +9,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light};
 use serde_json::{Map, Value, json};
 
+use super::compressed_primitives::EXTENSION as COMPRESSED;
 use super::document::{Document, extension};
 use super::error::Notes;
 use super::export::{LightmapFiles, SaveError, SaveOptions, SaveReport, is_glb, write_lightmaps};
@@ -18,7 +19,7 @@ use super::export_nodes::transform_keys;
 use super::extensions::LightReference;
 use super::hierarchy::hierarchy;
 use super::lightmapped::Primitives;
-use super::patch::{EXTENSION, Patch, place, record_copied};
+use super::patch::{EXTENSION, Patch, place, record_copied, without_unused};
 use super::source::SourceFile;
 use super::vertex_data::NewData;
 use super::{beside, container, import_scene, uri};
@@ -59,7 +60,7 @@ pub fn save_baked(
     };
     let data = NewData { buffer, start, bytes: Vec::new() };
     let mut baked = Baked {
-        patch: Patch::new(source.root.clone()),
+        patch: source.patch.clone(),
         lightmaps: LightmapFiles::new(&stem, options.encoding),
         primitives: Primitives::new(&buffers, data),
         used: HashSet::new(),
@@ -357,7 +358,12 @@ impl Baked<'_> {
     }
 
     fn extensions_used(&mut self) {
-        let mut used: Vec<String> = self.document().extensions_used.clone();
+        let mut primitives = self.document().meshes.iter().flat_map(|mesh| &mesh.primitives);
+        if primitives.any(|primitive| primitive.extensions.contains_key(COMPRESSED)) {
+            without_unused(&mut self.patch, COMPRESSED, "meshes");
+        }
+        let used = self.patch.get(&place!["extensionsUsed"]).and_then(Value::as_array).into_iter().flatten();
+        let mut used: Vec<String> = used.filter_map(Value::as_str).map(ToOwned::to_owned).collect();
         if !self.patch.is_unchanged() {
             self.used.insert(EXTENSION);
         }

@@ -4,14 +4,16 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
+use gltf::json::buffer::{ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
+use gltf::json::texture;
 use lumbre_mesh::TriangleMesh;
 use serde_json::{Value, json};
 
+use super::accessor_format::{FLOAT, UNSIGNED_INT, UNSIGNED_SHORT};
+use super::error::Notes;
 use super::export::SaveError;
+use super::texture_sets::LIGHTMAP_COORDINATES;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
-
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// Data of the file so far; equal things are written once.
 #[derive(Default)]
@@ -23,6 +25,7 @@ pub(crate) struct Data {
     pub samplers: Vec<Value>,
     pub textures: Vec<Value>,
     pub uses_texture_transform: bool,
+    pub notes: Notes,
     geometries: HashMap<*const TriangleMesh, Value>,
     known_images: HashMap<*const Image, usize>,
     known_samplers: Vec<Sampler>,
@@ -45,7 +48,7 @@ impl Data {
         let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
         let view = self.view(&bytes, Some(ARRAY_BUFFER));
         self.accessors
-            .push(json!({"bufferView": view, "componentType": 5126, "count": count, "type": shape}));
+            .push(json!({"bufferView": view, "componentType": FLOAT, "count": count, "type": shape}));
         self.accessors.len() - 1
     }
 
@@ -74,7 +77,14 @@ impl Data {
         }
         attributes.insert("POSITION".to_owned(), positions.into());
         if !mesh.normals.is_empty() {
-            let accessor = self.floats(mesh.normals.iter().flat_map(|v| v.to_array()), "VEC3", count);
+            // A triangle without an area has no normal, but glTF has no vertex without one.
+            let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
+            if missing > 0 {
+                self.notes.add(place, format!("{missing} normals are zero; they are written as (0, 1, 0)"));
+            }
+            let written = |normal: &Vec3| if *normal == Vec3::ZERO { Vec3::Y } else { *normal };
+            let normals = mesh.normals.iter().flat_map(|normal| written(normal).to_array());
+            let accessor = self.floats(normals, "VEC3", count);
             attributes.insert("NORMAL".to_owned(), accessor.into());
         }
         for (name, uv) in [("TEXCOORD_0", &mesh.uv0), ("TEXCOORD_1", &mesh.uv1)] {
@@ -82,6 +92,12 @@ impl Data {
                 let accessor = self.floats(uv.iter().flat_map(|v| v.to_array()), "VEC2", count);
                 attributes.insert(name.to_owned(), accessor.into());
             }
+        }
+        if let (None, Some(second)) = (attributes.get("TEXCOORD_0"), attributes.get("TEXCOORD_1").cloned()) {
+            if let Some(accessor) = second.as_u64() {
+                self.accessors[accessor as usize]["name"] = LIGHTMAP_COORDINATES.into();
+            }
+            attributes.insert("TEXCOORD_0".to_owned(), second);
         }
         if !mesh.colors.is_empty() {
             let accessor = self.floats(mesh.colors.iter().flat_map(|v| v.to_array()), "VEC4", count);
@@ -95,7 +111,7 @@ impl Data {
             mesh.indices.iter().flat_map(|index| index.to_le_bytes()).collect()
         };
         let view = self.view(&bytes, Some(ELEMENT_ARRAY_BUFFER));
-        let component = if short { 5123 } else { 5125 };
+        let component = if short { UNSIGNED_SHORT } else { UNSIGNED_INT };
         let length = mesh.indices.len();
         self.accessors
             .push(json!({"bufferView": view, "componentType": component, "count": length, "type": "SCALAR"}));
@@ -175,18 +191,18 @@ impl Data {
 
 fn sampler(sampler: &Sampler) -> Value {
     let wrap = |wrap: Wrap| match wrap {
-        Wrap::Repeat => 10497,
-        Wrap::MirroredRepeat => 33648,
-        Wrap::ClampToEdge => 33071,
+        Wrap::Repeat => texture::REPEAT,
+        Wrap::MirroredRepeat => texture::MIRRORED_REPEAT,
+        Wrap::ClampToEdge => texture::CLAMP_TO_EDGE,
     };
     let minify = match (sampler.minify_linear, sampler.mipmap) {
-        (false, Mipmap::None) => 9728,
-        (true, Mipmap::None) => 9729,
-        (false, Mipmap::Nearest) => 9984,
-        (true, Mipmap::Nearest) => 9985,
-        (false, Mipmap::Linear) => 9986,
-        (true, Mipmap::Linear) => 9987,
+        (false, Mipmap::None) => texture::NEAREST,
+        (true, Mipmap::None) => texture::LINEAR,
+        (false, Mipmap::Nearest) => texture::NEAREST_MIPMAP_NEAREST,
+        (true, Mipmap::Nearest) => texture::LINEAR_MIPMAP_NEAREST,
+        (false, Mipmap::Linear) => texture::NEAREST_MIPMAP_LINEAR,
+        (true, Mipmap::Linear) => texture::LINEAR_MIPMAP_LINEAR,
     };
-    let magnify = if sampler.magnify_linear { 9729 } else { 9728 };
+    let magnify = if sampler.magnify_linear { texture::LINEAR } else { texture::NEAREST };
     json!({"wrapS": wrap(sampler.wrap_u), "wrapT": wrap(sampler.wrap_v), "magFilter": magnify, "minFilter": minify})
 }

@@ -163,6 +163,7 @@ impl Nodes {
             }
             result.nodes[number] = node.into();
         }
+        notes.list.append(&mut result.data.notes.list);
         result.notes = notes.list;
         Ok(result)
     }

@@ -205,6 +205,34 @@ pub(crate) struct MeshoptBuffer {
     pub fallback: bool,
 }
 
+/// KHR_draco_mesh_compression of a primitive: the view with the compressed data, and the number of each attribute in them.
+#[derive(Deserialize, Debug)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct DracoPrimitive {
+    pub buffer_view: usize,
+    #[serde(default)]
+    pub attributes: std::collections::BTreeMap<String, u32>,
+}
+
+/// KHR_texture_basisu and EXT_texture_webp of a texture: the image in place of its `source`.
+#[derive(Deserialize, Debug)]
+pub(crate) struct TextureSource {
+    pub source: usize,
+}
+
+/// EXT_mesh_gpu_instancing of a node: accessors by the name of what they hold of every instance.
+#[derive(Deserialize, Debug)]
+pub(crate) struct Instancing {
+    #[serde(default)]
+    pub attributes: std::collections::BTreeMap<String, usize>,
+}
+
+/// KHR_animation_pointer of the target of an animation's channel: the JSON pointer to what is animated.
+#[derive(Deserialize, Debug)]
+pub(crate) struct AnimationPointer {
+    pub pointer: String,
+}
+
 /// KHR_materials_emissive_strength.
 #[derive(Deserialize, Debug, Default)]
 #[serde(rename_all = "camelCase")]

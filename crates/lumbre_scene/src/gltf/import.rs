@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use bevy_ecs::prelude::*;
 
 use super::accessor::Buffers;
+use super::decoders::{self, OptionalDecoder};
 use super::document::{self, Document, shortened};
 use super::error::{LoadError, LoadProblem, Note, Notes};
 use super::limits::LoadLimits;
 use super::options::LoadOptions;
+use super::patch::Patch;
 use super::prepared::{Prepared, PreparedNode, PreparedPrimitive, prepare};
 use super::uri::{self, Base};
-use super::{compressed_views, container};
+use super::{compressed, compressed_views, container, instancing};
 use crate::{
     ActiveCamera, DynamicObject, EmissiveLight, Extras, Hidden, MaterialTextures, Mesh, StaticObject,
     update_transforms,
@@ -97,15 +99,21 @@ pub fn load_slice_within(
 fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared, Notes), LoadProblem> {
     let mut notes = Notes { lenient: options.lenient, ..Notes::default() };
     let container = container::split(bytes, &mut notes)?;
-    let document = Document::from_root(document::parse(container.json)?, &mut notes)?;
+    let root = document::parse(container.json)?;
+    let mut patch = instancing::is_used(&root).then(|| Patch::new(root.clone()));
+    let document = Document::from_root(root, &mut notes)?;
     check_extensions(&document)?;
     let contents = contents(&document, container.binary, base, &mut notes)?;
-    let decoded = Cow::Owned(compressed_views::decode(
-        &document,
-        &contents,
-        &mut options.limits.budget(bytes.len(), &contents),
-    )?);
-    let buffers = Buffers { document: &document, bytes: contents, decoded };
+    let mut budget = options.limits.budget(bytes.len(), &document, &contents);
+    let decoded = Cow::Owned(compressed::decode(&document, &contents, &mut budget)?);
+    let mut buffers = Buffers { document: &document, bytes: contents, decoded };
+    let document_of_instances;
+    if let Some(patch) = &mut patch
+        && instancing::expand(patch, &document, &buffers, &mut budget, &mut notes)?
+    {
+        document_of_instances = Document::from_root(patch.root(), &mut notes)?;
+        buffers.document = &document_of_instances;
+    }
     let prepared = decode(&buffers, bytes.len() as u64, base, options.limits, &mut notes)?;
     Ok((prepared, notes))
 }
@@ -114,6 +122,9 @@ fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared
 pub(crate) fn check_extensions(document: &Document) -> Result<(), LoadProblem> {
     for name in &document.extensions_required {
         if !super::SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
+            if let Some(&OptionalDecoder { feature, remedy, .. }) = decoders::missing(name) {
+                return Err(LoadProblem::SwitchedOff { name: name.clone(), feature, remedy });
+            }
             let (name, supported) = (shortened(name).to_owned(), super::SUPPORTED_EXTENSIONS.join(", "));
             return Err(LoadProblem::RequiredExtension { name, supported });
         }
@@ -145,23 +156,24 @@ pub(crate) fn contents<'a>(
                 return Err(LoadProblem::Uri { place, uri: String::new(), problem });
             }
         };
+        let byte_length = buffer.byte_length.0;
         let found = content.len() as u64;
-        if found < buffer.byte_length {
-            let problem = LoadProblem::Truncated { what: place.clone(), needed: buffer.byte_length, found };
+        if found < byte_length {
+            let problem = LoadProblem::Truncated { what: place.clone(), needed: byte_length, found };
             // Four is what everything in a .glb is padded to.
-            if buffer.byte_length - found >= 4 {
+            if byte_length - found >= 4 {
                 return Err(problem);
             }
             notes.repair(&place, problem, "zeros stand for the padding that is missing")?;
             let mut padded = content.into_owned();
-            padded.resize(buffer.byte_length as usize, 0);
+            padded.resize(byte_length as usize, 0);
             contents.push(Cow::Owned(padded));
             continue;
         }
         contents.push(match content {
-            Cow::Borrowed(content) => Cow::Borrowed(&content[..buffer.byte_length as usize]),
+            Cow::Borrowed(content) => Cow::Borrowed(&content[..byte_length as usize]),
             Cow::Owned(mut content) => {
-                content.truncate(buffer.byte_length as usize);
+                content.truncate(byte_length as usize);
                 Cow::Owned(content)
             }
         });
@@ -178,7 +190,7 @@ pub(crate) fn decode(
     notes: &mut Notes,
 ) -> Result<Prepared, LoadProblem> {
     let document = buffers.document;
-    let budget = limits.budget(file_bytes as usize, &buffers.bytes);
+    let budget = limits.budget(file_bytes as usize, document, &buffers.bytes);
     let mut prepared = prepare(document, buffers, base, limits, budget, notes)?;
     prepared.files = files_beside(document, base);
     Ok(prepared)

@@ -4,13 +4,19 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use glam::Vec2;
+use gltf::json;
+use gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
+use gltf::json::validation::Checked;
 use image::{ImageFormat, ImageReader};
 
 use super::accessor::Buffers;
-use super::document::{TextureInfo, element, extension, shortened};
+use super::decoders;
+use super::document::{Texture, TextureInfo, element, extension, shortened};
 use super::error::{LoadProblem, Notes};
-use super::extensions::TextureTransform;
+use super::extensions::{TextureSource, TextureTransform};
+use super::guarded::guarded;
 use super::limits::{Budget, LoadLimits};
+use super::texture_ktx2::Ktx2Picture;
 use super::uri::{self, Base};
 use super::value::number;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
@@ -18,6 +24,12 @@ use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
 /// Most texels that one byte of a PNG or JPEG can stand for: deflate expands at most 1032 times, and a texel has at least one bit.
 /// A JPEG block of 64 texels takes at least one bit.
 const MOST_TEXELS_PER_BYTE: u64 = 8 * 1032;
+
+/// Texels that an image of any length may claim: one of a single colour takes next to no bytes as WebP or ETC1S.
+const TEXELS_OF_ANY_IMAGE: u64 = 4096 * 4096;
+
+/// Extensions of a texture that name another image, the one that is preferred first.
+const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 
 /// Decodes images when they are first used.
 pub(crate) struct Images<'a> {
@@ -44,12 +56,7 @@ impl Images<'_> {
                 return Ok(None);
             }
         };
-        let Some(source) = texture.source else {
-            let kinds: Vec<_> = texture.extensions.keys().map(|name| shortened(name)).collect();
-            notes.add(
-                format!("textures[{}]", info.index),
-                format!("no PNG or JPEG image ({}); left out", kinds.join(", ")),
-            );
+        let Some(source) = source(texture, &format!("textures[{}]", info.index), notes)? else {
             return Ok(None);
         };
         let sampler = match texture.sampler {
@@ -125,7 +132,9 @@ impl Images<'_> {
                 fetched = uri::fetch(uri, self.base, place)?;
                 &fetched
             }
-            (None, Some(view)) => self.buffers.view(view, || format!("images[{index}].bufferView"))?.0,
+            (None, Some(view)) => {
+                self.buffers.view(view.value(), || format!("images[{index}].bufferView"))?.0
+            }
             (None, None) => {
                 let problem = "has neither uri nor bufferView; export the file again".to_owned();
                 return Err(LoadProblem::Image { place: place.to_owned(), problem });
@@ -140,13 +149,69 @@ impl Images<'_> {
     }
 }
 
+/// The image of a texture: that of an extension which is decoded, or its own. `None`, with a note, where neither is there.
+fn source(texture: &Texture, place: &str, notes: &mut Notes) -> Result<Option<usize>, LoadProblem> {
+    for name in TEXTURE_EXTENSIONS {
+        if decoders::missing(name).is_none()
+            && let Some(TextureSource { source }) = extension(&texture.extensions, name, place)?
+        {
+            return Ok(Some(source));
+        }
+    }
+    if texture.source.is_none() {
+        let reasons = texture.extensions.keys().map(|name| match decoders::missing(name) {
+            Some(decoder) => format!(
+                "{name}: built without the feature `{}`; convert it with {}",
+                decoder.feature, decoder.remedy
+            ),
+            None => shortened(name).to_owned(),
+        });
+        let reasons: Vec<_> = reasons.collect();
+        notes.add(place, format!("no image that is read ({}); left out", reasons.join(", ")));
+    }
+    Ok(texture.source)
+}
+
 /// One white texel.
 pub(crate) fn white() -> Image {
     Image { name: "white".into(), width: 1, height: 1, rgba: vec![255; 4] }
 }
 
-/// Decodes a PNG or JPEG, told apart by their first bytes.
+/// Decodes an image, whose kind shows in its first bytes.
 fn decode(
+    bytes: &[u8],
+    name: String,
+    place: &str,
+    limits: &LoadLimits,
+    budget: &mut Budget,
+) -> Result<Image, LoadProblem> {
+    if Ktx2Picture::recognizes(bytes) {
+        decode_ktx2(bytes, name, place, limits, budget)
+    } else {
+        decode_common(bytes, name, place, limits, budget)
+    }
+}
+
+/// A KTX2 picture.
+fn decode_ktx2(
+    bytes: &[u8],
+    name: String,
+    place: &str,
+    limits: &LoadLimits,
+    budget: &mut Budget,
+) -> Result<Image, LoadProblem> {
+    let refused = |problem: String| LoadProblem::Image { place: place.to_owned(), problem };
+    let undecodable =
+        |problem: String| refused(format!("cannot be decoded as KTX2: {problem}; save it again as PNG"));
+    let picture = Ktx2Picture::read(bytes).map_err(|error| undecodable(error.to_string()))?;
+    let (width, height) = (picture.width, picture.height);
+    check_size((width, height), picture.most_texels(), bytes.len(), limits).map_err(refused)?;
+    budget.charge(u64::from(width) * u64::from(height), 4, || place.to_owned())?;
+    Ok(Image { name, width, height, rgba: picture.texels().map_err(undecodable)? })
+}
+
+/// A PNG, JPEG or WebP picture.
+fn decode_common(
     bytes: &[u8],
     name: String,
     place: &str,
@@ -158,8 +223,17 @@ fn decode(
         let mut reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(|error| refused(error.to_string()))?;
-        if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
-            return Err(refused("is neither PNG nor JPEG; convert it to PNG".to_owned()));
+        match reader.format() {
+            Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
+            Some(ImageFormat::WebP) => {
+                if let Some(decoder) = decoders::missing("EXT_texture_webp") {
+                    return Err(refused(format!(
+                        "is WebP, whose decoder was left out of this program (feature `{}`); convert it: {}",
+                        decoder.feature, decoder.remedy
+                    )));
+                }
+            }
+            _ => return Err(refused("is neither PNG nor JPEG, WebP or KTX2; convert it to PNG".to_owned())),
         }
         let mut bounds = image::Limits::default();
         bounds.max_image_width = Some(limits.image_side);
@@ -170,44 +244,61 @@ fn decode(
         reader.limits(bounds);
         Ok(reader)
     };
-    let undecodable =
-        |error: image::ImageError| refused(format!("cannot be decoded: {error}; save it again as PNG"));
-    let (width, height) = reader()?.into_dimensions().map_err(undecodable)?;
-    let texels = u64::from(width) * u64::from(height);
-    if texels > MOST_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64)
-        || width > limits.image_side
-        || height > limits.image_side
-    {
-        let (side, length) = (limits.image_side, bytes.len());
-        return Err(refused(format!(
-            "claims {width} x {height} texels in {length} bytes; at most {side} per side are allowed, and what the bytes can hold"
-        )));
+    let undecodable = |error: String| refused(format!("cannot be decoded: {error}; save it again as PNG"));
+    let first = reader()?;
+    let is_webp = first.format() == Some(ImageFormat::WebP);
+    let size = first.into_dimensions().map_err(|error| undecodable(error.to_string()))?;
+    let mut most_texels = MOST_TEXELS_PER_BYTE.saturating_mul(bytes.len() as u64);
+    if is_webp {
+        most_texels = most_texels.max(TEXELS_OF_ANY_IMAGE);
     }
-    budget.charge(texels, 4, || place.to_owned())?;
-    let decoded = reader()?.decode().map_err(undecodable)?;
-    let decoded = decoded.into_rgba8();
+    check_size(size, most_texels, bytes.len(), limits).map_err(refused)?;
+    budget.charge(u64::from(size.0) * u64::from(size.1), 4, || place.to_owned())?;
+    let reader = reader()?;
+    let decoded = guarded(|| reader.decode().map(image::DynamicImage::into_rgba8))
+        .ok_or_else(|| undecodable("its decoder failed".to_owned()))?
+        .map_err(|error| undecodable(error.to_string()))?;
     let (width, height) = decoded.dimensions();
     Ok(Image { name, width, height, rgba: decoded.into_raw() })
 }
 
-fn sampler(source: &super::document::Sampler) -> Sampler {
-    let wrap = |value: Option<u32>| match value {
-        Some(33071) => Wrap::ClampToEdge,
-        Some(33648) => Wrap::MirroredRepeat,
-        _ => Wrap::Repeat,
+/// Whether an image may have so many texels.
+fn check_size(
+    (width, height): (u32, u32),
+    most_texels: u64,
+    length: usize,
+    limits: &LoadLimits,
+) -> Result<(), String> {
+    let side = limits.image_side;
+    if u64::from(width) * u64::from(height) > most_texels || width > side || height > side {
+        return Err(format!(
+            "claims {width} x {height} texels in {length} bytes; at most {side} per side are allowed, and what the bytes can hold"
+        ));
+    }
+    Ok(())
+}
+
+fn sampler(source: &json::texture::Sampler) -> Sampler {
+    // What is not a number of glTF counts as not said.
+    let wrap = |value: Checked<WrappingMode>| match value {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,
+        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
     };
     let (minify_linear, mipmap) = match source.min_filter {
-        Some(9728) => (false, Mipmap::None),
-        Some(9729) => (true, Mipmap::None),
-        Some(9984) => (false, Mipmap::Nearest),
-        Some(9985) => (true, Mipmap::Nearest),
-        Some(9986) => (false, Mipmap::Linear),
-        _ => (true, Mipmap::Linear),
+        Some(Checked::Valid(MinFilter::Nearest)) => (false, Mipmap::None),
+        Some(Checked::Valid(MinFilter::Linear)) => (true, Mipmap::None),
+        Some(Checked::Valid(MinFilter::NearestMipmapNearest)) => (false, Mipmap::Nearest),
+        Some(Checked::Valid(MinFilter::LinearMipmapNearest)) => (true, Mipmap::Nearest),
+        Some(Checked::Valid(MinFilter::NearestMipmapLinear)) => (false, Mipmap::Linear),
+        Some(Checked::Valid(MinFilter::LinearMipmapLinear) | Checked::Invalid) | None => {
+            (true, Mipmap::Linear)
+        }
     };
     Sampler {
         wrap_u: wrap(source.wrap_s),
         wrap_v: wrap(source.wrap_t),
-        magnify_linear: source.mag_filter != Some(9728),
+        magnify_linear: source.mag_filter != Some(Checked::Valid(MagFilter::Nearest)),
         minify_linear,
         mipmap,
     }

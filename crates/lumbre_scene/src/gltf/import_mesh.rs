@@ -1,16 +1,16 @@
 //! Primitives of glTF meshes into triangle meshes: strips and fans, missing and broken normals. Not materials.
 
 use glam::{Vec2, Vec3, Vec4};
+use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use lumbre_mesh::TriangleMesh;
+use serde_json::Value;
 
 use super::accessor::Buffers;
+use super::decoders;
 use super::document::Primitive;
 use super::error::{LoadProblem, Notes};
 use super::limits::Budget;
-
-const TRIANGLES: u32 = 4;
-const TRIANGLE_STRIP: u32 = 5;
-const TRIANGLE_FAN: u32 = 6;
+use super::texture_sets::LIGHTMAP_COORDINATES;
 
 /// Squared length beyond which a normal is not taken as unit: what f32 and 16-bit exporters leave, and not more.
 const UNIT_TOLERANCE: f32 = 1e-5;
@@ -41,10 +41,15 @@ pub(crate) fn triangle_mesh(
     if primitive.targets.is_some() {
         notes.add(place, "morph targets are not supported; the base shape is used");
     }
-    if primitive.extensions.contains_key("KHR_draco_mesh_compression") {
+    if primitive.extensions.contains_key("KHR_draco_mesh_compression")
+        && let Some(decoder) = decoders::missing("KHR_draco_mesh_compression")
+    {
         notes.add(
             place,
-            "KHR_draco_mesh_compression is not supported; its uncompressed form is used if there is one",
+            format!(
+                "its uncompressed form is used: this program was built without the Draco decoder (feature `{}`)",
+                decoder.feature
+            ),
         );
     }
     let mut attributes = Attributes { buffers, primitive, place, index, budget };
@@ -54,7 +59,9 @@ pub(crate) fn triangle_mesh(
     };
     let vertices = positions.len();
     let normals = attributes.read_unchecked("NORMAL", &["VEC3"], [0.0; 3], vertices)?;
-    let uv0 = attributes.read("TEXCOORD_0", &["VEC2"], [0.0; 2], Some(vertices))?;
+    let stand_in = attributes.first_coordinates_stand_in();
+    let uv0 =
+        if stand_in { None } else { attributes.read("TEXCOORD_0", &["VEC2"], [0.0; 2], Some(vertices))? };
     let uv1 = attributes.read("TEXCOORD_1", &["VEC2"], [0.0; 2], Some(vertices))?;
     let colors = attributes.read("COLOR_0", &["VEC3", "VEC4"], [1.0; 4], Some(vertices))?;
     for unused in ["TEXCOORD_2", "COLOR_1", "JOINTS_0"] {
@@ -142,6 +149,16 @@ struct Attributes<'a> {
 }
 
 impl Attributes<'_> {
+    /// Whether the first set of texture coordinates is there because a lightmap's must not be alone.
+    fn first_coordinates_stand_in(&self) -> bool {
+        let attributes = &self.primitive.attributes;
+        let Some(first) = attributes.get("TEXCOORD_0").and_then(Value::as_u64) else { return false };
+        let accessor =
+            usize::try_from(first).ok().and_then(|first| self.buffers.document.accessors.get(first));
+        attributes.get("TEXCOORD_1").and_then(Value::as_u64) == Some(first)
+            && accessor.and_then(|accessor| accessor.name.as_deref()) == Some(LIGHTMAP_COORDINATES)
+    }
+
     fn read<const N: usize>(
         &mut self,
         name: &str,

@@ -3,18 +3,19 @@
 
 use std::collections::HashMap;
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use lumbre_mesh::TriangleMesh;
 use serde_json::{Map, Value};
 
 use super::accessor::Buffers;
+use super::compressed_primitives::EXTENSION as COMPRESSED;
 use super::error::{LoadProblem, Notes};
 use super::export::SaveError;
 use super::import_mesh::corners;
 use super::limits::Budget;
 use super::patch::{Patch, place};
-use super::texture_sets::with_sets_moved;
-use super::vertex_data::{NewData, Vertices};
+use super::texture_sets::{LIGHTMAP_COORDINATES, with_sets_moved};
+use super::vertex_data::{NewData, Normals, Vertices};
 
 /// Where fewer than one vertex in so many is drawn, the others are not carried along: primitives may share one large list.
 const LEAST_USED: usize = 4;
@@ -42,6 +43,21 @@ struct Split {
     coordinates: Vec<Vec2>,
     /// The new vertex at each corner of each triangle.
     corners: Vec<u32>,
+}
+
+impl Split {
+    /// The normal that a mesh has at each vertex; zero where none of its triangles has it.
+    fn directions(&self, made: &TriangleMesh) -> Vec<Vec3> {
+        let mut directions = vec![Vec3::ZERO; self.vertices.sources.len()];
+        for (&vertex, &of) in self.corners.iter().zip(&made.indices) {
+            if let (Some(direction), Some(normal)) =
+                (directions.get_mut(vertex as usize), made.normals.get(of as usize))
+            {
+                *direction = *normal;
+            }
+        }
+        directions
+    }
 }
 
 impl<'a> Primitives<'a> {
@@ -96,26 +112,45 @@ impl<'a> Primitives<'a> {
         if equal(&second, &made.uv1) {
             return Ok(primitive);
         }
-        if source.extensions.contains_key("KHR_draco_mesh_compression") {
+        let compressed = source.extensions.contains_key(COMPRESSED);
+        if compressed {
             if let Some(Value::Object(extensions)) = primitive.get_mut("extensions") {
-                extensions.shift_remove("KHR_draco_mesh_compression");
+                extensions.shift_remove(COMPRESSED);
+                if extensions.is_empty()
+                    && let Some(primitive) = primitive.as_object_mut()
+                {
+                    primitive.shift_remove("extensions");
+                }
             }
             self.notes
                 .add(&place, "its lightmap coordinates are not in the Draco data; written uncompressed");
         }
 
         let split = split(&corners, made, positions.len());
+        let directions = split.directions(made);
         let whole = split.vertices.complete && split.vertices.sources.len() == positions.len();
-        if !whole {
-            self.choose_vertices(patch, (mesh, index), &place, &mut primitive, positions.len(), &split);
+        if !whole || compressed {
+            let of = (mesh, index);
+            self.choose_vertices(patch, of, &place, &mut primitive, positions.len(), &split, &directions);
+        } else if let Some(normals) = primitive["attributes"]["NORMAL"].as_u64() {
+            let chosen = &split.vertices;
+            if let Some(mended) =
+                self.mended_normals(patch, normals as usize, &place, positions.len(), chosen, &directions)
+            {
+                primitive["attributes"]["NORMAL"] = mended.into();
+            }
         }
         let coordinates: Vec<[f32; 2]> = split.coordinates.iter().map(Vec2::to_array).collect();
-        let written = self.data.coordinates(patch, &coordinates);
+        let alone = first.is_none() && second.is_none();
+        let written = self.data.coordinates(patch, &coordinates, alone.then_some(LIGHTMAP_COORDINATES));
 
         let moved = second.is_some() && !equal(&first, &made.uv0) && equal(&second, &made.uv0);
         let alike = first.is_some() && equal(&first, &made.uv0) && equal(&second, &made.uv0);
         let moves = move_sets(&mut primitive, moved, alike);
         primitive["attributes"]["TEXCOORD_1"] = written.into();
+        if alone {
+            primitive["attributes"]["TEXCOORD_0"] = written.into();
+        }
         self.follow(patch, &mut primitive, &moves);
         Ok(primitive)
     }
@@ -133,7 +168,30 @@ impl<'a> Primitives<'a> {
         self.buffers.floats(accessor as usize, &used_by, &[shape], [0.0; N], &mut budget).map(Some)
     }
 
+    /// An accessor of normals in place of one of which some have no direction; nothing if all have one.
+    fn mended_normals(
+        &mut self,
+        patch: &mut Patch,
+        accessor: usize,
+        place: &str,
+        vertices: usize,
+        chosen: &Vertices,
+        directions: &[Vec3],
+    ) -> Option<usize> {
+        let used_by = format!("{place}.NORMAL");
+        let normals =
+            Normals { buffers: self.buffers, accessor, used_by: &used_by, vertices, chosen, directions };
+        // What cannot be read is told where the attribute is carried along.
+        let (mended, count) = normals.mended(&mut self.data, patch).ok().flatten()?;
+        self.notes.add(
+            place,
+            format!("{count} normals were zero or NaN; those of the faces around them are written instead"),
+        );
+        Some(mended)
+    }
+
     /// Gives a primitive other vertices: its attributes, morph targets and indices.
+    #[expect(clippy::too_many_arguments, reason = "one call for all that a primitive gets")]
     fn choose_vertices(
         &mut self,
         patch: &mut Patch,
@@ -142,6 +200,7 @@ impl<'a> Primitives<'a> {
         primitive: &mut Value,
         vertices: usize,
         split: &Split,
+        directions: &[Vec3],
     ) {
         let key = (mesh, index, split.vertices.clone(), split.corners.clone());
         if let Some(known) = self.known.get(&key) {
@@ -152,10 +211,18 @@ impl<'a> Primitives<'a> {
             let mut carried = HashMap::new();
             let mut attributes = primitive.get("attributes").cloned().unwrap_or_default();
             let mut targets = primitive.get("targets").cloned();
+            let mended = attributes.get("NORMAL").and_then(Value::as_u64).and_then(|normals| {
+                self.mended_normals(patch, normals as usize, place, vertices, &split.vertices, directions)
+            });
             let morphs = targets.as_mut().and_then(Value::as_array_mut).into_iter().flatten();
-            for list in std::iter::once(&mut attributes).chain(morphs).filter_map(Value::as_object_mut) {
+            let lists = std::iter::once(&mut attributes).chain(morphs).filter_map(Value::as_object_mut);
+            for (number, list) in lists.enumerate() {
+                let first_list = number == 0;
                 list.retain(|name, accessor| {
                     let Some(old) = accessor.as_u64().map(|old| old as usize) else { return false };
+                    if mended.is_some() && name == "NORMAL" && first_list {
+                        return true;
+                    }
                     let new = match carried.get(&old) {
                         Some(&known) => Some(known),
                         None => {
@@ -172,6 +239,9 @@ impl<'a> Primitives<'a> {
                     }
                     new.is_some()
                 });
+            }
+            if let Some(mended) = mended {
+                attributes["NORMAL"] = mended.into();
             }
             let replaced = primitive.get("indices").and_then(Value::as_u64).map(|old| old as usize);
             let count = split.vertices.sources.len();

@@ -1,11 +1,13 @@
 //! How large a decoded scene may become. Not what it holds.
 
+use super::document::Document;
 use super::error::LoadProblem;
 
 /// Bounds on what loading allocates, so that a small file cannot fill the memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadLimits {
-    /// Bytes of decoded vertices and indices in all; by default 64 MiB and 64 times the file with its buffers.
+    /// Bytes of decoded vertices and indices in all; by default 64 MiB and 64 times the file with its buffers, and 1024 times what is compressed
+    /// as `KHR_draco_mesh_compression`, where a triangle may take a byte.
     pub decoded_bytes: Option<u64>,
     /// Width and height of an image in texels; by default 16384.
     pub image_side: u32,
@@ -22,12 +24,34 @@ impl Default for LoadLimits {
 
 impl LoadLimits {
     /// What may be decoded of a file of so many bytes with these buffers.
-    pub(crate) fn budget(&self, file_bytes: usize, contents: &[std::borrow::Cow<'_, [u8]>]) -> Budget {
+    pub(crate) fn budget(
+        &self,
+        file_bytes: usize,
+        document: &Document,
+        contents: &[std::borrow::Cow<'_, [u8]>],
+    ) -> Budget {
         let total = contents
             .iter()
             .fold(file_bytes as u64, |total, content| total.saturating_add(content.len() as u64));
-        Budget::new(self.decoded_bytes.unwrap_or_else(|| total.saturating_mul(64).saturating_add(64 << 20)))
+        let compressed = compressed_bytes(document).min(total).saturating_mul(DRACO_EXPANSION);
+        let default = || total.saturating_mul(64).saturating_add(64 << 20).saturating_add(compressed);
+        Budget::new(self.decoded_bytes.unwrap_or_else(default))
     }
+}
+
+/// How many bytes of vertices and indices a byte of Draco data may stand for.
+const DRACO_EXPANSION: u64 = 1024;
+
+/// The bytes of all views that primitives name as their Draco data, as the document claims.
+fn compressed_bytes(document: &Document) -> u64 {
+    let primitives = document.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let views = primitives.filter_map(|primitive| {
+        primitive.extensions.get("KHR_draco_mesh_compression")?.get("bufferView")?.as_u64()
+    });
+    let distinct: std::collections::HashSet<u64> = views.collect();
+    let lengths =
+        distinct.into_iter().filter_map(|view| document.buffer_views.get(usize::try_from(view).ok()?));
+    lengths.fold(0u64, |total, view| total.saturating_add(view.byte_length.0))
 }
 
 /// What is left of a limit.

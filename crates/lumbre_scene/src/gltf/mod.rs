@@ -4,10 +4,16 @@
 //! name whole or not at all.
 
 mod accessor;
+mod accessor_format;
 mod beside;
+mod buffer_view;
+mod compressed;
+mod compressed_primitives;
 mod compressed_views;
 mod container;
+mod decoders;
 mod document;
+mod draco;
 mod error;
 mod export;
 mod export_baked;
@@ -18,6 +24,7 @@ mod export_material;
 mod export_nodes;
 mod export_scene;
 mod extensions;
+mod guarded;
 mod hierarchy;
 mod import;
 mod import_image;
@@ -27,6 +34,7 @@ mod import_lightmap;
 mod import_material;
 mod import_mesh;
 mod import_scene;
+mod instancing;
 mod lightmapped;
 mod limits;
 mod meshopt;
@@ -34,6 +42,7 @@ mod options;
 mod patch;
 mod prepared;
 mod source;
+mod texture_ktx2;
 mod texture_sets;
 mod uri;
 mod value;
@@ -49,11 +58,20 @@ pub use source::SourceFile;
 
 /// Extensions that a file may require.
 pub const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
+    #[cfg(feature = "webp")]
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
+    #[cfg(feature = "draco")]
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_mesh_quantization",
+    #[cfg(feature = "basisu")]
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "LUMBRE_bake",
     "LUMBRE_camera",

@@ -58,6 +58,7 @@ struct Record {
 }
 
 /// The JSON of a file while it is changed.
+#[derive(Clone, Debug)]
 pub(crate) struct Patch {
     root: Value,
     lengths: BTreeMap<String, Option<usize>>,
@@ -74,6 +75,11 @@ impl Patch {
     /// The value at a place.
     pub(crate) fn get(&self, place: &[Key]) -> Option<&Value> {
         place.iter().try_fold(&self.root, |value, key| step(value, key))
+    }
+
+    /// The JSON as it is now.
+    pub(crate) fn root(&self) -> Map<String, Value> {
+        self.root.as_object().cloned().unwrap_or_default()
     }
 
     /// Whether nothing was changed.
@@ -170,6 +176,32 @@ impl Patch {
         let record = Record { version: VERSION, lengths, replaced: self.replaced, copied: Vec::new() };
         put(&mut self.root, &place!["extensions", EXTENSION], Some(serde_json::to_value(record)?));
         Ok(self.root)
+    }
+}
+
+/// Takes an extension out of `extensionsUsed` and `extensionsRequired` if nothing in a list of the file has it any more.
+pub(crate) fn without_unused(patch: &mut Patch, extension: &str, list: &str) {
+    fn has(value: &Value, extension: &str) -> bool {
+        match value {
+            Value::Object(object) => object.iter().any(|(key, member)| {
+                (key == "extensions" && member.get(extension).is_some())
+                    || (key != "extras" && has(member, extension))
+            }),
+            Value::Array(elements) => elements.iter().any(|element| has(element, extension)),
+            _ => false,
+        }
+    }
+    if patch.get(&place![list]).is_some_and(|elements| has(elements, extension)) {
+        return;
+    }
+    for key in ["extensionsUsed", "extensionsRequired"] {
+        let Some(Value::Array(names)) = patch.get(&place![key]) else { continue };
+        let others: Vec<Value> = names.iter().filter(|name| *name != extension).cloned().collect();
+        if others.is_empty() {
+            patch.remove(&place![key]);
+        } else if others.len() < names.len() {
+            patch.set(&place![key], others.into());
+        }
     }
 }
 

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{Light, Material, ReflectionModel, Shading};
+use lumbre_optics::{BakeMode, Light, Material, ReflectionModel, Shading};
 
 use super::accessor::Buffers;
 use super::document::{self, Document, element, extension};
 use super::error::{LoadProblem, Notes};
 use super::extensions::{
-    CameraExtension, IrradianceVolumeExtension, LightReference, LightmapExtension, ObjectExtension,
-    ShadingExtension,
+    AnimationPointer, CameraExtension, IrradianceVolumeExtension, LightReference, LightmapExtension,
+    ObjectExtension, ShadingExtension,
 };
 use super::hierarchy::{Hierarchy, hierarchy, transform};
 use super::import_image::Images;
@@ -99,12 +99,18 @@ pub(crate) fn prepare(
         )?);
     }
     let mut lights = Vec::new();
+    let animated_lights = animated_lights(document)?;
     for (index, source) in document.lights.iter().enumerate() {
         let place = match &source.name {
             Some(name) => format!("lights[{index}] ({})", document::shortened(name)),
             None => format!("lights[{index}]"),
         };
-        lights.push(import_light::light(source, &place)?);
+        let mut light = import_light::light(source, &place)?;
+        if animated_lights.contains(&index) && light.bake != BakeMode::Dynamic {
+            notes.add(&place, "an animation changes it, so that it is not baked");
+            light.bake = BakeMode::Dynamic;
+        }
+        lights.push(light);
     }
 
     let mut meshes = BTreeMap::new();
@@ -299,8 +305,14 @@ fn dynamic_nodes(
     let mut dynamic = HashSet::new();
     for (index, animation) in document.animations.iter().enumerate() {
         notes.add(format!("animations[{index}]"), "animations are not played; their nodes count as dynamic");
-        for node in animation.channels.iter().filter_map(|channel| channel.target.node) {
-            let place = format!("animations[{index}].channels");
+        let place = format!("animations[{index}].channels");
+        for channel in &animation.channels {
+            let target = &channel.target;
+            let pointer = extension::<AnimationPointer>(&target.extensions, "KHR_animation_pointer", &place)?;
+            let Some(node) = target.node.or_else(|| pointer.and_then(|pointer| moved_node(&pointer.pointer)))
+            else {
+                continue;
+            };
             match element(&document.nodes, "nodes", node, || place.clone()) {
                 Ok(_) => {
                     dynamic.insert(node);
@@ -327,6 +339,31 @@ fn dynamic_nodes(
     Ok(dynamic)
 }
 
+/// The node that is moved where a JSON pointer is animated: by its transform or the weights of its morph targets.
+fn moved_node(pointer: &str) -> Option<usize> {
+    let (node, property) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
+    let property = property.split('/').next()?;
+    matches!(property, "translation" | "rotation" | "scale" | "weights").then(|| node.parse().ok())?
+}
+
+/// The lights whose strength or colour is animated through a JSON pointer.
+fn animated_lights(document: &Document) -> Result<HashSet<usize>, LoadProblem> {
+    let mut animated = HashSet::new();
+    for (index, animation) in document.animations.iter().enumerate() {
+        for channel in &animation.channels {
+            let place = format!("animations[{index}].channels");
+            let pointer =
+                extension::<AnimationPointer>(&channel.target.extensions, "KHR_animation_pointer", &place)?;
+            let light = pointer.and_then(|pointer| {
+                let light = pointer.pointer.strip_prefix("/extensions/KHR_lights_punctual/lights/")?;
+                light.split('/').next()?.parse::<usize>().ok()
+            });
+            animated.extend(light);
+        }
+    }
+    Ok(animated)
+}
+
 fn note_extensions(document: &Document, notes: &mut Notes) {
     for name in &document.extensions_used {
         if !super::SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
@@ -335,5 +372,8 @@ fn note_extensions(document: &Document, notes: &mut Notes) {
     }
     if document.skins > 0 {
         notes.add("skins", "not supported; ignored");
+    }
+    if document.extensions_used.iter().any(|name| name == "KHR_materials_variants") {
+        notes.add("KHR_materials_variants", "the materials that stand without a variant are shown");
     }
 }

@@ -4,28 +4,28 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
-use serde_json::{Map, Value};
 
 use super::accessor::Buffers;
-use super::compressed_views::DecodedViews;
+use super::compressed::Decoded;
 use super::document::{self, Document};
 use super::error::{LoadError, LoadProblem, Notes};
 use super::import::{LoadReport, check_extensions, contents, decode, spawn};
 use super::options::LoadOptions;
-use super::patch::{Former, take_back};
+use super::patch::{Former, Patch, take_back};
 use super::uri::{self, Base};
-use super::{compressed_views, container};
+use super::{compressed, container, instancing};
 
 /// A glTF file as its artist made it: the JSON, the buffers and chunks of others, untouched. What an earlier bake added to the file is
 /// taken back when it is read.
 #[derive(Debug)]
 pub struct SourceFile {
-    pub(crate) root: Map<String, Value>,
+    /// The JSON, with what had to be written out before anything could be read of it.
+    pub(crate) patch: Patch,
     pub(crate) document: Document,
     /// The bytes of every buffer.
     pub(crate) contents: Vec<Vec<u8>>,
-    /// Buffer views that were compressed.
-    decoded: DecodedViews,
+    /// What was compressed.
+    decoded: Decoded,
     /// Type and bytes of chunks that glTF does not know.
     pub(crate) chunks: Vec<(u32, Vec<u8>)>,
     /// The folder that it lies in.
@@ -71,17 +71,18 @@ impl SourceFile {
             Base { folder: Some(&folder), root: options.root.as_deref() },
             &mut notes,
         )?;
-        let decoded = compressed_views::decode(
-            &document,
-            &contents,
-            &mut options.limits.budget(bytes.len(), &contents),
-        )?;
-        let contents = contents.into_iter().map(Cow::into_owned).collect();
+        let mut budget = options.limits.budget(bytes.len(), &document, &contents);
+        let decoded = compressed::decode(&document, &contents, &mut budget)?;
+        let buffers = Buffers { document: &document, bytes: contents, decoded: Cow::Borrowed(&decoded) };
+        let mut patch = Patch::new(root);
+        let expanded = instancing::expand(&mut patch, &document, &buffers, &mut budget, &mut notes)?;
+        let contents = buffers.bytes.into_iter().map(Cow::into_owned).collect();
+        let document = if expanded { Document::from_root(patch.root(), &mut notes)? } else { document };
         let chunks = container.others.into_iter().map(|(kind, bytes)| (kind, bytes.to_vec())).collect();
         let (name, file_bytes) = (name.to_owned(), bytes.len() as u64);
         let (nodes, options) = (Vec::new(), options.clone());
         Ok(Self {
-            root,
+            patch,
             document,
             contents,
             chunks,

@@ -1,6 +1,11 @@
-//! Which sets of texture coordinates a material's textures read, and other sets in their place. Not the coordinates themselves.
+//! Which sets of texture coordinates a material's textures read, other sets in their place, and a first set where a mesh has only a second. Not the
+//! coordinates themselves.
 
 use serde_json::{Value, json};
+
+/// The name of the accessor that holds the coordinates of a lightmap where a mesh has no others. glTF does not allow a second set without a first,
+/// so both are this accessor then; by its name it is known again that there is no first.
+pub(crate) const LIGHTMAP_COORDINATES: &str = "LUMBRE_lightmap coordinates";
 
 /// The material with every texture reading the set that `moved` gives for its own; `None` where that changes nothing.
 ///

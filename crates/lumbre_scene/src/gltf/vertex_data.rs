@@ -2,17 +2,18 @@
 
 use std::collections::HashMap;
 
+use glam::Vec3;
+use gltf::json::buffer::{ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER};
 use serde_json::{Value, json};
 
-use super::accessor::{Buffers, Format};
+use super::accessor::Buffers;
+use super::accessor_format::{self, FLOAT, Format, SHORT};
 use super::error::LoadProblem;
 use super::patch::{Patch, place};
 
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-const UNSIGNED_BYTE: u64 = 5121;
-const UNSIGNED_SHORT: u64 = 5123;
-const UNSIGNED_INT: u64 = 5125;
+const UNSIGNED_BYTE: u64 = accessor_format::UNSIGNED_BYTE as u64;
+const UNSIGNED_SHORT: u64 = accessor_format::UNSIGNED_SHORT as u64;
+const UNSIGNED_INT: u64 = accessor_format::UNSIGNED_INT as u64;
 
 /// Bytes that a file's last buffer gets, and the views into them.
 pub(crate) struct NewData {
@@ -48,11 +49,19 @@ impl NewData {
     }
 
     /// Texture coordinates.
-    pub(crate) fn coordinates(&mut self, patch: &mut Patch, values: &[[f32; 2]]) -> usize {
+    pub(crate) fn coordinates(
+        &mut self,
+        patch: &mut Patch,
+        values: &[[f32; 2]],
+        name: Option<&str>,
+    ) -> usize {
         let bytes: Vec<u8> = values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(patch, &bytes, Some(ARRAY_BUFFER), None);
-        let accessor =
-            json!({"bufferView": view, "componentType": 5126, "count": values.len(), "type": "VEC2"});
+        let mut accessor =
+            json!({"bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "VEC2"});
+        if let Some(name) = name {
+            accessor["name"] = name.into();
+        }
         patch.push("accessors", accessor)
     }
 
@@ -108,7 +117,8 @@ impl NewData {
         let size = raw.format.size();
         let zero = vec![0; size];
         let replacements: HashMap<u32, &[u8]> = raw.sparse.iter().copied().collect();
-        if !chosen.complete {
+        // What is decoded need not be what the compressed file stated.
+        if !chosen.complete || buffers.is_decoded(accessor) {
             let elements = chosen.sources.iter().map(|source| {
                 let replaced = replacements.get(source).copied();
                 replaced.or_else(|| raw.base(*source as usize)).unwrap_or(&zero)
@@ -146,6 +156,73 @@ impl NewData {
             object.insert("sparse".to_owned(), former);
         }
         Ok(patch.push("accessors", written))
+    }
+}
+
+/// Normals for other vertices, as [`NewData::attribute`] writes them, but for those without a direction: zero or no number.
+pub(crate) struct Normals<'a> {
+    pub buffers: &'a Buffers<'a>,
+    pub accessor: usize,
+    pub used_by: &'a str,
+    /// How many vertices there are.
+    pub vertices: usize,
+    pub chosen: &'a Vertices,
+    /// What takes the place of a missing direction, by the new vertex.
+    pub directions: &'a [Vec3],
+}
+
+impl Normals<'_> {
+    /// The accessor, and how many normals were mended; nothing if all have a direction.
+    ///
+    /// # Errors
+    /// As [`NewData::attribute`].
+    pub(crate) fn mended(
+        &self,
+        data: &mut NewData,
+        patch: &mut Patch,
+    ) -> Result<Option<(usize, usize)>, LoadProblem> {
+        let raw = self.buffers.raw(self.accessor, self.used_by)?;
+        if raw.count != self.vertices || raw.format.components != 3 || raw.format.columns != 1 {
+            return Ok(None);
+        }
+        let zero = vec![0; raw.format.size()];
+        let replacements: HashMap<u32, &[u8]> = raw.sparse.iter().copied().collect();
+        let stride = raw.format.size().next_multiple_of(4);
+        let mut bytes = Vec::with_capacity(stride * self.chosen.sources.len());
+        let mut mended = 0;
+        for (new, source) in self.chosen.sources.iter().enumerate() {
+            let replaced = replacements.get(source).copied();
+            let own = replaced.or_else(|| raw.base(*source as usize)).unwrap_or(&zero);
+            let length: f64 = raw.format.raw(own).map(|value| value * value).sum();
+            if length > 0.0 && length.is_finite() {
+                bytes.extend_from_slice(own);
+            } else {
+                mended += 1;
+                let direction = self.directions.get(new).and_then(|direction| direction.try_normalize());
+                for value in direction.unwrap_or(Vec3::Y).to_array() {
+                    match raw.format.component {
+                        FLOAT => bytes.extend(value.to_le_bytes()),
+                        SHORT => bytes.extend(((value * 32767.0).round() as i16).to_le_bytes()),
+                        _ => bytes.extend(((value * 127.0).round() as i8).to_le_bytes()),
+                    }
+                }
+            }
+            bytes.resize(bytes.len().next_multiple_of(stride), 0);
+        }
+        if mended == 0 {
+            return Ok(None);
+        }
+        let view =
+            data.view(patch, &bytes, Some(ARRAY_BUFFER), (stride != raw.format.size()).then_some(stride));
+        let mut written = patch.get(&place!["accessors", self.accessor]).cloned().unwrap_or_default();
+        if let Value::Object(object) = &mut written {
+            for stale in ["byteOffset", "sparse", "min", "max"] {
+                object.shift_remove(stale);
+            }
+            object.insert("bufferView".to_owned(), view.into());
+            object.insert("count".to_owned(), self.chosen.sources.len().into());
+        }
+        Ok(Some((patch.push("accessors", written), mended)))
     }
 }
 

@@ -116,3 +116,24 @@ pub enum Ktx2Error {
         problem: String,
     },
 }
+
+/// The little-endian word at an offset that is known to be inside.
+pub(crate) fn word(bytes: &[u8], offset: usize) -> u32 {
+    bytes[offset..].iter().take(4).rev().fold(0, |word, &byte| word << 8 | u32::from(byte))
+}
+
+/// Bytes of a file from an offset, checked against those that exist.
+pub(crate) fn part<'a>(
+    bytes: &'a [u8],
+    what: &'static str,
+    start: u64,
+    length: u64,
+) -> Result<&'a [u8], Ktx2Error> {
+    let needed = start.saturating_add(length);
+    let found = bytes.len() as u64;
+    // Both are at most the length of a slice, or refused.
+    if needed > found {
+        return Err(Ktx2Error::Truncated { what, needed, found });
+    }
+    Ok(&bytes[start as usize..needed as usize])
+}

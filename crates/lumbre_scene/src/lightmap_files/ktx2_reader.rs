@@ -1,6 +1,6 @@
 //! Reads KTX2 files of the kind that this crate writes, from bytes that nothing is known about. Not other kinds.
 
-use super::ktx2::{HEADER_BYTES, IDENTIFIER, LEVEL_BYTES, ORIENTATION_KEY};
+use super::ktx2::{HEADER_BYTES, IDENTIFIER, LEVEL_BYTES, ORIENTATION_KEY, part, word};
 use super::{Ktx2Error, Ktx2Texture, PackedFormat, Supercompression, zstandard};
 
 /// Most texels per byte of a Zstandard frame: a block of four bytes can stand for 128 KiB.
@@ -118,21 +118,6 @@ impl Ktx2Texture {
         }
         header.texture()
     }
-}
-
-/// The little-endian word at an offset that is known to be inside.
-fn word(bytes: &[u8], offset: usize) -> u32 {
-    bytes[offset..].iter().take(4).rev().fold(0, |word, &byte| word << 8 | u32::from(byte))
-}
-
-fn part<'a>(bytes: &'a [u8], what: &'static str, start: u64, length: u64) -> Result<&'a [u8], Ktx2Error> {
-    let needed = start.saturating_add(length);
-    let found = bytes.len() as u64;
-    // Both are at most the length of a slice, or refused.
-    if needed > found {
-        return Err(Ktx2Error::Truncated { what, needed, found });
-    }
-    Ok(&bytes[start as usize..needed as usize])
 }
 
 /// Looks for an orientation other than the default; entries that are damaged end the search, as nothing else is asked of them.

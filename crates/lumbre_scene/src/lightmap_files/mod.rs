@@ -12,7 +12,7 @@
 mod data_format_descriptor;
 mod encoding_error;
 mod irradiance_volume;
-mod ktx2;
+pub(crate) mod ktx2;
 mod ktx2_reader;
 mod ktx2_writer;
 mod lightmap;
@@ -20,7 +20,7 @@ mod open_exr;
 mod packed_format;
 mod shared_exponent;
 mod unsigned_float;
-mod zstandard;
+pub(crate) mod zstandard;
 
 pub use encoding_error::EncodingError;
 pub use irradiance_volume::{AmbientCube, IrradianceVolume};

@@ -157,6 +157,9 @@ pub fn differences(before: &Value, after: &Value, place: &str, found: &mut Vec<S
     }
 }
 
+/// Extensions whose data a bake writes out.
+const WRITTEN_OUT: [&str; 2] = ["KHR_draco_mesh_compression", "EXT_mesh_gpu_instancing"];
+
 /// Whether a bake may change what is at a place.
 pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
     let parts: Vec<&str> = place.split('/').skip(1).collect();
@@ -175,6 +178,12 @@ pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
         }
         ["buffers", "0", "byteLength"] => at(after, place).as_u64() > at(before, place).as_u64(),
         ["buffers", "0", "uri"] => at(after, place).is_null() || at(before, place).is_null(),
+        ["nodes", node, "children" | "mesh" | "extensions", ..]
+            if !before["nodes"][node.parse::<usize>().unwrap()]["extensions"]["EXT_mesh_gpu_instancing"]
+                .is_null() =>
+        {
+            true
+        }
         ["nodes", _, "extensions", "LUMBRE_lightmap"] => true,
         ["nodes", node, "extensions"] => {
             let added = &after["nodes"][node.parse::<usize>().unwrap()]["extensions"];
@@ -201,8 +210,22 @@ pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
         }
         ["extensions", "LUMBRE_bake"] => true,
         ["extensions"] => after["extensions"].as_object().unwrap().keys().eq(["LUMBRE_bake"]),
-        ["extensionsUsed"] => true,
-        ["extensionsUsed", number] => number.parse::<usize>().unwrap() >= length("extensionsUsed"),
+        ["extensionsUsed" | "extensionsRequired", ..] => {
+            let names = |value: &Value, key: &str| -> Vec<String> {
+                value[key]
+                    .as_array()
+                    .into_iter()
+                    .flatten()
+                    .map(|name| name.as_str().unwrap().to_owned())
+                    .collect()
+            };
+            let (old, new) = (names(before, parts[0]), names(after, parts[0]));
+            new.iter().all(|name| old.contains(name) || name.starts_with("LUMBRE_"))
+                && old.iter().all(|name| new.contains(name) || WRITTEN_OUT.contains(&name.as_str()))
+        }
+        ["meshes", _, "primitives", _, "extensions"] => {
+            at(before, place).as_object().unwrap().keys().eq(["KHR_draco_mesh_compression"])
+        }
         _ => false,
     }
 }

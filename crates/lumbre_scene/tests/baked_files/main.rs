@@ -4,6 +4,9 @@
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
 mod comparison;
+#[path = "../support/encoded.rs"]
+mod encoded;
+mod extensions;
 mod feature_files;
 #[path = "../support/mod.rs"]
 mod support;

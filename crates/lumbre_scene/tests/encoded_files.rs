@@ -1,0 +1,325 @@
+//! What artists have: Draco meshes, KTX2 and WebP pictures. Files of the reference encoders against what the reference decoders find in them,
+//! faults by their place, and mutants. `encoded/make.mjs` makes the files.
+
+#![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
+
+#[path = "support/encoded.rs"]
+mod encoded;
+mod support;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use bevy_ecs::prelude::*;
+use encoded::*;
+use lumbre_scene::*;
+use serde_json::{Value, json};
+use support::File;
+
+/// Counts the bytes in use and the most there were.
+struct Counting;
+
+static USED: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+/// Held by whoever measures, so that another test's memory is not counted with it.
+static MEASURING: Mutex<()> = Mutex::new(());
+
+#[allow(
+    unsafe_code,
+    reason = "a global allocator is unsafe by its trait; every call goes to the system's with the same arguments"
+)]
+// SAFETY: the system's allocator keeps the contract, and nothing but counting is added.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let used = USED.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
+        PEAK.fetch_max(used, Ordering::Relaxed);
+        // SAFETY: the caller's contract is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        USED.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the caller's contract is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn numbers(value: &Value) -> Vec<f32> {
+    value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap() as f32).collect()
+}
+
+fn the_mesh(world: &mut World) -> std::sync::Arc<lumbre_mesh::TriangleMesh> {
+    world.query::<&Mesh>().single(world).unwrap().0.clone()
+}
+
+#[test]
+fn draco_meshes_are_what_the_reference_decoder_finds() {
+    let _alone = MEASURING.lock();
+    for (name, bytes, expected) in MESHES {
+        let expected: Value = serde_json::from_slice(expected).unwrap();
+        let (mut world, report) = compressed_mesh(bytes, &expected).load().unwrap();
+        assert_eq!(report.triangles, 36, "{name}");
+        let mesh = the_mesh(&mut world);
+        let indices: Vec<f32> = mesh.indices.iter().map(|&index| index as f32).collect();
+        assert_eq!(indices, numbers(&expected["indices"]), "{name}");
+        let flat = |values: Vec<Vec<f32>>| values.concat();
+        let of = |name: &str| numbers(&expected["attributes"][name]);
+        let positions: Vec<f32> = flat(mesh.positions.iter().map(|v| v.to_array().to_vec()).collect());
+        assert_eq!(positions, of("POSITION"), "{name}");
+        let coordinates: Vec<f32> = flat(mesh.uv0.iter().map(|v| v.to_array().to_vec()).collect());
+        assert_eq!(coordinates, of("TEXCOORD_0"), "{name}");
+        // Eight bits of an octahedron leave normals that are not of unit length to the last digit.
+        for (ours, theirs) in mesh.normals.iter().zip(of("NORMAL").chunks(3)) {
+            assert!((*ours - glam::Vec3::from_slice(theirs)).length() < 1e-6, "{name}: {ours} {theirs:?}");
+        }
+        let colors: Vec<f32> = flat(mesh.colors.iter().map(|v| (*v * 255.0).to_array().to_vec()).collect());
+        for (ours, theirs) in colors.iter().zip(of("COLOR_0")) {
+            assert!((ours - theirs).abs() < 1e-3, "{name}");
+        }
+    }
+}
+
+fn the_picture(world: &mut World) -> std::sync::Arc<Image> {
+    world.query::<&MaterialTextures>().single(world).unwrap().base_color.clone().unwrap().image
+}
+
+#[test]
+fn pictures_are_what_the_reference_decoders_find() {
+    let _alone = MEASURING.lock();
+    for (name, bytes, expected) in PICTURES {
+        let (mut world, _) = encoded_picture(name, bytes).load().unwrap_or_else(|error| panic!("{error}"));
+        let image = the_picture(&mut world);
+        assert_eq!((image.width, image.height), SIZE, "{name}");
+        let difference = image.rgba.iter().zip(expected).map(|(ours, theirs)| ours.abs_diff(*theirs)).max();
+        println!("{name}: {} bytes, largest difference {difference:?}", bytes.len());
+        assert_eq!(image.rgba.len(), expected.len(), "{name}");
+        assert_eq!(difference, Some(0), "{name}");
+    }
+}
+
+/// A KTX2 file of plain bytes, written by hand.
+fn plain_ktx2(format: u32, channels: usize, zstandard: bool) -> (Vec<u8>, Vec<u8>) {
+    let (width, height) = (5u32, 3u32);
+    let texels: Vec<u8> = (0..width as usize * height as usize * channels).map(|at| (7 * at) as u8).collect();
+    let level = if zstandard { zstd::bulk::compress(&texels, 3).unwrap() } else { texels.clone() };
+    let mut file = vec![0xab, 0x4b, 0x54, 0x58, 0x20, 0x32, 0x30, 0xbb, 0x0d, 0x0a, 0x1a, 0x0a];
+    let scheme = if zstandard { 2 } else { 0 };
+    let fields = [format, 1, width, height, 0, 0, 1, 1, scheme, 104, 28, 0, 0];
+    file.extend(fields.into_iter().flat_map(u32::to_le_bytes));
+    let index = [0u64, 0, 132, level.len() as u64, texels.len() as u64];
+    file.extend(index.into_iter().flat_map(u64::to_le_bytes));
+    file.extend([28, 0, 0, 0]);
+    file.extend([0; 24]);
+    file.extend(&level);
+    (file, texels)
+}
+
+#[test]
+fn uncompressed_ktx2_pictures() {
+    let _alone = MEASURING.lock();
+    for (format, channels) in [(23, 3), (29, 3), (37, 4), (43, 4)] {
+        for zstandard in [false, true] {
+            let (bytes, texels) = plain_ktx2(format, channels, zstandard);
+            let (mut world, _) = encoded_picture("plain.ktx2", &bytes).load().unwrap();
+            let image = the_picture(&mut world);
+            assert_eq!((image.width, image.height), (5, 3));
+            let opaque = |texel: &[u8]| [texel[0], texel[1], texel[2], *texel.get(3).unwrap_or(&255)];
+            let expected: Vec<u8> = texels.chunks(channels).flat_map(opaque).collect();
+            assert_eq!(image.rgba, expected, "format {format}");
+        }
+    }
+}
+
+#[test]
+fn damaged_files_are_refused_by_their_place() {
+    let _alone = MEASURING.lock();
+    let (_, bytes, expected) = MESHES[0];
+    let expected: Value = serde_json::from_slice(expected).unwrap();
+    let problem = |change: &dyn Fn(&mut File)| {
+        let mut file = compressed_mesh(bytes, &expected);
+        change(&mut file);
+        file.problem()
+    };
+    let at = |file: &mut File, key: &str, value: Value| {
+        file.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"][key] = value;
+    };
+    for (change, said) in [
+        (
+            &(|file: &mut File| file.binary[0] = b'X') as &dyn Fn(&mut File),
+            "meshes[0].primitives[0]: its Draco data",
+        ),
+        (&|file: &mut File| file.binary.truncate(300), "bufferViews[0]"),
+        (&|file: &mut File| at(file, "bufferView", 9.into()), "bufferViews[9]"),
+        (
+            &|file: &mut File| at(file, "attributes", json!({"POSITION": 77})),
+            "attribute 77 is not in its Draco data",
+        ),
+        (
+            &|file: &mut File| at(file, "attributes", json!({"POSITION": 2})),
+            "its type has 3 numbers, but its Draco data have 2",
+        ),
+        (&|file: &mut File| at(file, "attributes", json!("x")), "KHR_draco_mesh_compression"),
+        (
+            &|file: &mut File| file.root["accessors"][0]["count"] = 29.into(),
+            "another attribute in the same Draco data 28",
+        ),
+        (&|file: &mut File| file.root["accessors"][6]["count"] = 30.into(), "faces"),
+        (&|file: &mut File| file.root["accessors"][6]["componentType"] = 5126.into(), "cannot be an index"),
+        (
+            &|file: &mut File| file.root["accessors"][4]["componentType"] = 5121.into(),
+            "componentType cannot hold",
+        ),
+        (&|file: &mut File| file.root["accessors"][0]["componentType"] = 5123.into(), "real numbers"),
+        (&|file: &mut File| file.root["meshes"][0]["primitives"][0]["mode"] = 5.into(), "mode"),
+    ] {
+        let text = problem(change).to_string();
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    // A few bytes cannot claim the memory.
+    let claims = problem(&|file| {
+        for accessor in 0..7 {
+            file.root["accessors"][accessor]["count"] = (3u64 << 40).into();
+        }
+    });
+    assert!(matches!(claims, LoadProblem::TooLarge { .. }), "{claims}");
+
+    let (_, bytes, _) = PICTURES[0];
+    let changed = |at: usize, value: u32| {
+        let mut bytes = bytes.to_vec();
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        encoded_picture("changed.ktx2", &bytes).problem().to_string()
+    };
+    for (at, value, said) in [
+        (12, 9, "vkFormat is 9"),
+        (20, 0, "pixelWidth is 0"),
+        (20, 30_000, "uncompressedByteLength"),
+        (28, 4, "pixelDepth"),
+        (36, 6, "faceCount"),
+        (44, 3, "supercompressionScheme"),
+        (48, u32::MAX, "data format descriptor"),
+        (68, u32::MAX, "global data"),
+        (84, u32::MAX, "level 0"),
+    ] {
+        let text = changed(at, value);
+        assert!(
+            text.starts_with("images[0]: cannot be decoded as KTX2") && text.contains(said),
+            "{said}: {text}"
+        );
+    }
+    let problem = pictured(b"GIF89a0000000000000", "image/gif", None).problem().to_string();
+    assert!(problem.contains("neither PNG nor JPEG, WebP or KTX2"), "{problem}");
+}
+
+#[test]
+fn instances_are_nodes() {
+    let _alone = MEASURING.lock();
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let rotations = [0., 0., 0., 1., 0., half, 0., half, 0., 0., 0., 1.];
+    let (mut world, report) = instanced(&[0., 0., 0., 5., 0., 0., 0., 7., 0.], &rotations).load().unwrap();
+    let mut seen: Vec<_> = world
+        .query_filtered::<&GlobalTransform, With<Mesh>>()
+        .iter(&world)
+        .map(|transform| transform.0.transform_point3(glam::DVec3::X))
+        .collect();
+    seen.sort_by(|a, b| a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x)));
+    // The node of the instances stands at (0, 1, 0); a quarter turn about y takes x to -z.
+    let expected = [(1., 1., 0.), (5., 1., -1.), (1., 8., 0.)].map(glam::DVec3::from);
+    assert_eq!(seen.len(), 3);
+    for (seen, expected) in seen.iter().zip(expected) {
+        assert!((*seen - expected).length() < 1e-6, "{seen} {expected}");
+    }
+    assert_eq!(report.nodes.len(), 4);
+    assert!(report.notes.iter().any(|note| note.text.contains("3 instances")), "{:?}", report.notes);
+
+    let problem = instanced(&[0.0; 9], &[0., 0., 0., 1.]).problem().to_string();
+    assert!(
+        problem.contains("nodes[0] (instanced): EXT_mesh_gpu_instancing.ROTATION")
+            && problem.contains("has 1 elements")
+    );
+    let problem = instanced(&[f32::NAN; 3], &[0., 0., 0., 1.]).problem().to_string();
+    assert!(problem.contains("NaN"), "{problem}");
+    let mut many = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3));
+    for accessor in many.root["accessors"].as_array_mut().unwrap() {
+        if accessor["count"] == 3 {
+            accessor.as_object_mut().unwrap().remove("bufferView");
+            accessor["count"] = 5_000_000.into();
+        }
+    }
+    let problem = many.problem();
+    assert!(matches!(problem, LoadProblem::TooLarge { .. }), "{problem}");
+}
+
+/// SplitMix64.
+fn next(state: &mut u64) -> usize {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((z ^ (z >> 31)) >> 1) as usize
+}
+
+/// Cut and with bytes flipped.
+fn mutant(original: &[u8], seed: u64) -> Vec<u8> {
+    let mut state = seed;
+    let mut bytes = original.to_vec();
+    for _ in 0..=next(&mut state) % 4 {
+        let at = next(&mut state) % bytes.len();
+        match next(&mut state) % 8 {
+            0 => bytes.truncate(at.max(1)),
+            1 => bytes[at] = [0, 0x7f, 0x80, 0xff][next(&mut state) % 4],
+            _ => bytes[at] ^= 1 << (next(&mut state) % 8),
+        }
+    }
+    bytes
+}
+
+/// What one load may hold at once: vertices and indices 64 MiB and 64 times the file (`LoadLimits`), and pictures, which are limited to 256
+/// texels per side here, 4 bytes a texel several times over. A VP8 frame keeps its rows beside that.
+const BOUND: usize = 96 << 20;
+const SLOWEST: Duration = Duration::from_secs(5);
+
+#[test]
+fn no_mutant_panics_hangs_or_fills_the_memory() {
+    let instances = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3)).glb();
+    let meshes = MESHES.map(|(name, bytes, expected)| (name, bytes, Some(expected)));
+    let pictures = PICTURES.map(|(name, bytes, _)| (name, bytes, None));
+    let _alone = MEASURING.lock();
+    let limits = LoadLimits { image_side: 256, ..LoadLimits::default() };
+    let whole = [("instances", &instances[..], None)];
+    for (name, original, expected) in meshes.into_iter().chain(pictures).chain(whole) {
+        let expected: Option<Value> = expected.map(|expected| serde_json::from_slice(expected).unwrap());
+        let (mut loaded, mut refused, mut largest, mut slowest) = (0, 0, 0, Duration::ZERO);
+        // Ten thousand and more for each of the three decoders.
+        for seed in 0..3_500u64 {
+            let bytes = mutant(original, seed);
+            let file = match &expected {
+                Some(expected) => compressed_mesh(&bytes, expected).glb(),
+                None if name == "instances" => bytes,
+                None => encoded_picture(name, &bytes).glb(),
+            };
+            let before = USED.load(Ordering::Relaxed);
+            PEAK.store(before, Ordering::Relaxed);
+            let start = Instant::now();
+            match load_slice_within(&mut World::new(), &file, "mutant", None, limits) {
+                Ok(_) => loaded += 1,
+                Err(error) => {
+                    let text = error.to_string();
+                    assert!(!text.contains("decoder fail"), "{name}, seed {seed}: {text}");
+                    refused += 1;
+                }
+            }
+            slowest = slowest.max(start.elapsed());
+            let peak = PEAK.load(Ordering::Relaxed).saturating_sub(before);
+            largest = largest.max(peak);
+            assert!(peak < BOUND, "{name}, seed {seed}: {peak} bytes at once");
+            assert!(slowest < SLOWEST, "{name}, seed {seed}: {slowest:?}");
+        }
+        println!("{name}: {loaded} loaded, {refused} refused; slowest {slowest:?}, largest {largest} bytes");
+        assert!(loaded > 100 && refused > 1_000, "{name}: {loaded} loaded, {refused} refused");
+    }
+}
