@@ -29,8 +29,8 @@ async function show() {
 
 	scene.updateMatrixWorld( true );
 	const wanted = asked.get( 'camera' );
-	const named = gltf.cameras.find( ( camera ) => wanted === null || camera.name === wanted || camera.parent?.name === wanted
-		|| camera.userData.name === wanted || camera.parent?.userData.name === wanted );
+	const named = cameraOf( gltf, wanted );
+	if ( wanted !== null && ! named ) throw new Error( `there is no camera ${ wanted }` );
 	const camera = new THREE.PerspectiveCamera( named?.fov ?? 45, 1, named?.near ?? 0.05, 1000 );
 	const box = new THREE.Box3().setFromObject( scene );
 	const middle = box.getCenter( new THREE.Vector3() );
@@ -46,13 +46,17 @@ async function show() {
 
 	}
 
-	window.frame = ( width, height ) => linear( scene, camera, width, height );
+	// The controls turn their camera.
+	const still = camera.clone();
+	window.frame = ( width, height ) => linear( scene, still, width, height );
 	window.lightmapped = count( scene );
 
 	// The page itself, for people.
 	const forward = new THREE.Vector3( 0, 0, - 1 ).applyQuaternion( camera.quaternion );
 	const controls = new OrbitControls( camera, renderer.domElement );
-	controls.target.copy( camera.position ).addScaledVector( forward, Math.max( 0.1, middle.clone().sub( camera.position ).dot( forward ) ) );
+	const ahead = Math.max( 0.1, middle.clone().sub( still.position ).dot( forward ) );
+	controls.target.copy( still.position ).addScaledVector( forward, ahead );
+	controls.update();
 	const resize = () => {
 
 		renderer.setSize( innerWidth, innerHeight );
@@ -65,6 +69,22 @@ async function show() {
 	resize();
 	words.textContent = `${ window.lightmapped } meshes with lightmaps`;
 	renderer.setAnimationLoop( () => renderer.render( scene, camera ) );
+
+}
+
+// The camera of the node with a name, or the first one.
+function cameraOf( { scene, parser }, name ) {
+
+	let found = null;
+	scene.traverse( ( object ) => {
+
+		// GLTFLoader's own names have no spaces.
+		const node = parser.associations.get( object )?.nodes ?? parser.associations.get( object.parent )?.nodes;
+		const fits = name === null || parser.json.nodes[ node ]?.name === name;
+		if ( object.isPerspectiveCamera && fits ) found ??= object;
+
+	} );
+	return found;
 
 }
 
