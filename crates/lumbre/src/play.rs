@@ -52,7 +52,7 @@ fn open_options(asked: &Play) -> demo::OpenOptions {
         Some(Exposure::Factor(factor)) => demo::Exposure::Factor(factor),
     };
     let load = load_options(&asked.reading);
-    demo::OpenOptions { load, default_light: !asked.no_default_light, exposure }
+    demo::OpenOptions { load, default_light: !asked.no_default_light, exposure, ..Default::default() }
 }
 
 /// One exposure for all pictures of a tour, as metered where it begins.

@@ -1,7 +1,7 @@
 //! A bake beside the frames: a thread of its own that hands out light as it refines. Not the baker, nor what is shown of it.
 //!
 //! The thread reads the file again, so that the World of the frames stays free. It bakes three times: with few texels and rays for a first
-//! look, with more, and as it is shipped. Each time it hands out the meshes and lightmaps; they are found by the nodes of the file.
+//! look, with more, and as it was asked for. Each time it hands out the meshes and lightmaps; they are found by the nodes of the file.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -24,18 +24,24 @@ use lumbre_scene::{
 /// One bake of several, each better than the one before.
 struct Pass {
     name: &'static str,
-    /// Texels of the whole scene; as many as the baker takes by itself without this.
-    texels: Option<f64>,
+    /// Texels along a metre, as a part of what was asked for.
+    density: f64,
+    /// The error that it may have at least.
     error: f64,
     quality: Quality,
 }
 
-/// The first is there after a moment, the last is what `lumbre bake --error 0.02` gives.
-const PASSES: [Pass; 3] = [
-    Pass { name: "first light", texels: Some(20_000.0), error: 0.2, quality: Quality::Draft },
-    Pass { name: "draft", texels: Some(120_000.0), error: 0.05, quality: Quality::Draft },
-    Pass { name: "final", texels: None, error: 0.02, quality: Quality::Final },
+/// What comes before the bake that was asked for: something after a moment, then something to judge by.
+const FIRST: [Pass; 2] = [
+    Pass { name: "first light", density: 0.2, error: 0.2, quality: Quality::Draft },
+    Pass { name: "draft", density: 0.5, error: 0.05, quality: Quality::Draft },
 ];
+/// The name of the bake that was asked for.
+const FINAL: &str = "final";
+/// Texels that the baker chooses for a whole scene, about.
+const AUTOMATIC_TEXELS: f64 = 500_000.0;
+/// The smallest map that a bake may be asked for.
+const SMALLEST_MAP: u32 = 4;
 /// Radiance of the sky that a file is baked under in which nothing shines, W/(m² sr).
 const SKY: f32 = 1.0;
 
@@ -186,16 +192,17 @@ pub struct BackgroundBake {
 }
 
 impl BackgroundBake {
-    /// Begins to bake a file.
+    /// Begins to bake a file; `wanted` is what it comes to in the end.
     ///
     /// # Errors
     /// [`BakeError::Thread`].
-    pub fn start(path: &Path, options: &LoadOptions) -> Result<Self, BakeError> {
+    pub fn start(path: &Path, options: &LoadOptions, wanted: &BakeOptions) -> Result<Self, BakeError> {
         let (sender, messages) = channel();
         let is_cancelled = Arc::new(AtomicBool::new(false));
         let job = Job {
             path: path.to_owned(),
             options: options.clone(),
+            wanted: *wanted,
             is_cancelled: Arc::clone(&is_cancelled),
             begun: Instant::now(),
             sender: sender.clone(),
@@ -285,6 +292,7 @@ impl Drop for BackgroundBake {
 struct Job {
     path: PathBuf,
     options: LoadOptions,
+    wanted: BakeOptions,
     is_cancelled: Arc<AtomicBool>,
     begun: Instant,
     sender: Sender<Message>,
@@ -316,19 +324,20 @@ impl Job {
             world.get_resource_or_init::<SceneSettings>().sky = Vec3::splat(SKY);
         }
         let area = area(&mut world);
-        for (index, pass) in PASSES.iter().enumerate() {
+        let first = FIRST.iter().map(|pass| (pass.name, rougher(&self.wanted, pass, area)));
+        for (name, options) in first.chain([(FINAL, self.wanted)]) {
             if self.is_cancelled.load(Ordering::Relaxed) {
                 return Ok(None);
             }
-            let is_final = index + 1 == PASSES.len();
-            let report = bake(&mut world, &options(pass, area, is_final), &mut |progress| {
+            let report = bake(&mut world, &leaving_a_core(options), &mut |progress| {
                 let status = BakeStatus {
-                    pass: pass.name,
+                    pass: name,
                     stage: progress.stage,
                     fraction: progress.fraction,
                     error: progress.error,
                     elapsed: self.begun.elapsed(),
                 };
+                // The window may be gone.
                 let _ = self.sender.send(Message::Status(status));
                 match self.is_cancelled.load(Ordering::Relaxed) {
                     true => ControlFlow::Break(()),
@@ -336,30 +345,34 @@ impl Job {
                 }
             })?;
             let mut light = BakedLight::of(&mut world, &nodes, &report);
-            (light.pass, light.under_a_sky, light.is_final) = (pass.name, under_a_sky, is_final);
+            (light.pass, light.under_a_sky, light.is_final) = (name, under_a_sky, name == FINAL);
             let _ = self.sender.send(Message::News(BakeNews::Light(light)));
         }
         Ok(Some(Baked { source: file, world }))
     }
 }
 
-fn options(pass: &Pass, area: f64, is_final: bool) -> BakeOptions {
-    let density = match pass.texels {
-        Some(texels) if area > 0.0 && area.is_finite() => Density::TexelsPerMeter((texels / area).sqrt()),
-        _ => Density::Automatic,
+/// What was asked for, more quickly.
+fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
+    let density = match wanted.density {
+        Density::Automatic if area > 0.0 && area.is_finite() => {
+            Density::TexelsPerMeter(pass.density * (AUTOMATIC_TEXELS / area).sqrt())
+        }
+        Density::Automatic => Density::Automatic,
+        Density::TexelsPerMeter(texels) => Density::TexelsPerMeter(pass.density * texels),
+        Density::MapSize(side) => {
+            Density::MapSize(((pass.density * f64::from(side)) as u32).max(SMALLEST_MAP))
+        }
     };
-    // One core is left to the frames.
-    let threads = thread::available_parallelism().map_or(1, |cores| (cores.get() - 1).max(1));
-    BakeOptions {
-        density,
-        error: pass.error,
-        quality: pass.quality,
-        threads: Some(threads),
-        resolution_error: is_final,
-        // Frames do not read them; the file that may be saved has them.
-        probes: if is_final { Probes::Automatic } else { Probes::Never },
-        ..BakeOptions::default()
-    }
+    let (error, quality) = (pass.error.max(wanted.error), pass.quality);
+    // Frames do not read probes; the file that may be saved has them.
+    BakeOptions { density, error, quality, resolution_error: false, probes: Probes::Never, ..*wanted }
+}
+
+/// One core is left to the frames, unless threads were asked for.
+fn leaving_a_core(options: BakeOptions) -> BakeOptions {
+    let cores = thread::available_parallelism().map_or(1, |cores| (cores.get() - 1).max(1));
+    BakeOptions { threads: options.threads.or(Some(cores)), ..options }
 }
 
 /// Whether anything gives light that a bake takes: lamps, emission, a sky.

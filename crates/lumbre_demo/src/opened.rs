@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
+use lumbre_bake::BakeOptions;
 use lumbre_scene::{LoadOptions, add_default_light, is_without_light, load_with};
 
 use crate::{Game, GameError};
@@ -31,12 +32,15 @@ pub struct OpenOptions {
     pub default_light: bool,
     /// How bright their pictures are.
     pub exposure: Exposure,
+    /// What a bake in the background comes to in the end.
+    pub bake: BakeOptions,
 }
 
 impl Default for OpenOptions {
     fn default() -> Self {
         let load = LoadOptions { lenient: true, ..LoadOptions::default() };
-        Self { load, default_light: true, exposure: Exposure::default() }
+        let bake = BakeOptions { error: 0.02, ..BakeOptions::default() };
+        Self { load, default_light: true, exposure: Exposure::default(), bake }
     }
 }
 

@@ -9,6 +9,7 @@ use std::process::{Child, Command, Stdio};
 
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
+use lumbre_bake::{BakeOptions, Density};
 use lumbre_demo::{Action, PlayOptions, Trial};
 use lumbre_mesh::shapes::cuboid;
 use lumbre_optics::{Light, Material, Surface};
@@ -89,6 +90,7 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
         wait_for_work: true,
         ..PlayOptions::default()
     };
+    options.open.bake = BakeOptions { density: Density::MapSize(32), error: 0.1, ..BakeOptions::default() };
     let folder = tempfile::tempdir()?;
     let file = |name: &str, write: fn(&Path)| {
         let path = folder.path().join(name);

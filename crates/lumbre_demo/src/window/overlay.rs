@@ -9,15 +9,13 @@ use lumbre_render::FrameReport;
 
 use super::overlay_file;
 pub use super::overlay_file::FileFacts;
+use super::overlay_file::{DIM, GOOD, WARM};
 use crate::ViewSettings;
 
 /// Frames in the graph: two seconds at 60 per second.
 const GRAPH_FRAMES: usize = 120;
 /// Size of the graph in points.
 const GRAPH_SIZE: egui::Vec2 = vec2(330.0, 56.0);
-pub const DIM: Color32 = Color32::from_gray(150);
-pub const GOOD: Color32 = Color32::from_rgb(140, 210, 120);
-pub const WARM: Color32 = Color32::from_rgb(235, 180, 90);
 
 /// What the overlay is about, beside the frame itself.
 #[derive(Clone, Debug, Default)]

@@ -2,7 +2,6 @@
 
 use egui::{Align2, Color32, ProgressBar, RichText, ScrollArea, Ui, vec2};
 
-use super::overlay::{DIM, GOOD, WARM};
 use super::viewing::{LightFacts, Message};
 use crate::BakeStatus;
 
@@ -10,6 +9,10 @@ use crate::BakeStatus;
 const NOTES_HEIGHT: f32 = 90.0;
 /// Width of the bar of a bake in points.
 const BAR_WIDTH: f32 = 420.0;
+/// Colours of the overlay's text: of what is by the way, of what is well, of what is to be noted, of what went wrong.
+pub const DIM: Color32 = Color32::from_gray(150);
+pub const GOOD: Color32 = Color32::from_rgb(140, 210, 120);
+pub const WARM: Color32 = Color32::from_rgb(235, 180, 90);
 const BAD: Color32 = Color32::from_rgb(255, 120, 100);
 
 /// What is known of the file.

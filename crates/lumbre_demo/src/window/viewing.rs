@@ -249,7 +249,7 @@ impl Viewing {
         if self.bake.as_ref().is_some_and(BackgroundBake::is_running) {
             return self.say("the baked file is being written".to_owned());
         }
-        match BackgroundBake::start(&self.opened.path, &self.options.load) {
+        match BackgroundBake::start(&self.opened.path, &self.options.load, &self.options.bake) {
             Ok(bake) => {
                 self.bake = Some(bake);
                 self.message = None;
