@@ -13,25 +13,40 @@ use lumbre::scene::PackedFormat;
 #[command(
     name = "lumbre",
     version,
+    args_conflicts_with_subcommands = true,
     after_help = "\
 Examples:
   lumbre                                         play the demo level
+  lumbre room.glb                                look at a file: turn it, walk in it, bake it at a key press
   lumbre bake room.glb -o room.baked.glb         bake its radiosity into lightmaps
   lumbre render room.baked.glb -o room.png       draw it without a window
   lumbre explain room.glb                        what it calls for, and what it does not"
 )]
 pub struct Arguments {
-    /// What to do; without it, plays the demo level.
+    /// What to do; without it, a file is shown, or the demo level played.
     #[command(subcommand)]
     pub command: Option<Command>,
+    #[command(flatten)]
+    pub play: Play,
 }
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Play a level; without a display, draw a short tour of it to PNG frames.
-    #[command(
-        after_help = "Examples:\n  lumbre play\n  lumbre play room.baked.glb\n  lumbre play --headless --frames-dir tour"
-    )]
+    /// Play a level, or look at any glTF file; without a display, draw a short tour of it to PNG frames.
+    #[command(after_help = "\
+Keys:
+  drag with the left button   turn            O, Home   show everything, turn around it
+  with the right or middle    shift           V         the file's next camera
+  wheel                       come nearer     B         bake in the background; again or Esc cancels
+  W A S D, Shift, Space       walk or fly     K         keep the bake: writes NAME.baked.glb beside the file
+  click                       look around     E         adapt the exposure
+  drop a file                 open it         1 2 3 G R L M T F   shading, reflection, lightmaps, multisampling, torch, flight
+  Tab                         the overlay     Q         quit
+
+Examples:
+  lumbre play
+  lumbre play room.baked.glb
+  lumbre play --headless --frames-dir tour")]
     Play(Play),
     /// Bake radiosity into lightmaps.
     #[command(after_help = "\
@@ -77,7 +92,8 @@ pub enum Exposure {
 
 #[derive(Args, Debug)]
 pub struct Play {
-    /// A level; without one the demo level, baked first if it is not baked.
+    /// A .glb or .gltf file; without one the demo level, baked first if it is not baked.
+    #[arg(value_name = "FILE", value_parser = gltf_file)]
     pub level: Option<PathBuf>,
     #[command(flatten)]
     pub reading: Reading,
@@ -111,17 +127,6 @@ pub struct Play {
     /// Ends after so many frames.
     #[arg(long, value_name = "FRAMES", allow_negative_numbers = true)]
     pub quit_after: Option<u32>,
-}
-
-impl Play {
-    /// What `lumbre play` says without a word more.
-    pub fn parse_from_defaults() -> Self {
-        match Arguments::parse_from(["lumbre", "play"]).command {
-            Some(Command::Play(play)) => play,
-            // The line above names the command.
-            _ => unreachable!("`lumbre play` is the play command"),
-        }
-    }
 }
 
 #[derive(Args, Debug)]
@@ -346,6 +351,18 @@ pub struct Frame {
     /// Leaves a scene without lights dark, instead of lighting it from the camera.
     #[arg(long)]
     pub no_default_light: bool,
+}
+
+/// A file to look at: whatever is there, or is named like one. Else it is a misspelt command.
+fn gltf_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_named_so = path
+        .extension()
+        .is_some_and(|extension| ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)));
+    match is_named_so || path.exists() {
+        true => Ok(path),
+        false => Err("neither a .glb or .gltf file nor a command: play, bake, render, explain".into()),
+    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -42,7 +42,8 @@ pub fn load_source(path: &Path, reading: &Reading) -> anyhow::Result<(SourceFile
     Ok((source, loaded(world, report, path)))
 }
 
-fn load_options(reading: &Reading) -> LoadOptions {
+/// How the command line wants files read.
+pub fn load_options(reading: &Reading) -> LoadOptions {
     LoadOptions { lenient: !reading.strict, root: reading.root.clone(), ..LoadOptions::default() }
 }
 
@@ -55,7 +56,7 @@ fn loaded(mut world: World, report: LoadReport, path: &Path) -> Loaded {
 }
 
 /// Lights a World from a camera, with a note, if it would be black otherwise.
-pub fn light_by_default(world: &mut World, camera: Entity, path: &Path) {
+fn light_by_default(world: &mut World, camera: Entity, path: &Path) {
     if scene::is_without_light(world) {
         eprintln!(
             "lumbre: note: {}: has no light that a frame shows; lit by a key and a fill light at the camera (--no-default-light leaves it dark)",
@@ -68,24 +69,24 @@ pub fn light_by_default(world: &mut World, camera: Entity, path: &Path) {
 /// Share of a frame that has to be white for want of an exposure before one is metered unasked.
 const CLIPPED: f64 = 0.02;
 
-/// The exposure that is asked for, or that a file with lights in candela or lux needs; a metered one is stated on standard error. `None`
+/// The exposure that is asked for, or that a file needs whose lights are in candela or lux (`photometric`) and whose cameras state none; a metered one is stated on standard error. `None`
 /// leaves that of the camera.
 pub fn exposure(
     asked: Option<Exposure>,
-    loaded: &mut Loaded,
+    photometric: bool,
+    world: &mut World,
     gpu: &Gpu,
     options: &FrameOptions,
     aspect: f64,
     path: &Path,
 ) -> anyhow::Result<Option<f32>> {
-    let physical = loaded.report.photometric_lights > 0 && !loaded.report.states_exposure;
     match asked {
         Some(Exposure::Factor(factor)) => return Ok(Some(factor)),
         Some(Exposure::Auto) => {}
-        None if physical && options.display == Display::Srgb => {}
+        None if photometric && options.display == Display::Srgb => {}
         None => return Ok(None),
     }
-    let metering = meter(gpu, &mut loaded.world, options, aspect)?;
+    let metering = meter(gpu, world, options, aspect)?;
     let Some(metering) = metering.filter(|found| asked.is_some() || found.clipped > CLIPPED) else {
         return Ok(None);
     };

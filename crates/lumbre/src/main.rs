@@ -33,7 +33,7 @@ fn main() -> ExitCode {
         .without_time()
         .init();
     let outcome = match arguments.command {
-        None => play::run(&arguments::Play::parse_from_defaults()),
+        None => play::run(&arguments.play),
         Some(Command::Play(options)) => play::run(&options),
         Some(Command::Bake(options)) => bake::run(&options),
         Some(Command::Render(options)) => render::run(&options),

@@ -1,4 +1,4 @@
-//! `lumbre play`: the demo level, or any other. Without a display, a tour of it in PNG frames.
+//! `lumbre play`, and `lumbre FILE.glb`: the demo level, or any other file. Without a display, a tour of it in PNG frames.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use lumbre::bake::{BakeOptions, Probes, bake};
-use lumbre::demo::{self, Game};
+use lumbre::demo::{self, Opened};
 use lumbre::render::{FrameOptions, Gpu};
-use lumbre::scene::{self, Camera};
+use lumbre::scene;
 
 use crate::arguments::{Exposure, Play, Reading};
-use crate::loading::{Loaded, exposure, light_by_default, load, load_source};
+use crate::loading::{Loaded, exposure, load_options, load_source};
 use crate::progress::Shown;
 
 /// Runs the command.
@@ -20,9 +20,14 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
         Some(level) => level.clone(),
         None => demo_level()?,
     };
-    let game = game(&level, asked)?;
+    let options = open_options(asked);
+    let mut opened = Opened::open(&level, &options)?;
+    for note in &opened.notes {
+        eprintln!("lumbre: note: {}: {note}", level.display());
+    }
     if asked.headless || !demo::has_display() {
-        let paths = demo::tour_of(game, &asked.frames_dir, asked.frames, asked.size)?;
+        let exposure = exposure_of_tour(&mut opened, asked)?;
+        let paths = demo::tour_of(opened.game, &asked.frames_dir, asked.frames, asked.size, exposure)?;
         let mut out = std::io::stdout().lock();
         for path in paths {
             writeln!(out, "{}", path.display())?;
@@ -30,47 +35,40 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
         return Ok(());
     }
     let options = demo::PlayOptions {
-        title: format!("Lumbre: {}", level.file_stem().unwrap_or_default().to_string_lossy()),
+        open: options,
         input: asked.input.clone(),
         record: asked.record.clone(),
         screenshot: asked.screenshot.clone(),
         quit_after: asked.quit_after,
         ..demo::PlayOptions::default()
     };
-    demo::run_game(game, options)
+    demo::run_opened(opened, options)
 }
 
-/// The level with the player in it, lit and exposed so that something can be seen.
-fn game(level: &Path, asked: &Play) -> anyhow::Result<Game> {
-    let Loaded { world, report } = load(level, &asked.reading)?;
-    let mut game = Game::new(world).with_context(|| level.display().to_string())?;
-    let camera = game.camera();
-    if !asked.no_default_light {
-        light_by_default(&mut game.world, camera, level);
-    }
-    let physical = report.photometric_lights > 0 && !report.states_exposure;
+fn open_options(asked: &Play) -> demo::OpenOptions {
     let exposure = match asked.exposure {
-        Some(Exposure::Factor(factor)) => Some(factor),
-        None if !physical => None,
-        _ => {
-            let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
-            let mut seen = Loaded { world: std::mem::take(&mut game.world), report };
-            let metered = exposure(
-                asked.exposure,
-                &mut seen,
-                &Gpu::headless()?,
-                &FrameOptions::default(),
-                aspect,
-                level,
-            );
-            game.world = seen.world;
-            metered?
-        }
+        None => demo::Exposure::AsNeeded,
+        Some(Exposure::Auto) => demo::Exposure::Auto,
+        Some(Exposure::Factor(factor)) => demo::Exposure::Factor(factor),
     };
-    if let (Some(exposure), Some(mut lens)) = (exposure, game.world.get_mut::<Camera>(camera)) {
-        lens.exposure = exposure;
+    let load = load_options(&asked.reading);
+    demo::OpenOptions { load, default_light: !asked.no_default_light, exposure, ..Default::default() }
+}
+
+/// One exposure for all pictures of a tour, as metered where it begins.
+fn exposure_of_tour(opened: &mut Opened, asked: &Play) -> anyhow::Result<Option<f32>> {
+    let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
+    let (options, photometric) = (FrameOptions::default(), opened.is_photometric);
+    let is_metered = match asked.exposure {
+        Some(Exposure::Factor(factor)) => return Ok(Some(factor)),
+        Some(Exposure::Auto) => true,
+        None => photometric,
+    };
+    if !is_metered {
+        return Ok(None);
     }
-    Ok(game)
+    let gpu = Gpu::headless()?;
+    exposure(asked.exposure, photometric, &mut opened.game.world, &gpu, &options, aspect, &opened.path)
 }
 
 /// The baked demo level; baked now if it is not there or older than the level.

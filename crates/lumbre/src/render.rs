@@ -66,7 +66,9 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         options.measure = Measure::TimeAndInvocations;
     }
     let gpu = Gpu::headless()?;
-    options.exposure = exposure(asked.frame.exposure, &mut loaded, &gpu, &options, aspect, &asked.input)?;
+    let photometric = loaded.report.photometric_lights > 0 && !loaded.report.states_exposure;
+    options.exposure =
+        exposure(asked.frame.exposure, photometric, &mut loaded.world, &gpu, &options, aspect, &asked.input)?;
     let mut renderer = Renderer::new(&gpu);
     let format = if floats { OffscreenFormat::LinearFloat } else { OffscreenFormat::Rgba8 };
     let target = Offscreen::new(&gpu, width, height, format)?;

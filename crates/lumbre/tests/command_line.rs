@@ -79,6 +79,19 @@ fn help_shows_examples_and_bad_usage_exits_with_2() {
 }
 
 #[test]
+fn what_is_neither_a_command_nor_a_file_is_told_apart() {
+    let output = lumbre(&["paint"]);
+    assert!(stderr(&output).contains("neither") && stderr(&output).contains("render"), "{}", stderr(&output));
+    let output = lumbre(&["nowhere.glb", "--headless"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("nowhere.glb"), "{}", stderr(&output));
+    let output = lumbre(&["play", "--help"]);
+    for wanted in ["NAME.baked.glb", "drop a file", "Esc cancels"] {
+        assert!(stdout(&output).contains(wanted), "{wanted}: {}", stdout(&output));
+    }
+}
+
+#[test]
 fn a_failed_job_exits_with_1_and_names_the_file() {
     let (folder, path) = level();
     let missing = lumbre(&["render", "nowhere.glb", "-o", "x.png"]);
@@ -225,6 +238,17 @@ fn playing_without_a_display_draws_a_tour() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let paths: Vec<PathBuf> = stdout(&output).lines().map(PathBuf::from).collect();
     assert_eq!(paths.len(), 7, "{paths:?}");
+    // A file without a command is played.
+    let again = folder.path().join("again");
+    let frames = ["--headless", "--frames-dir", text(&again), "--frames", "7", "--size", "192x108"];
+    let output = lumbre(&[&[text(&path)], &frames[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(stdout(&output).lines().count(), 7);
+    let same = |path: &PathBuf| {
+        let other = again.join(path.file_name().unwrap());
+        image::open(path).unwrap().to_rgb8() == image::open(other).unwrap().to_rgb8()
+    };
+    assert!(paths.iter().all(same));
     let pictures: Vec<_> = paths.iter().map(|path| image::open(path).unwrap().to_rgb8()).collect();
     assert!(pictures.iter().all(|picture| picture.dimensions() == (192, 108)));
     assert!(pictures[0] != pictures[pictures.len() / 2], "the tour stands still");

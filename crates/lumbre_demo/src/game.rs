@@ -7,11 +7,15 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::SingleThreadedExecutor;
 use glam::{DQuat, DVec2, DVec3};
 use lumbre_optics::Light;
-use lumbre_scene::{ActiveCamera, Camera, GlobalTransform, LoadError, Name, Transform, propagate_transforms};
+use lumbre_scene::{
+    ActiveCamera, Bounds, Camera, GlobalTransform, LoadError, Name, Projection, Transform, default_camera,
+    propagate_transforms, scene_bounds,
+};
 
 use crate::clock::{Clock, STEP_SECONDS};
 use crate::input::{Action, Input};
 use crate::moving::{ExtrasError, GameTime, move_things, read_motions};
+use crate::orbit_view::OrbitView;
 use crate::player::Player;
 use crate::recording::Recording;
 use crate::solid::level_triangles;
@@ -23,6 +27,24 @@ use crate::walking::{TriangleTree, ground_below, overlaps};
 pub const START_CAMERA: &str = "start";
 /// Who falls this far below the level starts again, metres.
 const ABYSS: f64 = 10.0;
+
+/// Seconds in which flight crosses half of a scene, where that is slower or faster than a player flies.
+const CROSSING_SECONDS: f64 = 4.0;
+/// Largest angle above or below the horizon, radians, from which everything is shown first.
+const STEEPEST_START: f64 = 0.8;
+/// Radii of scenes, in metres, that a player flies through at their own speed.
+const OF_HUMAN_SIZE: std::ops::RangeInclusive<f64> = 2.0..=60.0;
+
+/// Where the picture is taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Viewpoint {
+    /// The player's eyes: walking, or flying.
+    Player,
+    /// A place on a sphere around what is looked at.
+    Orbit(OrbitView),
+    /// A camera of the file, by its place in [`Game::cameras`].
+    FileCamera(usize),
+}
 
 /// A level that is being played.
 pub struct Game {
@@ -39,7 +61,13 @@ pub struct Game {
     now: Player,
     before: Player,
     start: Player,
-    look: DVec2,
+    viewpoint: Viewpoint,
+    lens: Camera,
+    cameras: Vec<(Entity, String)>,
+    bounds: Bounds,
+    aspect: f64,
+    /// What the mouse did that no step has seen yet.
+    gestures: Input,
     commands: Vec<Action>,
     recording: Option<Recording>,
     quit: bool,
@@ -77,6 +105,8 @@ impl Game {
         read_motions(&mut world)?;
         lumbre_scene::update_transforms(&mut world);
         let level = TriangleTree::build(level_triangles(&mut world));
+        let cameras = cameras_of(&mut world);
+        let bounds = scene_bounds(&mut world);
         let (view, lens) = first_view(&mut world, &level);
         let mut start = Player::with_eyes_at(&view);
         let ground = ground_below(start.body.feet, 3.0, &start.stature, &level);
@@ -112,7 +142,12 @@ impl Game {
             now: start,
             before: start,
             start,
-            look: DVec2::ZERO,
+            viewpoint: Viewpoint::Player,
+            lens,
+            cameras,
+            bounds,
+            aspect: 16.0 / 9.0,
+            gestures: Input::default(),
             commands: Vec::new(),
             recording: None,
             quit: false,
@@ -123,16 +158,14 @@ impl Game {
 
     /// Lets a frame's time pass with this input. The player moves in fixed steps; what is drawn lies between the last two.
     pub fn step(&mut self, frame: Duration, input: &Input) {
-        if input.look.is_finite() {
-            self.look += input.look;
-        }
+        self.gestures.add_gestures(input);
         self.clock.pass(frame);
         self.make_steps(input);
     }
 
     /// Makes exactly one fixed step.
     pub fn step_once(&mut self, input: &Input) {
-        self.look += input.look;
+        self.gestures.add_gestures(input);
         self.clock.pass_one_step();
         self.make_steps(input);
     }
@@ -163,7 +196,11 @@ impl Game {
                 self.now.flying = !self.now.flying;
                 self.now.body.velocity = DVec3::ZERO;
             }
-            _ => self.quit = true,
+            Action::OrbitEverything => self.orbit_everything(),
+            Action::NextCamera => self.next_camera(),
+            Action::Quit => self.quit = true,
+            // The window's, or of the view above.
+            _ => {}
         }
     }
 
@@ -181,9 +218,67 @@ impl Game {
 
     /// Puts the player's eyes at a place, flying.
     pub fn look_from(&mut self, view: &Transform) {
-        self.now = Player { flying: true, ..Player::with_eyes_at(view) };
+        let flight_speed = match OF_HUMAN_SIZE.contains(&self.bounds.radius()) {
+            true => self.start.flight_speed,
+            false => (self.bounds.radius() / CROSSING_SECONDS).max(1e-6),
+        };
+        self.now = Player { flying: true, flight_speed, ..Player::with_eyes_at(view) };
         self.before = self.now;
+        self.viewpoint = Viewpoint::Player;
         self.show(1.0);
+    }
+
+    /// Shows the whole scene, and turns around its middle from there.
+    pub fn orbit_everything(&mut self) {
+        let (view, lens) = default_camera(&mut self.world, self.aspect);
+        self.lens.projection = lens.projection;
+        let mut orbit = OrbitView::of_camera(&view, &self.bounds);
+        // A thing on a floor, which is seen best from above, has a height all the same.
+        orbit.pitch = orbit.pitch.clamp(-STEEPEST_START, STEEPEST_START);
+        self.viewpoint = Viewpoint::Orbit(orbit);
+        self.show(1.0);
+    }
+
+    /// Looks through the file's next camera; after the last one, around everything.
+    pub fn next_camera(&mut self) {
+        let next = match self.viewpoint {
+            Viewpoint::FileCamera(index) => index + 1,
+            Viewpoint::Player | Viewpoint::Orbit(_) => 0,
+        };
+        if next < self.cameras.len() {
+            self.viewpoint = Viewpoint::FileCamera(next);
+            self.show(1.0);
+        } else {
+            self.orbit_everything();
+        }
+    }
+
+    /// Where the picture is taken from.
+    pub fn viewpoint(&self) -> &Viewpoint {
+        &self.viewpoint
+    }
+
+    /// The cameras of the file: entity and name.
+    pub fn cameras(&self) -> &[(Entity, String)] {
+        &self.cameras
+    }
+
+    /// Puts the cameras into the order of the file's nodes.
+    pub fn order_cameras(&mut self, nodes: &[Entity]) {
+        let place = |entity: Entity| nodes.iter().position(|node| *node == entity).unwrap_or(usize::MAX);
+        self.cameras.sort_by_key(|(entity, _)| place(*entity));
+    }
+
+    /// Whether the level has a camera from which a player starts: a level to walk through, and not a file to look at.
+    pub fn has_a_start(&self) -> bool {
+        self.cameras.iter().any(|(_, name)| name == START_CAMERA)
+    }
+
+    /// Says how wide the picture is for its height, so that everything can be framed.
+    pub fn set_aspect(&mut self, aspect: f64) {
+        if aspect.is_finite() && aspect > 0.0 {
+            self.aspect = aspect;
+        }
     }
 
     /// The player after the last step.
@@ -218,12 +313,17 @@ impl Game {
 
     fn make_steps(&mut self, input: &Input) {
         while self.clock.take_step() {
-            let input = Input { look: std::mem::take(&mut self.look), ..*input };
+            let mut input = input.held();
+            input.add_gestures(&std::mem::take(&mut self.gestures));
             if let Some(recording) = &mut self.recording {
                 recording.note(self.clock.steps() - 1, input, &self.commands);
             }
             self.commands.clear();
+            self.follow_viewpoint(&input);
             self.before = self.now;
+            if self.viewpoint != Viewpoint::Player {
+                continue;
+            }
             self.now.step(&input, &self.level, STEP_SECONDS);
             let lowest = self.level.bounds().map_or(f64::NEG_INFINITY, |(min, _)| min.y);
             if self.now.body.feet.y < lowest - ABYSS && !self.now.flying {
@@ -234,27 +334,122 @@ impl Game {
         self.show(self.clock.part_of_step());
     }
 
-    /// Writes what is seen into the World: the player between the last two steps, everything else at this moment.
-    fn show(&mut self, part: f64) {
+    /// What an input does to where the picture is taken from: who drags turns around something, who walks sets out from there.
+    fn follow_viewpoint(&mut self, input: &Input) {
+        if self.viewpoint == Viewpoint::Player {
+            return;
+        }
+        if input.wants_to_go() {
+            let view = self.view();
+            return self.look_from(&view);
+        }
+        let Some(moved) = self.orbit_after(input) else { return };
+        if let Viewpoint::FileCamera(index) = self.viewpoint
+            && let Some((entity, _)) = self.cameras.get(index)
+            && let Some(Camera { projection: seen @ Projection::Perspective { .. }, .. }) =
+                self.world.get(*entity)
+        {
+            // The picture keeps its angle.
+            self.lens.projection = *seen;
+        }
+        self.viewpoint = Viewpoint::Orbit(moved);
+    }
+
+    /// The orbit that gestures lead to, if there is one or they ask for one.
+    fn orbit_after(&self, gestures: &Input) -> Option<OrbitView> {
+        let drags = *gestures != Input { orbit: DVec2::ZERO, pan: DVec2::ZERO, zoom: 0.0, ..*gestures };
+        let mut orbit = match self.viewpoint {
+            Viewpoint::Orbit(orbit) => orbit,
+            Viewpoint::FileCamera(_) if drags => OrbitView::of_camera(&self.view(), &self.bounds),
+            Viewpoint::FileCamera(_) | Viewpoint::Player => return None,
+        };
+        orbit.turn(gestures.orbit);
+        orbit.pan(gestures.pan, self.height_of_view());
+        orbit.zoom(gestures.zoom);
+        Some(orbit)
+    }
+
+    /// Metres that the picture is high, one metre before the eye.
+    fn height_of_view(&self) -> f64 {
+        match self.lens.projection {
+            Projection::Perspective { vertical_fov, .. } => 2.0 * (0.5 * vertical_fov).tan(),
+            Projection::Orthographic { .. } => 1.0,
+        }
+    }
+
+    /// The eye of the picture as it was shown last.
+    fn view(&self) -> Transform {
+        let entity = match self.viewpoint {
+            Viewpoint::FileCamera(index) => self.cameras.get(index).map(|(entity, _)| *entity),
+            Viewpoint::Player | Viewpoint::Orbit(_) => Some(self.camera),
+        };
+        let place = entity.and_then(|entity| self.world.get::<GlobalTransform>(entity));
+        place.map_or(Transform::IDENTITY, |place| Transform::from_affine(place.0).0)
+    }
+
+    /// Where the player's body and eyes are in the picture, and the lens: the player between the last two steps.
+    fn eyes(&self, part: f64) -> (Transform, Transform, Camera) {
         let (before, now) = (&self.before, &self.now);
+        // The view turns at once: what the mouse did since the last step is shown before it counts.
+        if let Some(orbit) = self.orbit_after(&self.gestures) {
+            return (orbit.place(), Transform::IDENTITY, self.lens_from(orbit.near()));
+        }
+        if let Viewpoint::FileCamera(index) = self.viewpoint
+            && let Some((entity, _)) = self.cameras.get(index)
+            && let Some(lens) = self.world.get::<Camera>(*entity)
+        {
+            return (self.view(), Transform::IDENTITY, *lens);
+        }
         let feet = before.body.feet.lerp(now.body.feet, part);
         let eyes = before.eye_height() + (now.eye_height() - before.eye_height()) * part;
-        // The view turns at once: what the mouse did since the last step is shown before it counts.
         let mut turned = *now;
-        turned.turn(self.look);
+        turned.turn(self.gestures.look);
         let body = Transform::from_translation(feet).with_rotation(DQuat::from_rotation_y(turned.yaw));
         let head = Transform::from_xyz(0.0, eyes, 0.0).with_rotation(DQuat::from_rotation_x(turned.pitch));
+        (body, head, self.lens)
+    }
+
+    /// The lens, with a near plane of at most so many metres.
+    fn lens_from(&self, most: f64) -> Camera {
+        let mut lens = self.lens;
+        if let Projection::Perspective { near, .. } = &mut lens.projection {
+            *near = near.min(most);
+        }
+        lens
+    }
+
+    /// Writes what is seen into the World: the eyes, and everything else at this moment.
+    fn show(&mut self, part: f64) {
+        let (body, head, lens) = self.eyes(part);
         for (entity, transform) in [(self.player, body), (self.camera, head)] {
             if let Some(mut current) = self.world.get_mut::<Transform>(entity) {
                 current.set_if_neq(transform);
             }
         }
+        if let Some(mut current) = self.world.get_mut::<Camera>(self.camera) {
+            current.set_if_neq(lens);
+        }
+        let now = self.now;
         if let Some(mut player) = self.world.get_mut::<Player>(self.player) {
-            player.set_if_neq(*now);
+            player.set_if_neq(now);
         }
         self.world.insert_resource(GameTime { seconds: self.clock.elapsed().as_secs_f64() });
         self.schedule.run(&mut self.world);
     }
+}
+
+/// The cameras of a World, by their entities.
+fn cameras_of(world: &mut World) -> Vec<(Entity, String)> {
+    let mut query = world.query_filtered::<(Entity, Option<&Name>), With<Camera>>();
+    let mut cameras: Vec<(Entity, String)> = query
+        .iter(world)
+        .map(|(entity, name)| (entity, name.map_or_else(String::new, ToString::to_string)))
+        .collect();
+    cameras.sort();
+    for (index, (_, name)) in cameras.iter_mut().enumerate().filter(|(_, (_, name))| name.is_empty()) {
+        *name = format!("camera {index}");
+    }
+    cameras
 }
 
 /// Where the player starts, and the lens of that camera.
@@ -273,4 +468,108 @@ fn first_view(world: &mut World, level: &TriangleTree) -> (Transform, Camera) {
     let (middle, radius) = (0.5 * (min + max), 0.5 * (max - min).length());
     let eye = middle + DVec3::new(0.3, 0.4, 1.0).normalize() * 2.4 * radius;
     (Transform::from_translation(eye).looking_at(middle, DVec3::Y), Camera::default())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use lumbre_scene::Mesh;
+
+    use super::*;
+
+    /// A box before the origin, and two cameras: the first looks at it from the right, the second lies above it.
+    fn looked_at() -> Game {
+        let mut world = World::new();
+        let cuboid = Arc::new(lumbre_mesh::shapes::cuboid(glam::Vec3::new(2.0, 1.0, 1.0), 1));
+        world.spawn(Mesh(cuboid));
+        let right = Transform::from_xyz(9.0, 0.0, 0.0).looking_at(DVec3::ZERO, DVec3::Y);
+        let above = Transform::from_xyz(0.0, 7.0, 0.1).looking_at(DVec3::ZERO, DVec3::Y);
+        world.spawn((Name::new("right"), Camera { exposure: 0.5, ..Camera::default() }, right));
+        world.spawn((Camera::default(), above));
+        let mut game = Game::new(world).unwrap();
+        game.orbit_everything();
+        game
+    }
+
+    fn eye(game: &Game) -> Transform {
+        Transform::from_affine(game.world.get::<GlobalTransform>(game.camera()).unwrap().0).0
+    }
+
+    #[test]
+    fn a_file_is_framed_and_turned_by_dragging() {
+        let mut game = looked_at();
+        let before = eye(&game);
+        assert!((before.rotation * DVec3::NEG_Z).dot(-before.translation.normalize()) > 1.0 - 1e-9);
+        game.step_once(&Input { orbit: DVec2::new(0.4, 0.2), ..Input::default() });
+        let after = eye(&game);
+        assert!((after.translation.length() - before.translation.length()).abs() < 1e-9);
+        assert!(after.translation.distance(before.translation) > 0.3);
+        assert!(after.translation.y > before.translation.y, "dragged downwards it is seen from above");
+        game.step_once(&Input { zoom: 3.0, ..Input::default() });
+        assert!(eye(&game).translation.length() < 0.7 * before.translation.length());
+        // The mouse at rest changes nothing.
+        let rest = eye(&game);
+        game.step_once(&Input::default());
+        assert_eq!(eye(&game), rest);
+    }
+
+    #[test]
+    fn what_the_mouse_did_is_shown_before_the_next_step() {
+        let mut game = looked_at();
+        let before = eye(&game);
+        game.step(Duration::ZERO, &Input { orbit: DVec2::new(0.4, 0.0), ..Input::default() });
+        let shown = eye(&game);
+        assert!(shown.translation.distance(before.translation) > 0.3);
+        game.step_once(&Input::default());
+        assert!(eye(&game).translation.distance(shown.translation) < 1e-9, "and counts once");
+    }
+
+    #[test]
+    fn cameras_come_in_turn_and_bring_their_lenses() {
+        let mut game = looked_at();
+        assert_eq!(
+            game.cameras().iter().map(|(_, name)| name.as_str()).collect::<Vec<_>>(),
+            ["right", "camera 1"]
+        );
+        game.apply(Action::NextCamera);
+        assert_eq!(game.viewpoint(), &Viewpoint::FileCamera(0));
+        assert!(eye(&game).translation.distance(DVec3::X * 9.0) < 1e-9);
+        assert_eq!(game.world.get::<Camera>(game.camera()).unwrap().exposure, 0.5);
+        game.apply(Action::NextCamera);
+        assert!((eye(&game).translation.y - 7.0).abs() < 1e-9);
+        game.apply(Action::NextCamera);
+        assert!(matches!(game.viewpoint(), Viewpoint::Orbit(_)));
+        // Who drags in a camera's view turns around what it looks at, from there.
+        game.apply(Action::NextCamera);
+        game.step_once(&Input { orbit: DVec2::new(1e-6, 0.0), ..Input::default() });
+        assert!(matches!(game.viewpoint(), Viewpoint::Orbit(_)));
+        assert!(eye(&game).translation.distance(DVec3::X * 9.0) < 1e-3);
+    }
+
+    #[test]
+    fn walking_sets_out_from_the_view_and_a_key_leads_back() {
+        let mut game = looked_at();
+        let before = eye(&game);
+        game.step_once(&Input { forward: true, ..Input::default() });
+        assert_eq!(game.viewpoint(), &Viewpoint::Player);
+        assert!(game.player().flying);
+        let after = eye(&game);
+        let ahead = after.translation - before.translation;
+        let speed = game.player().flight_speed;
+        assert!((ahead.length() - speed * STEP_SECONDS).abs() < 1e-9, "{ahead} at {speed}");
+        assert!(ahead.normalize().dot(before.rotation * DVec3::NEG_Z) > 0.999);
+        game.apply(Action::OrbitEverything);
+        assert_eq!(eye(&game), before);
+    }
+
+    #[test]
+    fn nothing_to_see_is_no_fault() {
+        let mut game = Game::new(World::new()).unwrap();
+        game.orbit_everything();
+        game.next_camera();
+        game.step_once(&Input { orbit: DVec2::ONE, pan: DVec2::ONE, zoom: 1.0, ..Input::default() });
+        game.step_once(&Input { forward: true, ..Input::default() });
+        assert!(eye(&game).translation.is_finite());
+    }
 }

@@ -1,4 +1,5 @@
-//! What a player wants, free of any window: held keys, turning, and one-off commands. Which key means what is the window's.
+//! What a player or viewer wants, free of any window: held keys, gestures of the mouse, and one-off commands. Which key means what is the
+//! window's.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,15 @@ pub struct Input {
     /// Turn of the view in radians: x to the right, y downwards, as a mouse moves.
     #[serde(skip_serializing_if = "is_zero")]
     pub look: DVec2,
+    /// Turn around what is looked at in radians: x to the right, y downwards, as a mouse moves.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub orbit: DVec2,
+    /// Shift of the picture in parts of its height: x to the right, y downwards, as a mouse moves.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub pan: DVec2,
+    /// Notches of the wheel towards what is looked at.
+    #[serde(skip_serializing_if = "is_still")]
+    pub zoom: f64,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
@@ -38,14 +48,39 @@ fn is_false(value: &bool) -> bool {
     !*value
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_still(value: &f64) -> bool {
+    *value == 0.0
+}
+
 fn is_zero(value: &DVec2) -> bool {
     *value == DVec2::ZERO
 }
 
 impl Input {
-    /// The same keys with the view at rest: what the following steps of the same frame see.
+    /// The same keys with the mouse at rest: what the following steps of the same frame see.
     pub fn held(self) -> Self {
-        Self { look: DVec2::ZERO, ..self }
+        Self { look: DVec2::ZERO, orbit: DVec2::ZERO, pan: DVec2::ZERO, zoom: 0.0, ..self }
+    }
+
+    /// Adds what the mouse did in another input; gestures that are no numbers are left out.
+    pub fn add_gestures(&mut self, other: &Self) {
+        if other.has_finite_gestures() {
+            self.look += other.look;
+            self.orbit += other.orbit;
+            self.pan += other.pan;
+            self.zoom += other.zoom;
+        }
+    }
+
+    /// Whether everything that the mouse did is a number.
+    pub fn has_finite_gestures(&self) -> bool {
+        self.look.is_finite() && self.orbit.is_finite() && self.pan.is_finite() && self.zoom.is_finite()
+    }
+
+    /// Whether somebody wants to go somewhere on foot or in flight.
+    pub fn wants_to_go(&self) -> bool {
+        self.walk() != DVec2::ZERO || self.climb() != 0.0
     }
 
     /// Walking direction in the player's frame, x to the right and y forward, of length 0 or 1.
@@ -84,6 +119,16 @@ pub enum Action {
     ToggleTorch,
     /// Walk, or fly through walls.
     ToggleFlight,
+    /// Turn around the whole scene.
+    OrbitEverything,
+    /// Look through the next camera of the file.
+    NextCamera,
+    /// Meter the exposure, or take the camera's.
+    ToggleAutoExposure,
+    /// Bake the file, or cancel the bake that runs.
+    ToggleBake,
+    /// Write the baked file.
+    SaveBake,
     /// Leave the game.
     Quit,
 }

@@ -24,12 +24,18 @@
 //! # Ok::<(), lumbre_demo::GameError>(())
 //! ```
 
+mod adaptation;
+#[cfg(feature = "window")]
+mod background_bake;
 mod clock;
 mod game;
 mod input;
 pub mod level;
 mod motion;
 mod moving;
+#[cfg(feature = "window")]
+mod opened;
+mod orbit_view;
 #[cfg(feature = "window")]
 mod picture;
 mod player;
@@ -44,11 +50,17 @@ pub mod walking;
 #[cfg(feature = "window")]
 mod window;
 
+pub use adaptation::Adaptation;
+#[cfg(feature = "window")]
+pub use background_bake::{BackgroundBake, BakeError, BakeNews, BakeStatus, BakedLight};
 pub use clock::{LONGEST_FRAME, STEP_SECONDS};
-pub use game::{Game, GameError, START_CAMERA};
+pub use game::{Game, GameError, START_CAMERA, Viewpoint};
 pub use input::{Action, Input};
 pub use motion::{Bob, Flicker, Motion, MotionError, Orbit, Path, Pose, Spin, Swing};
 pub use moving::{ExtrasError, GameTime, Rest, move_things, read_motions};
+#[cfg(feature = "window")]
+pub use opened::{Exposure, OpenOptions, Opened};
+pub use orbit_view::OrbitView;
 pub use player::Player;
 pub use recording::{Event, Playback, Recording, RecordingError, STEPS_PER_SECOND};
 pub use torch::{torch_light, torch_place};
@@ -57,4 +69,4 @@ pub use tour::{TOUR_CAMERA, Tour};
 pub use tour_frames::{tour, tour_of};
 pub use view_settings::ViewSettings;
 #[cfg(feature = "window")]
-pub use window::{PlayOptions, Trial, has_display, run, run_game};
+pub use window::{PlayOptions, Trial, has_display, run, run_opened};

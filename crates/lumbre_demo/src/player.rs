@@ -11,7 +11,7 @@ use crate::walking::{Body, Stature, TriangleTree, Wish, move_body};
 const STEEPEST_VIEW: f64 = 1.55;
 /// How quickly the eyes follow the feet up a step, 1/s.
 const EYE_FOLLOW: f64 = 12.0;
-/// Speed of flying as a multiple of walking.
+/// Speed of flying as a multiple of walking, where nothing says how large the scene is.
 const FLIGHT: f64 = 1.5;
 
 /// The player.
@@ -27,6 +27,8 @@ pub struct Player {
     pub eye_lag: f64,
     /// Through walls, without weight.
     pub flying: bool,
+    /// Speed of flying, m/s; running is as much faster as on foot.
+    pub flight_speed: f64,
     /// Size and speed.
     pub stature: Stature,
 }
@@ -40,7 +42,8 @@ impl Player {
         let flat = DVec2::new(-forward.x, -forward.z);
         let yaw = if flat.length() > 1e-6 { flat.x.atan2(flat.y) } else { 0.0 };
         let pitch = forward.y.clamp(-1.0, 1.0).asin().clamp(-STEEPEST_VIEW, STEEPEST_VIEW);
-        Self { body, yaw, pitch, eye_lag: 0.0, flying: false, stature }
+        let flight_speed = FLIGHT * stature.walk;
+        Self { body, yaw, pitch, eye_lag: 0.0, flying: false, flight_speed, stature }
     }
 
     /// Turns the view.
@@ -58,7 +61,8 @@ impl Player {
         let walk = input.walk();
         if self.flying {
             let ahead = self.view_rotation() * DVec3::new(walk.x, 0.0, -walk.y);
-            self.body.velocity = (ahead + DVec3::Y * input.climb()) * speed * FLIGHT;
+            self.body.velocity =
+                (ahead + DVec3::Y * input.climb()) * self.flight_speed * speed / self.stature.walk;
             self.body.feet += self.body.velocity * seconds;
             self.body.on_ground = false;
             return;

@@ -31,7 +31,7 @@ pub struct Recording {
 pub struct Event {
     /// The step before which it happens; there are [`STEPS_PER_SECOND`].
     pub step: u64,
-    /// Held until the next event; its `look` turns the view once.
+    /// Held until the next event; its `look`, `orbit`, `pan` and `zoom` move the view once.
     #[serde(default)]
     pub input: Input,
     /// Commands.
@@ -107,8 +107,8 @@ impl Recording {
     fn validate(&self) -> Result<(), RecordingError> {
         let fail = |index, problem| Err(RecordingError::Event { index, problem });
         for (index, event) in self.events.iter().enumerate() {
-            if !event.input.look.is_finite() {
-                return fail(index, "turns by a number that is not finite");
+            if !event.input.has_finite_gestures() {
+                return fail(index, "moves the mouse by a number that is not finite");
             }
             if index > 0 && event.step < self.events[index - 1].step {
                 return fail(index, "comes before the one above it; sort by step");
@@ -149,15 +149,17 @@ impl Iterator for Playback<'_> {
         if self.step >= self.recording.end {
             return None;
         }
-        let (mut look, mut actions) = (glam::DVec2::ZERO, Vec::new());
+        let (mut gestures, mut actions) = (Input::default(), Vec::new());
         while let Some(event) = self.recording.events.get(self.next).filter(|event| event.step <= self.step) {
-            look += event.input.look;
+            gestures.add_gestures(&event.input);
             actions.extend(&event.actions);
             self.held = event.input.held();
             self.next += 1;
         }
         self.step += 1;
-        Some((Input { look, ..self.held }, actions))
+        let mut input = self.held;
+        input.add_gestures(&gestures);
+        Some((input, actions))
     }
 }
 

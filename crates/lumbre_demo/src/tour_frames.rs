@@ -18,14 +18,20 @@ const BETWEEN: Duration = Duration::from_millis(200);
 /// # Errors
 /// The level cannot be loaded, there is no device, or a picture cannot be drawn or written.
 pub fn tour(level: &Path, out_dir: &Path, frames: u32, size: (u32, u32)) -> Result<Vec<PathBuf>> {
-    tour_of(Game::load(level)?, out_dir, frames, size)
+    tour_of(Game::load(level)?, out_dir, frames, size, None)
 }
 
-/// [`tour`] of a level that is loaded already.
+/// [`tour`] of a level that is loaded already, with an exposure instead of the camera's.
 ///
 /// # Errors
 /// There is no device, or a picture cannot be drawn or written.
-pub fn tour_of(mut game: Game, out_dir: &Path, frames: u32, size: (u32, u32)) -> Result<Vec<PathBuf>> {
+pub fn tour_of(
+    mut game: Game,
+    out_dir: &Path,
+    frames: u32,
+    size: (u32, u32),
+    exposure: Option<f32>,
+) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(out_dir)
         .with_context(|| format!("cannot make the folder {}", out_dir.display()))?;
     let bounds = game.level().bounds();
@@ -33,7 +39,7 @@ pub fn tour_of(mut game: Game, out_dir: &Path, frames: u32, size: (u32, u32)) ->
     let gpu = Gpu::headless()?;
     let mut renderer = Renderer::new(&gpu);
     let picture = Offscreen::new(&gpu, size.0, size.1, OffscreenFormat::Rgba8)?;
-    let options = FrameOptions { multisample: true, ..FrameOptions::default() };
+    let options = FrameOptions { multisample: true, exposure, ..FrameOptions::default() };
     let mut paths = Vec::new();
     for frame in 0..frames {
         let part = f64::from(frame) / f64::from(frames.saturating_sub(1).max(1));

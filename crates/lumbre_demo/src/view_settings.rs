@@ -37,7 +37,14 @@ impl ViewSettings {
             Action::ToggleLightmaps => self.lightmaps = !self.lightmaps,
             Action::ToggleMultisample => self.multisample = !self.multisample,
             Action::ToggleOverlay => self.overlay = !self.overlay,
-            Action::ToggleTorch | Action::ToggleFlight | Action::Quit => return false,
+            Action::ToggleTorch
+            | Action::ToggleFlight
+            | Action::OrbitEverything
+            | Action::NextCamera
+            | Action::ToggleAutoExposure
+            | Action::ToggleBake
+            | Action::SaveBake
+            | Action::Quit => return false,
         }
         true
     }

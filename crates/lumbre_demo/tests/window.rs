@@ -1,4 +1,5 @@
-//! The game in a window of a virtual X server: pictures with the overlay, a change of size, a lost device, recorded input.
+//! A level and other files in a window of a virtual X server: pictures with the overlay, a change of size, a lost device, recorded input,
+//! turning, files that are dropped, a bake beside the frames, an exposure that adapts.
 //!
 //! A window needs the main thread and an event loop of its own, so every scenario is a process: this program starts itself.
 
@@ -6,7 +7,13 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use lumbre_demo::{PlayOptions, Trial};
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_bake::{BakeOptions, Density};
+use lumbre_demo::{Action, PlayOptions, Trial};
+use lumbre_mesh::shapes::cuboid;
+use lumbre_optics::{Light, Material, Surface};
+use lumbre_scene::{Camera, DynamicObject, Mesh, Name, StaticObject, Transform, save};
 
 /// Says to a child process which scenario it is.
 const SCENARIO: &str = "LUMBRE_WINDOW_SCENARIO";
@@ -19,12 +26,22 @@ const SIZE: (u32, u32) = (640, 400);
 /// Looks at a scenario's picture.
 type Judge = fn(&Path);
 /// Every scenario by name, and how its picture is judged.
-const SCENARIOS: [(&str, Judge); 5] = [
+const SCENARIOS: [(&str, Judge); 15] = [
     ("overlay", picture_with_overlay),
     ("no overlay", picture_without_overlay),
     ("resize", picture_of_other_size),
     ("lost device", picture_with_overlay),
     ("recorded input", picture_with_overlay),
+    ("a file", picture_of_the_red_box),
+    ("turned", picture_of_the_green_side),
+    ("its camera", picture_from_its_camera),
+    ("dropped", picture_of_the_red_box),
+    ("dropped and broken", picture_of_the_red_box_and_an_error),
+    ("not baked", picture_without_baked_light),
+    ("baked", picture_with_baked_light),
+    ("bake cancelled", picture_without_baked_light),
+    ("bake of nothing that shines", picture_under_a_sky),
+    ("adapted", picture_with_an_exposure),
 ];
 
 fn main() {
@@ -70,7 +87,61 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
         size: SIZE,
         screenshot: Some(picture.to_owned()),
         quit_after: Some(10),
+        wait_for_work: true,
         ..PlayOptions::default()
+    };
+    options.open.bake = BakeOptions { density: Density::MapSize(32), error: 0.1, ..BakeOptions::default() };
+    let folder = tempfile::tempdir()?;
+    let file = |name: &str, write: fn(&Path)| {
+        let path = folder.path().join(name);
+        write(&path);
+        path
+    };
+    let hide = (0, Trial::Act(Action::ToggleOverlay));
+    let level = match scenario {
+        "a file" => {
+            options.trials = vec![hide];
+            file("box.glb", write_box)
+        }
+        "turned" => {
+            options.input = Some(here.join("tests/walks/turn.json"));
+            options.trials = vec![hide];
+            file("box.glb", write_box)
+        }
+        "its camera" => {
+            options.trials = vec![hide, (1, Trial::Act(Action::NextCamera))];
+            file("box.glb", write_box)
+        }
+        "dropped" => {
+            options.trials = vec![hide, (2, Trial::Drop(file("box.glb", write_box)))];
+            file("room.glb", write_room)
+        }
+        "dropped and broken" => {
+            let broken = file("broken.glb", |path| std::fs::write(path, "glTF?").expect("there is room"));
+            options.trials = vec![hide, (2, Trial::Drop(broken))];
+            file("box.glb", write_box)
+        }
+        "not baked" => {
+            options.trials = vec![hide];
+            file("room.glb", write_room)
+        }
+        "baked" => {
+            options.trials = vec![hide, (2, Trial::Act(Action::ToggleBake))];
+            file("room.glb", write_room)
+        }
+        "bake cancelled" => {
+            options.trials = vec![hide, (2, Trial::Act(Action::ToggleBake)), (3, Trial::Escape)];
+            file("room.glb", write_room)
+        }
+        "bake of nothing that shines" => {
+            options.trials = vec![hide, (2, Trial::Act(Action::ToggleBake))];
+            file("box.glb", write_box)
+        }
+        "adapted" => {
+            options.trials = vec![hide];
+            file("bright.gltf", write_bright)
+        }
+        _ => level,
     };
     match scenario {
         "no overlay" => options.input = Some(here.join("tests/walks/no_overlay.json")),
@@ -83,6 +154,61 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
         _ => {}
     }
     lumbre_demo::run(&level, options)
+}
+
+/// A box whose front is red and whose right side is green, without a light, and a camera that sees it from far above.
+fn write_box(path: &Path) {
+    let mut world = World::new();
+    let matt = |color| Material { double_sided: false, ..Material::matt(color) };
+    let part = |size: Vec3| (Mesh(cuboid(size, 1).into()), StaticObject);
+    let red = matt(Vec3::new(0.8, 0.02, 0.02));
+    world.spawn((Name::new("red"), part(Vec3::new(2.0, 2.0, 1.9)), red));
+    let green = (part(Vec3::new(0.1, 1.9, 1.8)), matt(Vec3::new(0.02, 0.8, 0.02)));
+    world.spawn((Name::new("green"), green, Transform::from_xyz(1.0, 0.0, 0.0)));
+    let above = Transform::from_xyz(0.0, 30.0, 0.1).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("above"), Camera::default(), above));
+    save(&mut world, path).expect("the folder takes it");
+}
+
+/// A room with an open front, lit by a panel that shines in a bake only, and one thing in it that moves.
+fn write_room(path: &Path) {
+    let mut world = World::new();
+    let grey = || Material { double_sided: true, ..Material::matt(Vec3::splat(0.6)) };
+    let wall = |size: Vec3| (Mesh(cuboid(size, 1).into()), grey(), StaticObject);
+    for (name, size, place) in [
+        ("floor", Vec3::new(4.0, 0.2, 4.0), (0.0, -0.1, 0.0)),
+        ("ceiling", Vec3::new(4.0, 0.2, 4.0), (0.0, 3.1, 0.0)),
+        ("back", Vec3::new(4.0, 3.0, 0.2), (0.0, 1.5, -2.1)),
+        ("left", Vec3::new(0.2, 3.0, 4.0), (-2.1, 1.5, 0.0)),
+        ("right", Vec3::new(0.2, 3.0, 4.0), (2.1, 1.5, 0.0)),
+    ] {
+        world.spawn((Name::new(name), wall(size), Transform::from_xyz(place.0, place.1, place.2)));
+    }
+    let glow = Surface { emission: Vec3::new(6.0, 5.0, 4.0), ..Surface::default() };
+    let panel = (Mesh(cuboid(Vec3::new(1.0, 0.05, 1.0), 1).into()), StaticObject);
+    let panel = (panel, Material { front: glow, ..Material::default() }, Transform::from_xyz(0.0, 2.9, 0.0));
+    world.spawn((Name::new("panel"), panel));
+    let ball = (Mesh(cuboid(Vec3::splat(0.4), 1).into()), grey(), DynamicObject);
+    world.spawn((Name::new("moves"), ball, Transform::from_xyz(1.2, 0.4, 0.5)));
+    // So weak that a frame is all but black, and no light from the camera stands in.
+    let weak = Light { bake: lumbre_optics::BakeMode::Dynamic, ..Light::point(Vec3::splat(1e-3)) };
+    world.spawn((Name::new("weak"), weak, Transform::from_xyz(0.0, 1.5, 1.0)));
+    save(&mut world, path).expect("the folder takes it");
+}
+
+/// A white floor under a sun in lux: as it stands, all white.
+fn write_bright(path: &Path) {
+    let mut world = World::new();
+    let floor = (Mesh(cuboid(Vec3::new(4.0, 4.0, 0.1), 1).into()), Material::matt(Vec3::splat(0.5)));
+    world.spawn((Name::new("wall"), floor, StaticObject));
+    world.spawn((Name::new("sun"), Light::directional(Vec3::ONE), Transform::IDENTITY));
+    save(&mut world, path).expect("the folder takes it");
+    let text = std::fs::read_to_string(path).expect("a .gltf is text");
+    let mut json: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
+    // As other programs write it: lux, and nothing of ours.
+    json["extensions"]["KHR_lights_punctual"]["lights"][0] =
+        serde_json::json!({"type": "directional", "intensity": 50_000.0});
+    std::fs::write(path, json.to_string()).expect("the folder takes it");
 }
 
 fn open(path: &Path) -> image::RgbImage {
@@ -123,6 +249,84 @@ fn picture_without_overlay(path: &Path) {
 fn picture_of_other_size(path: &Path) {
     let picture = open(path);
     assert_eq!(picture.dimensions(), (420, 300));
+}
+
+/// Mean colour of the middle of a picture, 0 to 255.
+fn middle(path: &Path) -> [f64; 3] {
+    let picture = open(path);
+    assert_eq!(picture.dimensions(), SIZE);
+    let pixels: Vec<_> = picture
+        .enumerate_pixels()
+        .filter(|(x, y, _)| x.abs_diff(SIZE.0 / 2) < 30 && y.abs_diff(SIZE.1 / 2) < 30)
+        .map(|(_, _, p)| p.0)
+        .collect();
+    [0, 1, 2].map(|c| pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / pixels.len() as f64)
+}
+
+/// The share of pixels that show something.
+fn shown(path: &Path) -> f64 {
+    let picture = open(path);
+    let lit = picture.pixels().filter(|p| p.0.iter().any(|&c| c > 12)).count();
+    lit as f64 / f64::from(SIZE.0 * SIZE.1)
+}
+
+/// It has no light, so that one from the camera shows it; it fills the window's height.
+fn picture_of_the_red_box(path: &Path) {
+    let [red, green, _] = middle(path);
+    assert!(red > 100.0 && green < 0.4 * red, "{red} {green}");
+    let part = shown(path);
+    assert!((0.3..0.7).contains(&part), "{part} of the window shows it");
+}
+
+fn picture_of_the_green_side(path: &Path) {
+    let [red, green, _] = middle(path);
+    assert!(green > 100.0 && red < 0.4 * green, "{red} {green}");
+}
+
+fn picture_from_its_camera(path: &Path) {
+    let [red, green, _] = middle(path);
+    assert!(red > 30.0 && green < red, "{red} {green}");
+    let part = shown(path);
+    assert!(part > 1e-3 && part < 0.05, "{part} of the window shows it");
+}
+
+/// The old file stands, and the reason is written over the foot of the window.
+fn picture_of_the_red_box_and_an_error(path: &Path) {
+    let [red, green, _] = middle(path);
+    assert!(red > 100.0 && green < 0.4 * red, "{red} {green}");
+    let picture = open(path);
+    let foot = picture.enumerate_pixels().filter(|(_, y, _)| *y > SIZE.1 - 80);
+    // The colour of errors, where letters are covered by it in full.
+    let letters =
+        foot.filter(|(_, _, p)| p.0[0] > 200 && p.0[1].abs_diff(p.0[2]) < 40 && p.0[1] > 80).count();
+    assert!(letters > 100, "{letters} texels of letters");
+}
+
+fn picture_without_baked_light(path: &Path) {
+    let picture = middle(path);
+    assert!(picture.iter().all(|&channel| channel < 20.0), "{picture:?}");
+}
+
+fn picture_with_baked_light(path: &Path) {
+    let picture = middle(path);
+    assert!(picture.iter().all(|&channel| channel > 60.0), "{picture:?}");
+    assert!(picture[0] > picture[2] + 5.0, "the panel is warm: {picture:?}");
+}
+
+/// Red under white, by its own lightmap and no longer by lights at the camera: evenly.
+fn picture_under_a_sky(path: &Path) {
+    let [red, green, blue] = middle(path);
+    assert!(red > 100.0 && green < 0.4 * red && blue < 0.4 * red, "{red} {green} {blue}");
+    let picture = open(path);
+    let at = |x: u32| f64::from(picture.get_pixel(x, SIZE.1 / 2).0[0]);
+    let (left, right) = (at(SIZE.0 / 2 - 40), at(SIZE.0 / 2 + 40));
+    assert!((left - right).abs() < 4.0, "{left} and {right}: no light comes from the left any more");
+}
+
+/// A middle grey, tone curve and all.
+fn picture_with_an_exposure(path: &Path) {
+    let picture = middle(path);
+    assert!(picture.iter().all(|&channel| (90.0..150.0).contains(&channel)), "{picture:?}");
 }
 
 /// A virtual X server that ends with this value.

@@ -62,7 +62,7 @@ pub use error::RenderError;
 pub use explain::{SceneExplanation, explain};
 pub use frame_report::{CpuStages, FrameReport, LightListing, Statistics};
 pub use gpu::Gpu;
-pub use metering::{Metering, meter};
+pub use metering::{LightMeter, Metering, meter};
 pub use offscreen::{Offscreen, OffscreenFormat};
 pub use options::{Display, FrameOptions, LightLists, Measure};
 pub use renderer::Renderer;

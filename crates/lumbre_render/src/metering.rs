@@ -3,7 +3,7 @@
 use bevy_ecs::world::World;
 use glam::Vec4;
 
-use crate::{Display, FrameOptions, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer};
+use crate::{Display, FrameOptions, Gpu, Measure, Offscreen, OffscreenFormat, RenderError, Renderer};
 
 /// What the log-average luminance becomes: the middle grey of photography.
 const MIDDLE_GREY: f64 = 0.18;
@@ -47,7 +47,47 @@ impl Metering {
     }
 }
 
-/// Meters the frame that the options describe, drawn small, of a width by height of `aspect`. The same World gives the same exposure.
+/// Meters frames again and again, with the renderer that draws them: a small picture of its own beside them.
+#[derive(Debug)]
+pub struct LightMeter {
+    target: Offscreen,
+}
+
+impl LightMeter {
+    /// A meter for frames of a width by height of `aspect`, by a picture of at most `width` texels a row.
+    ///
+    /// # Errors
+    /// [`RenderError::TargetTooLarge`].
+    pub fn new(gpu: &Gpu, width: u32, aspect: f64) -> Result<Self, RenderError> {
+        let height = (f64::from(width) / aspect).round().clamp(1.0, 4096.0) as u32;
+        Ok(Self { target: Offscreen::new(gpu, width, height, OffscreenFormat::LinearFloat)? })
+    }
+
+    /// Meters the frame that the options describe. The same World gives the same exposure.
+    ///
+    /// # Errors
+    /// [`RenderError`], as drawing a frame has it.
+    pub fn measure(
+        &self,
+        gpu: &Gpu,
+        renderer: &mut Renderer,
+        world: &mut World,
+        options: &FrameOptions,
+    ) -> Result<Option<Metering>, RenderError> {
+        let linear = FrameOptions {
+            display: Display::Linear,
+            exposure: Some(1.0),
+            full_precision: true,
+            multisample: false,
+            measure: Measure::Nothing,
+            ..options.clone()
+        };
+        renderer.render(world, &self.target.target(), &linear)?;
+        Ok(Metering::of(&self.target.read_linear(gpu)?))
+    }
+}
+
+/// Meters one frame that the options describe, drawn small, of a width by height of `aspect`. The same World gives the same exposure.
 ///
 /// # Errors
 /// [`RenderError`], as drawing a frame has it.
@@ -57,17 +97,7 @@ pub fn meter(
     options: &FrameOptions,
     aspect: f64,
 ) -> Result<Option<Metering>, RenderError> {
-    let height = (f64::from(WIDTH) / aspect).round().clamp(1.0, 4096.0) as u32;
-    let target = Offscreen::new(gpu, WIDTH, height, OffscreenFormat::LinearFloat)?;
-    let linear = FrameOptions {
-        display: Display::Linear,
-        exposure: Some(1.0),
-        full_precision: true,
-        multisample: false,
-        ..options.clone()
-    };
-    Renderer::new(gpu).render(world, &target.target(), &linear)?;
-    Ok(Metering::of(&target.read_linear(gpu)?))
+    LightMeter::new(gpu, WIDTH, aspect)?.measure(gpu, &mut Renderer::new(gpu), world, options)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The application: winit's events on one side, the game and the stage on the other.
+//! The application: winit's events on one side, the file that is viewed and the stage on the other.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,13 +14,14 @@ use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
 
 use super::keys;
-use super::mouse::Grab;
-use super::overlay::{Facts, Overlay};
+use super::mouse::{Drag, Grab};
+use super::overlay::{Facts, FileFacts, Overlay};
 use super::stage::{OverlayFrame, Shown, Stage};
+use super::viewing::Viewing;
 use super::{PlayOptions, Trial};
 use crate::picture::write_png;
 use crate::recording::STEPS_PER_SECOND;
-use crate::{Action, Game, Input, Recording};
+use crate::{Action, Input, Opened, Recording, Viewpoint};
 
 /// Devices that may be lost before the first frame of the next one is shown.
 const MOST_LOSSES: u32 = 3;
@@ -29,9 +30,9 @@ const IDLE: Duration = Duration::from_millis(50);
 /// Steps of a recording that are played per frame: 60 frames per second of game time.
 const STEPS_PER_FRAME: u32 = STEPS_PER_SECOND / 60;
 
-/// A game in a window.
+/// A file in a window.
 pub struct App {
-    game: Game,
+    viewing: Viewing,
     options: PlayOptions,
     replay: Option<std::vec::IntoIter<(Input, Vec<Action>)>>,
     window: Option<Arc<Window>>,
@@ -41,6 +42,9 @@ pub struct App {
     report: Option<Box<FrameReport>>,
     input: Input,
     grab: Grab,
+    drag: Drag,
+    /// A file that is held over the window.
+    hovered: bool,
     last: Option<Instant>,
     frames: u64,
     losses: u32,
@@ -49,11 +53,11 @@ pub struct App {
 }
 
 impl App {
-    /// A game that will have a window once the event loop runs.
-    pub fn new(game: Game, options: PlayOptions, replay: Option<&Recording>) -> Self {
+    /// A file that will have a window once the event loop runs.
+    pub fn new(opened: Opened, options: PlayOptions, replay: Option<&Recording>) -> Self {
         let replay = replay.map(|recording| recording.player().collect::<Vec<_>>().into_iter());
         Self {
-            game,
+            viewing: Viewing::new(opened, options.open.clone()),
             options,
             replay,
             window: None,
@@ -63,6 +67,8 @@ impl App {
             report: None,
             input: Input::default(),
             grab: Grab::default(),
+            drag: Drag::default(),
+            hovered: false,
             last: None,
             frames: 0,
             losses: 0,
@@ -72,13 +78,13 @@ impl App {
 
     /// The recording of what was played, if one was asked for.
     pub fn take_recording(&mut self) -> Option<Recording> {
-        self.game.take_recording()
+        self.viewing.opened.game.take_recording()
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
         let (width, height) = self.options.size;
         let attributes = Window::default_attributes()
-            .with_title(self.options.title.clone())
+            .with_title(self.title())
             .with_inner_size(LogicalSize::new(width.max(1), height.max(1)));
         let window = Arc::new(event_loop.create_window(attributes).context("no window could be opened")?);
         self.window = Some(window);
@@ -89,9 +95,25 @@ impl App {
             .is_some_and(|stage| stage.gpu().adapter.get_info().device_type == wgpu::DeviceType::Cpu);
         if software {
             // Four samples cost a software rasterizer dearly; M turns them on.
-            self.game.view.multisample = false;
+            self.viewing.opened.game.view.multisample = false;
+        }
+        self.follow_size();
+        if !self.viewing.opened.game.has_a_start() {
+            // Framed again, now that the window's shape is known.
+            self.viewing.opened.game.orbit_everything();
         }
         Ok(())
+    }
+
+    fn title(&self) -> String {
+        format!("Lumbre: {}", self.viewing.opened.path.file_name().unwrap_or_default().to_string_lossy())
+    }
+
+    /// Tells the game how wide the picture is for its height.
+    fn follow_size(&mut self) {
+        if let Some((width, height)) = self.stage.as_ref().map(Stage::size) {
+            self.viewing.opened.game.set_aspect(f64::from(width) / f64::from(height));
+        }
     }
 
     /// A new device for the window, and a new overlay context, whose fonts have to be uploaded to it.
@@ -122,20 +144,37 @@ impl App {
         if !passed.is_zero() {
             self.overlay.note_frame(passed.as_secs_f32() * 1000.0);
         }
+        if self.viewing.update(passed) {
+            self.show_new_file();
+        }
         let Some(replay) = &mut self.replay else {
-            self.game.step(passed, &self.input);
+            self.viewing.opened.game.step(passed, &self.input);
             self.input = self.input.held();
             return;
         };
         for _ in 0..STEPS_PER_FRAME {
             let Some((input, actions)) = replay.next() else { break };
-            actions.into_iter().for_each(|action| self.game.apply(action));
-            self.game.step_once(&input);
+            actions.into_iter().for_each(|action| self.viewing.apply(action));
+            self.viewing.opened.game.step_once(&input);
+        }
+    }
+
+    /// Another file has taken the place of the old one.
+    fn show_new_file(&mut self) {
+        self.release();
+        self.input = Input::default();
+        self.report = None;
+        self.follow_size();
+        if !self.viewing.opened.game.has_a_start() {
+            self.viewing.opened.game.orbit_everything();
+        }
+        if let Some(window) = &self.window {
+            window.set_title(&self.title());
         }
     }
 
     fn frame_options(&self) -> FrameOptions {
-        let view = &self.game.view;
+        let view = &self.viewing.opened.game.view;
         FrameOptions {
             shading: view.shading,
             reflection: view.reflection,
@@ -148,7 +187,11 @@ impl App {
 
     fn draw(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
         self.advance();
-        let options = self.frame_options();
+        let mut options = self.frame_options();
+        if let Some(stage) = &mut self.stage {
+            self.viewing.measure(stage, &options)?;
+        }
+        options.exposure = self.viewing.exposure();
         let facts = self.facts();
         let (Some(window), Some(egui), Some(stage)) = (&self.window, &mut self.egui, &mut self.stage) else {
             return Ok(());
@@ -162,7 +205,7 @@ impl App {
         let scale = output.pixels_per_point;
         let triangles = self.overlay.context.tessellate(output.shapes, scale);
         let frame = OverlayFrame { triangles, textures: output.textures_delta, scale };
-        match stage.show(&mut self.game.world, &options, frame)? {
+        match stage.show(&mut self.viewing.opened.game.world, &options, frame)? {
             Shown::Frame(report) => {
                 self.report = Some(report);
                 self.losses = 0;
@@ -191,11 +234,13 @@ impl App {
         self.undergo_trials();
         let played = self.replay.as_ref().is_some_and(|replay| replay.len() == 0);
         let counted = self.options.quit_after.is_some_and(|after| self.frames >= u64::from(after));
-        if !(counted || (played && self.options.quit_after.is_none()) || self.game.wants_to_quit()) {
+        let is_over = counted || (played && self.options.quit_after.is_none());
+        let waits = self.options.wait_for_work && !self.viewing.is_at_rest();
+        if !(is_over && !waits || self.viewing.opened.game.wants_to_quit()) {
             return Ok(());
         }
         if let (Some(path), Some(stage)) = (self.options.screenshot.take(), &mut self.stage) {
-            let (width, height, rgba) = stage.picture(&mut self.game.world, options)?;
+            let (width, height, rgba) = stage.picture(&mut self.viewing.opened.game.world, options)?;
             write_png(&path, width, height, &rgba)?;
         }
         event_loop.exit();
@@ -219,21 +264,41 @@ impl App {
                         stage.resize(size.width, size.height);
                     }
                 }
+                (Trial::Drop(path), _, _) => self.viewing.open(&path),
+                (Trial::Act(action), _, _) => self.viewing.apply(action),
+                (Trial::Escape, _, _) => self.escape(),
                 _ => {}
             }
         }
     }
 
     fn facts(&self) -> Facts {
-        let lit = self.game.world.get::<Light>(self.game.torch()).is_some_and(|light| light.enabled);
+        let game = &self.viewing.opened.game;
+        let lit = game.world.get::<Light>(game.torch()).is_some_and(|light| light.enabled);
+        let opened = &self.viewing.opened;
         Facts {
             device: self.stage.as_ref().map(|stage| stage.gpu().describe()).unwrap_or_default(),
             size: self.stage.as_ref().map(Stage::size).unwrap_or_default(),
-            view: self.game.view,
+            view: game.view,
             torch: lit,
-            flying: self.game.player().flying,
+            is_player: *game.viewpoint() == Viewpoint::Player,
+            flying: game.player().flying,
             grabbed: self.grab.is_held(),
-            feet: self.game.player().body.feet,
+            feet: game.player().body.feet,
+            is_level: game.has_a_start(),
+            exposure: self.viewing.exposure(),
+            adapts: self.viewing.adapts(),
+            file: FileFacts {
+                name: opened.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+                notes: opened.notes.clone(),
+                viewpoint: self.viewing.viewpoint(),
+                cameras: game.cameras().iter().map(|(_, name)| name.clone()).collect(),
+                hovered: self.hovered,
+                message: self.viewing.message().cloned(),
+                bake: self.viewing.bake_status().cloned(),
+                light: self.viewing.light(),
+                can_save: self.viewing.can_save(),
+            },
         }
     }
 
@@ -245,9 +310,30 @@ impl App {
             return;
         }
         match keys::action(key) {
-            Some(action) => self.game.apply(action),
-            None if key == KeyCode::Escape => self.release(),
+            Some(action) => self.viewing.apply(action),
+            None if key == KeyCode::Escape => self.escape(),
             None => {}
+        }
+    }
+
+    /// Frees the mouse, or ends the bake that runs.
+    fn escape(&mut self) {
+        if self.grab.is_held() {
+            self.release();
+        } else {
+            self.viewing.cancel();
+        }
+    }
+
+    /// A button goes down over the picture: who walks looks around from now on, who looks on drags.
+    fn press(&mut self, button: MouseButton) {
+        let walks = *self.viewing.opened.game.viewpoint() == Viewpoint::Player;
+        match &self.window {
+            Some(window) if walks && button == MouseButton::Left && !self.grab.is_held() => {
+                self.grab = Grab::take(window);
+            }
+            _ if !walks => self.drag.press(button),
+            _ => {}
         }
     }
 
@@ -291,22 +377,41 @@ impl ApplicationHandler for App {
                 if let Some(stage) = &mut self.stage {
                     stage.resize(size.width, size.height);
                 }
+                self.follow_size();
             }
             WindowEvent::Focused(false) => {
                 // Keys that are released elsewhere are not heard of.
                 self.input = Input::default();
+                self.drag = Drag::default();
                 self.release();
             }
             // A recording plays undisturbed; Q still quits.
             WindowEvent::KeyboardInput { event, .. } if self.replay.is_none() || is_quit(&event) => {
                 self.key(&event)
             }
-            WindowEvent::MouseInput { state: ElementState::Pressed, button: MouseButton::Left, .. }
+            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. }
                 if !consumed && self.replay.is_none() =>
             {
-                if let (false, Some(window)) = (self.grab.is_held(), &self.window) {
-                    self.grab = Grab::take(window);
+                self.press(button);
+            }
+            WindowEvent::MouseInput { state: ElementState::Released, button, .. } => {
+                self.drag.release(button);
+            }
+            WindowEvent::CursorMoved { position, .. } if self.replay.is_none() => {
+                let height = self.stage.as_ref().map_or(1, |stage| stage.size().1);
+                let dragged = self.drag.motion((position.x, position.y), height);
+                if !self.grab.is_held() {
+                    self.input.add_gestures(&dragged);
                 }
+            }
+            WindowEvent::MouseWheel { delta, .. } if !consumed && self.replay.is_none() => {
+                self.input.add_gestures(&Drag::wheel(delta));
+            }
+            WindowEvent::HoveredFile(_) => self.hovered = true,
+            WindowEvent::HoveredFileCancelled => self.hovered = false,
+            WindowEvent::DroppedFile(path) => {
+                self.hovered = false;
+                self.viewing.open(&path);
             }
             WindowEvent::RedrawRequested => {
                 let drawn = self.draw(event_loop);

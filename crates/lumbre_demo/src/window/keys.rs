@@ -16,6 +16,11 @@ pub fn action(key: KeyCode) -> Option<Action> {
         KeyCode::KeyM => Action::ToggleMultisample,
         KeyCode::KeyT => Action::ToggleTorch,
         KeyCode::KeyF => Action::ToggleFlight,
+        KeyCode::KeyO | KeyCode::Home => Action::OrbitEverything,
+        KeyCode::KeyV => Action::NextCamera,
+        KeyCode::KeyE => Action::ToggleAutoExposure,
+        KeyCode::KeyB => Action::ToggleBake,
+        KeyCode::KeyK => Action::SaveBake,
         KeyCode::F1 | KeyCode::Tab => Action::ToggleOverlay,
         KeyCode::KeyQ => Action::Quit,
         _ => return None,
@@ -57,6 +62,7 @@ mod tests {
     fn commands_have_keys() {
         assert_eq!(action(KeyCode::Digit2), Some(Action::ShadeGouraud));
         assert_eq!(action(KeyCode::Tab), Some(Action::ToggleOverlay));
+        assert_eq!(action(KeyCode::KeyB), Some(Action::ToggleBake));
         assert_eq!(action(KeyCode::KeyW), None);
     }
 }

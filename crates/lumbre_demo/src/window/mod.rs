@@ -1,26 +1,28 @@
-//! The game in a window: events in, frames out. Not its rules: those know no window.
+//! A level or any other glTF file in a window: events in, frames out. Not the rules of the game: those know no window.
 
 mod app;
 mod keys;
 mod mouse;
 mod overlay;
+mod overlay_file;
 mod overlay_painter;
 mod stage;
+mod viewing;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use winit::event_loop::EventLoop;
 
-use crate::{Game, Recording};
+use crate::{Action, OpenOptions, Opened, Recording};
 
 /// How a level is played.
 #[derive(Clone, Debug)]
 pub struct PlayOptions {
     /// Width and height of the window in points.
     pub size: (u32, u32),
-    /// The window's title.
-    pub title: String,
+    /// How the file, and those that are dropped on the window, are opened.
+    pub open: OpenOptions,
     /// Plays this recording instead of listening to the keyboard; the window closes at its end.
     pub input: Option<PathBuf>,
     /// Records what is played to this file.
@@ -29,12 +31,14 @@ pub struct PlayOptions {
     pub screenshot: Option<PathBuf>,
     /// Closes the window after so many frames.
     pub quit_after: Option<u32>,
+    /// Closes it only when nothing is being opened, baked or written any more.
+    pub wait_for_work: bool,
     /// What befalls the window after so many frames, to see whether the game survives it.
     pub trials: Vec<(u64, Trial)>,
 }
 
-/// A mishap, for tests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A mishap, or what a hand would do, for tests.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trial {
     /// The device is destroyed, as if the driver had reset it.
     LoseDevice,
@@ -42,17 +46,24 @@ pub enum Trial {
     Resize(u32, u32),
     /// The surface has no size for a frame, as a minimised window's on some systems.
     Vanish,
+    /// A file is dropped on it.
+    Drop(PathBuf),
+    /// The key of a command is pressed.
+    Act(Action),
+    /// The key Esc is pressed.
+    Escape,
 }
 
 impl Default for PlayOptions {
     fn default() -> Self {
         Self {
             size: (1280, 720),
-            title: "Lumbre".to_owned(),
+            open: OpenOptions::default(),
             input: None,
             record: None,
             screenshot: None,
             quit_after: None,
+            wait_for_work: false,
             trials: Vec::new(),
         }
     }
@@ -68,27 +79,27 @@ pub fn has_display() -> bool {
         || set("DISPLAY")
 }
 
-/// Plays a level in a window until the player quits.
+/// Plays a level, or shows any other glTF file, in a window until it is closed.
 ///
 /// # Errors
-/// The level or the recording cannot be loaded, there is no display or no device, or drawing fails; the message says what to do.
-pub fn run(level: &Path, options: PlayOptions) -> Result<()> {
-    run_game(Game::load(level)?, options)
+/// The file or the recording cannot be loaded, there is no display or no device, or drawing fails; the message says what to do.
+pub fn run(file: &Path, options: PlayOptions) -> Result<()> {
+    run_opened(Opened::open(file, &options.open)?, options)
 }
 
-/// [`run`] of a level that is loaded already.
+/// [`run`] of a file that is open already.
 ///
 /// # Errors
-/// As [`run`], the level aside.
-pub fn run_game(mut game: Game, options: PlayOptions) -> Result<()> {
+/// As [`run`], the file aside.
+pub fn run_opened(mut opened: Opened, options: PlayOptions) -> Result<()> {
     let recording = options.input.as_deref().map(Recording::load).transpose()?;
     if options.record.is_some() {
-        game.record();
+        opened.game.record();
     }
     let event_loop =
         EventLoop::new().context("no display: set DISPLAY or WAYLAND_DISPLAY, or render without a window")?;
     let record = options.record.clone();
-    let mut app = app::App::new(game, options, recording.as_ref());
+    let mut app = app::App::new(opened, options, recording.as_ref());
     event_loop.run_app(&mut app)?;
     if let (Some(path), Some(recording)) = (record, app.take_recording()) {
         recording.save(&path)?;

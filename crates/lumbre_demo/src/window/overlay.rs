@@ -1,4 +1,5 @@
-//! What the overlay says: frame times, passes, counts, choices. Not how it is painted: that is `overlay_painter`.
+//! What the overlay says: frame times, passes, counts, choices. Not what it says of the file (that is `overlay_file`), nor how it is painted
+//! (`overlay_painter`).
 
 use std::collections::VecDeque;
 
@@ -6,15 +7,15 @@ use egui::{Color32, RichText, Sense, Stroke, Ui, pos2, vec2};
 use lumbre_graph::{GpuTime, PassExplanation, PassReport};
 use lumbre_render::FrameReport;
 
+use super::overlay_file;
+pub use super::overlay_file::FileFacts;
+use super::overlay_file::{DIM, GOOD, WARM};
 use crate::ViewSettings;
 
 /// Frames in the graph: two seconds at 60 per second.
 const GRAPH_FRAMES: usize = 120;
 /// Size of the graph in points.
 const GRAPH_SIZE: egui::Vec2 = vec2(330.0, 56.0);
-const DIM: Color32 = Color32::from_gray(150);
-const GOOD: Color32 = Color32::from_rgb(140, 210, 120);
-const WARM: Color32 = Color32::from_rgb(235, 180, 90);
 
 /// What the overlay is about, beside the frame itself.
 #[derive(Clone, Debug, Default)]
@@ -27,12 +28,22 @@ pub struct Facts {
     pub view: ViewSettings,
     /// Whether the torch is lit.
     pub torch: bool,
+    /// Whether the picture is what the player sees.
+    pub is_player: bool,
     /// Whether the player flies.
     pub flying: bool,
     /// Whether the mouse turns the view.
     pub grabbed: bool,
     /// The player's feet, metres.
     pub feet: glam::DVec3,
+    /// Whether it is a level to walk through, and not a file to look at.
+    pub is_level: bool,
+    /// Factor on radiance, if it is not the camera's.
+    pub exposure: Option<f32>,
+    /// Whether the exposure adapts.
+    pub adapts: bool,
+    /// The file.
+    pub file: FileFacts,
 }
 
 /// The overlay and what it remembers.
@@ -66,6 +77,7 @@ impl Overlay {
         report: Option<&FrameReport>,
     ) -> egui::FullOutput {
         self.context.run_ui(input, |root| {
+            overlay_file::status(root, &facts.file);
             if !facts.view.overlay {
                 return;
             }
@@ -80,6 +92,8 @@ impl Overlay {
     }
 
     fn contents(&self, ui: &mut Ui, facts: &Facts, report: Option<&FrameReport>) {
+        overlay_file::about(ui, &facts.file);
+        ui.separator();
         let mean = self.frame_ms.iter().sum::<f32>() / self.frame_ms.len().max(1) as f32;
         let worst = self.frame_ms.iter().copied().fold(0.0, f32::max);
         let rate = if mean > 0.0 { 1000.0 / mean } else { 0.0 };
@@ -93,10 +107,12 @@ impl Overlay {
                 .small(),
         );
         if let Some(report) = report {
-            ui.separator();
-            passes(ui, report);
-            ui.separator();
-            counts(ui, report);
+            let heading = egui::CollapsingHeader::new("what a frame does and costs");
+            heading.default_open(facts.is_level).show(ui, |ui| {
+                passes(ui, report);
+                ui.separator();
+                counts(ui, report);
+            });
         }
         ui.separator();
         choices(ui, facts);
@@ -185,17 +201,28 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
 /// What can be changed, with its key.
 fn choices(ui: &mut Ui, facts: &Facts) {
     let view = &facts.view;
-    let shading = view.shading.map_or("as the level asks", |shading| shading.name());
-    let reflection = view.reflection.map_or("as the level asks", |model| model.name());
+    let shading = view.shading.map_or("as the file asks", |shading| shading.name());
+    let reflection = view.reflection.map_or("as the file asks", |model| model.name());
     let switch = |on: bool| if on { "on" } else { "off" };
+    let exposure = match (facts.exposure, facts.adapts) {
+        (Some(factor), true) => format!("{factor:.3e} ({:.1} EV), adapts", exposure_value(factor)),
+        (Some(factor), false) => format!("{factor:.3e}"),
+        (None, _) => "the camera's".to_owned(),
+    };
+    let bake = if facts.file.bake.is_some() { "runs; again or Esc cancels" } else { "in the background" };
     egui::Grid::new("choices").num_columns(3).spacing([10.0, 2.0]).show(ui, |ui| {
         for (key, what, state) in [
+            ("O, Home", "show everything", facts.file.viewpoint.as_str()),
+            ("V", "next camera", if facts.file.cameras.is_empty() { "the file has none" } else { "" }),
+            ("B", "bake", bake),
+            ("K", "keep the bake", if facts.file.can_save { "ready" } else { "when it is done" }),
+            ("E", "exposure", &exposure),
             ("1 2 3, G", "shading", shading),
             ("R", "reflection", reflection),
             ("L", "lightmaps", switch(view.lightmaps)),
             ("M", "multisampling", switch(view.multisample)),
             ("T", "torch", switch(facts.torch)),
-            ("F", "flight", switch(facts.flying)),
+            ("F", "flight", if facts.is_player { switch(facts.flying) } else { "" }),
             ("Tab, F1", "this overlay", "on"),
         ] {
             ui.label(RichText::new(key).color(WARM));
@@ -204,11 +231,24 @@ fn choices(ui: &mut Ui, facts: &Facts) {
             ui.end_row();
         }
     });
-    let feet = facts.feet;
-    let hint = if facts.grabbed { "Esc frees the mouse" } else { "click to look around" };
-    let keys = format!("{hint}; W A S D walk, Shift runs, Space jumps, Q quits");
+    let keys = match (facts.is_player, facts.grabbed) {
+        (true, true) => "Esc frees the mouse; W A S D walk, Shift runs, Space jumps, Q quits",
+        (true, false) => "click to look around; W A S D walk, Shift runs, Space jumps, Q quits",
+        (false, _) => {
+            "drag: left turns, right or middle shifts, the wheel zooms; W A S D set out; drop a file to open it; Q quits"
+        }
+    };
     ui.label(RichText::new(keys).color(DIM).small());
-    ui.label(RichText::new(format!("at {:.1}, {:.1}, {:.1} m", feet.x, feet.y, feet.z)).color(DIM).small());
+    if facts.is_player {
+        let feet = facts.feet;
+        let place = format!("at {:.1}, {:.1}, {:.1} m", feet.x, feet.y, feet.z);
+        ui.label(RichText::new(place).color(DIM).small());
+    }
+}
+
+/// The exposure value at ISO 100 of a factor on radiance.
+fn exposure_value(factor: f32) -> f64 {
+    -(1.2 * f64::from(factor)).log2()
 }
 
 #[cfg(test)]
@@ -253,10 +293,55 @@ mod tests {
         facts.torch = true;
         let text = texts(&overlay, &facts);
         for wanted in
-            ["20.00 ms  (50 per second", "a test device, 640 x 480", "gouraud", "torch", "as the level asks"]
+            ["20.00 ms  (50 per second", "a test device, 640 x 480", "gouraud", "torch", "as the file asks"]
         {
             assert!(text.contains(wanted), "{wanted} is not in:\n{text}");
         }
+    }
+
+    #[test]
+    fn says_what_is_known_of_the_file_and_what_the_bake_does() {
+        let mut facts = Facts { exposure: Some(1e-3), adapts: true, ..Facts::default() };
+        facts.file = FileFacts {
+            name: "room.glb".into(),
+            notes: (0..20).map(|index| format!("node {index}: left out")).collect(),
+            cameras: vec!["door".into(), "window".into()],
+            viewpoint: "camera door".into(),
+            bake: Some(crate::BakeStatus {
+                pass: "draft",
+                stage: "final gather",
+                fraction: 0.37,
+                error: Some(0.042),
+                elapsed: std::time::Duration::from_secs(12),
+            }),
+            ..FileFacts::default()
+        };
+        let text = texts(&Overlay::default(), &facts);
+        for wanted in [
+            "room.glb",
+            "node 0: left out",
+            "20 notes",
+            "door, window",
+            "camera door",
+            "draft",
+            "final gather",
+            "37 %",
+            "4.2 %",
+            "12 s",
+            "Esc cancels",
+            "9.7 EV",
+        ] {
+            assert!(text.contains(wanted), "{wanted} is not in:\n{text}");
+        }
+    }
+
+    #[test]
+    fn an_error_is_said_even_if_the_overlay_is_off() {
+        let mut facts =
+            Facts { view: ViewSettings { overlay: false, ..ViewSettings::default() }, ..Facts::default() };
+        let text = "broken.glb: is no glTF file".to_owned();
+        facts.file.message = Some(super::super::viewing::Message { text: text.clone(), is_error: true });
+        assert_eq!(texts(&Overlay::default(), &facts).trim(), text);
     }
 
     #[test]

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use bevy_ecs::world::World;
 use lumbre_render::{
-    Acquired, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer,
-    WindowSurface,
+    Acquired, FrameOptions, FrameReport, Gpu, LightMeter, Metering, Offscreen, OffscreenFormat, RenderError,
+    Renderer, WindowSurface,
 };
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
@@ -25,8 +25,12 @@ pub struct Stage {
     picture_painter: Option<OverlayPainter>,
     /// Written to see whether the device is there.
     probe: wgpu::Buffer,
+    /// Made when it is first asked, and for the size of the window then.
+    meter: Option<((u32, u32), LightMeter)>,
 }
 
+/// Texels in a row of the picture that is metered: enough for a mean.
+const METER_WIDTH: u32 = 64;
 /// Bytes of the probe: the least that may be written.
 const PROBE_BYTES: wgpu::BufferSize = match wgpu::BufferSize::new(wgpu::COPY_BUFFER_ALIGNMENT) {
     Some(bytes) => bytes,
@@ -77,7 +81,7 @@ impl Stage {
             usage: wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Ok(Self { window, gpu, surface, renderer, painter, picture_painter, probe })
+        Ok(Self { window, gpu, surface, renderer, painter, picture_painter, probe, meter: None })
     }
 
     /// The device.
@@ -136,6 +140,28 @@ impl Stage {
             }
             Err(RenderError::DeviceLost) => Ok(Shown::DeviceLost),
             Err(_) if self.gpu.is_lost() => Ok(Shown::DeviceLost),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Meters the World as these options show it; nothing if no light is seen, or there is no device or no window to show it on.
+    ///
+    /// # Errors
+    /// What the renderer cannot draw or read back.
+    pub fn measure(&mut self, world: &mut World, options: &FrameOptions) -> Result<Option<Metering>> {
+        let (width, height) = self.size();
+        if width == 0 || height == 0 || !self.is_alive() {
+            return Ok(None);
+        }
+        let meter = match self.meter.take().filter(|(size, _)| *size == (width, height)) {
+            Some((_, meter)) => meter,
+            None => LightMeter::new(&self.gpu, METER_WIDTH, f64::from(width) / f64::from(height))?,
+        };
+        let (_, meter) = self.meter.insert(((width, height), meter));
+        match meter.measure(&self.gpu, &mut self.renderer, world, options) {
+            Ok(metering) => Ok(metering),
+            // The next frame makes another device.
+            Err(_) if self.gpu.is_lost() => Ok(None),
             Err(error) => Err(error.into()),
         }
     }

@@ -1,0 +1,407 @@
+//! A bake beside the frames: a thread of its own that hands out light as it refines. Not the baker, nor what is shown of it.
+//!
+//! The thread reads the file again, so that the World of the frames stays free. It bakes three times: with few texels and rays for a first
+//! look, with more, and as it was asked for. Each time it hands out the meshes and lightmaps; they are found by the nodes of the file.
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
+use lumbre_optics::{BakeMode, Light, Material};
+use lumbre_scene::{
+    GlobalTransform, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Primitive, SaveError,
+    SaveOptions, SceneSettings, SourceFile, StaticObject, save_baked,
+};
+
+/// One bake of several, each better than the one before.
+struct Pass {
+    name: &'static str,
+    /// Texels along a metre, as a part of what was asked for.
+    density: f64,
+    /// The error that it may have at least.
+    error: f64,
+    quality: Quality,
+}
+
+/// What comes before the bake that was asked for: something after a moment, then something to judge by.
+const FIRST: [Pass; 2] = [
+    Pass { name: "first light", density: 0.2, error: 0.2, quality: Quality::Draft },
+    Pass { name: "draft", density: 0.5, error: 0.05, quality: Quality::Draft },
+];
+/// The name of the bake that was asked for.
+const FINAL: &str = "final";
+/// Texels that the baker chooses for a whole scene, about.
+const AUTOMATIC_TEXELS: f64 = 500_000.0;
+/// The smallest map that a bake may be asked for.
+const SMALLEST_MAP: u32 = 4;
+/// Radiance of the sky that a file is baked under in which nothing shines, W/(m² sr).
+const SKY: f32 = 1.0;
+
+/// Why a bake ended without light.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// The file cannot be read (again).
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The baker refuses it.
+    #[error(transparent)]
+    Bake(#[from] lumbre_bake::BakeError),
+    /// The baked file cannot be written.
+    #[error(transparent)]
+    Save(#[from] SaveError),
+    /// The system gives no thread.
+    #[error("no thread can be started for the bake: {0}; close other programs")]
+    Thread(#[from] std::io::Error),
+    /// The thread ended without a word.
+    #[error(
+        "the bake has ended unexpectedly: this is a fault of the program; please report it with the file"
+    )]
+    Lost,
+}
+
+/// How far a bake is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BakeStatus {
+    /// Which of the bakes it is, in words.
+    pub pass: &'static str,
+    /// What is being done, in words.
+    pub stage: &'static str,
+    /// How much of this bake is done, in [0, 1].
+    pub fraction: f32,
+    /// Estimated relative error so far, once one is known.
+    pub error: Option<f64>,
+    /// Since the bakes began.
+    pub elapsed: Duration,
+}
+
+/// Meshes and lightmaps by node and primitive of the file.
+#[derive(Debug, Default)]
+pub struct BakedLight {
+    parts: HashMap<(usize, usize), (Mesh, Option<MaterialTextures>, Lightmap)>,
+    /// Which of the bakes it is from, in words.
+    pub pass: &'static str,
+    /// Its estimated relative error.
+    pub error: f64,
+    /// Whether an even sky was put over the file because nothing in it shines.
+    pub under_a_sky: bool,
+    /// Whether no better light follows.
+    pub is_final: bool,
+}
+
+impl BakedLight {
+    fn of(world: &mut World, nodes: &[Entity], report: &BakeReport) -> Self {
+        let node_of: HashMap<Entity, usize> =
+            nodes.iter().enumerate().map(|(index, &entity)| (entity, index)).collect();
+        let mut baked = world.query::<(&ChildOf, &Primitive, &Mesh, Option<&MaterialTextures>, &Lightmap)>();
+        let parts = baked
+            .iter(world)
+            .filter_map(|(parent, primitive, mesh, textures, lightmap)| {
+                let node = *node_of.get(&parent.parent())?;
+                Some(((node, primitive.index), (mesh.clone(), textures.cloned(), lightmap.clone())))
+            })
+            .collect();
+        Self { parts, error: report.estimated_error, ..Self::default() }
+    }
+
+    /// Surfaces that have a lightmap.
+    pub fn len(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// Whether nothing was lit.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Shows it in a World that the same file was loaded into; `nodes` are its nodes' entities.
+    pub fn apply(&self, world: &mut World, nodes: &[Entity]) {
+        let stale: Vec<Entity> = world.query_filtered::<Entity, With<Lightmap>>().iter(world).collect();
+        for entity in stale {
+            world.entity_mut(entity).remove::<Lightmap>();
+        }
+        let node_of: HashMap<Entity, usize> =
+            nodes.iter().enumerate().map(|(index, &entity)| (entity, index)).collect();
+        let mut primitives = world.query_filtered::<(Entity, &ChildOf, &Primitive), With<Mesh>>();
+        let found: Vec<_> = primitives
+            .iter(world)
+            .filter_map(|(entity, parent, primitive)| {
+                let node = *node_of.get(&parent.parent())?;
+                Some((entity, self.parts.get(&(node, primitive.index))?))
+            })
+            .collect();
+        for (entity, (mesh, textures, lightmap)) in found {
+            let mut entity = world.entity_mut(entity);
+            entity.insert((mesh.clone(), lightmap.clone()));
+            if let Some(textures) = textures {
+                entity.insert(textures.clone());
+            }
+        }
+    }
+}
+
+/// What a bake tells.
+#[derive(Debug)]
+pub enum BakeNews {
+    /// There is (better) light.
+    Light(BakedLight),
+    /// The baked file is written.
+    Saved(PathBuf),
+    /// It was cancelled, as asked.
+    Cancelled,
+    /// It cannot go on.
+    Failed(BakeError),
+}
+
+enum Message {
+    Status(BakeStatus),
+    News(BakeNews),
+    /// All passes are done; here is what can be saved.
+    Done(Box<Baked>),
+}
+
+struct Baked {
+    source: SourceFile,
+    world: World,
+}
+
+/// What the threads are at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Work {
+    Baking,
+    Saving,
+    Nothing,
+}
+
+/// A bake that runs, or has run, beside the frames. Dropping it cancels it.
+pub struct BackgroundBake {
+    messages: Receiver<Message>,
+    sender: Sender<Message>,
+    is_cancelled: Arc<AtomicBool>,
+    status: Option<BakeStatus>,
+    work: Work,
+    baked: Option<Box<Baked>>,
+}
+
+impl BackgroundBake {
+    /// Begins to bake a file; `wanted` is what it comes to in the end.
+    ///
+    /// # Errors
+    /// [`BakeError::Thread`].
+    pub fn start(path: &Path, options: &LoadOptions, wanted: &BakeOptions) -> Result<Self, BakeError> {
+        let (sender, messages) = channel();
+        let is_cancelled = Arc::new(AtomicBool::new(false));
+        let job = Job {
+            path: path.to_owned(),
+            options: options.clone(),
+            wanted: *wanted,
+            is_cancelled: Arc::clone(&is_cancelled),
+            begun: Instant::now(),
+            sender: sender.clone(),
+        };
+        thread::Builder::new().name("bake".to_owned()).spawn(move || job.run())?;
+        Ok(Self { messages, sender, is_cancelled, status: None, work: Work::Baking, baked: None })
+    }
+
+    /// Whether it still works at something: a bake, or the writing of the file.
+    pub fn is_running(&self) -> bool {
+        self.work != Work::Nothing
+    }
+
+    /// Whether it bakes.
+    pub fn is_baking(&self) -> bool {
+        self.work == Work::Baking
+    }
+
+    /// How far it is, while it bakes; nothing before that is known.
+    pub fn status(&self) -> Option<&BakeStatus> {
+        self.status.as_ref().filter(|_| self.is_baking())
+    }
+
+    /// Whether all passes are done, so that the file can be written.
+    pub fn can_be_saved(&self) -> bool {
+        self.baked.is_some()
+    }
+
+    /// Asks it to end; it says when it has.
+    pub fn cancel(&self) {
+        self.is_cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Writes the baked file, in a thread of its own. Does nothing before all is baked.
+    pub fn save(&mut self, path: &Path) {
+        let Some(mut baked) = self.baked.take() else { return };
+        let (sender, path) = (self.sender.clone(), path.to_owned());
+        let written = thread::Builder::new().name("save".to_owned()).spawn(move || {
+            let saved = save_baked(&mut baked.world, &baked.source, &path, &SaveOptions::default());
+            // Whoever waited for it may be gone.
+            let _ = sender.send(Message::News(match saved {
+                Ok(_) => BakeNews::Saved(path),
+                Err(error) => BakeNews::Failed(error.into()),
+            }));
+            let _ = sender.send(Message::Done(baked));
+        });
+        self.work = if written.is_ok() { Work::Saving } else { Work::Nothing };
+        if let Err(error) = written {
+            let _ = self.sender.send(Message::News(BakeNews::Failed(error.into())));
+        }
+    }
+
+    /// What has happened since it was asked last.
+    pub fn news(&mut self) -> Vec<BakeNews> {
+        let mut news = Vec::new();
+        loop {
+            match self.messages.try_recv() {
+                Ok(Message::Status(status)) => self.status = Some(status),
+                Ok(Message::Done(baked)) => {
+                    self.work = Work::Nothing;
+                    self.baked = Some(baked);
+                }
+                Ok(Message::News(one)) => {
+                    if matches!(one, BakeNews::Cancelled) || is_of_the_bake(&one) {
+                        self.work = Work::Nothing;
+                    }
+                    news.push(one);
+                }
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return news,
+            }
+        }
+    }
+}
+
+/// Whether nothing follows this failure; after one of saving the bake is handed back.
+fn is_of_the_bake(news: &BakeNews) -> bool {
+    matches!(news, BakeNews::Failed(error) if !matches!(error, BakeError::Save(_)))
+}
+
+impl Drop for BackgroundBake {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}
+
+/// What the thread knows.
+struct Job {
+    path: PathBuf,
+    options: LoadOptions,
+    wanted: BakeOptions,
+    is_cancelled: Arc<AtomicBool>,
+    begun: Instant,
+    sender: Sender<Message>,
+}
+
+impl Job {
+    fn run(self) {
+        // A panic of the baker's is a fault of ours; the window outlives it and says so.
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.bake_all()));
+        let message = match outcome {
+            Ok(Ok(Some(baked))) => Message::Done(Box::new(baked)),
+            Ok(Ok(None) | Err(BakeError::Bake(lumbre_bake::BakeError::Cancelled { .. }))) => {
+                Message::News(BakeNews::Cancelled)
+            }
+            Ok(Err(error)) => Message::News(BakeNews::Failed(error)),
+            Err(_) => Message::News(BakeNews::Failed(BakeError::Lost)),
+        };
+        // The window may be gone.
+        let _ = self.sender.send(message);
+    }
+
+    /// All passes; nothing if it was cancelled.
+    fn bake_all(&self) -> Result<Option<Baked>, BakeError> {
+        let mut world = World::new();
+        let mut file = SourceFile::read(&self.path, &self.options)?;
+        let nodes = file.load_into(&mut world)?.nodes;
+        let under_a_sky = !shines(&mut world);
+        if under_a_sky {
+            world.get_resource_or_init::<SceneSettings>().sky = Vec3::splat(SKY);
+        }
+        let area = area(&mut world);
+        let first = FIRST.iter().map(|pass| (pass.name, rougher(&self.wanted, pass, area)));
+        for (name, options) in first.chain([(FINAL, self.wanted)]) {
+            if self.is_cancelled.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let report = bake(&mut world, &leaving_a_core(options), &mut |progress| {
+                let status = BakeStatus {
+                    pass: name,
+                    stage: progress.stage,
+                    fraction: progress.fraction,
+                    error: progress.error,
+                    elapsed: self.begun.elapsed(),
+                };
+                // The window may be gone.
+                let _ = self.sender.send(Message::Status(status));
+                match self.is_cancelled.load(Ordering::Relaxed) {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
+            })?;
+            let mut light = BakedLight::of(&mut world, &nodes, &report);
+            (light.pass, light.under_a_sky, light.is_final) = (name, under_a_sky, name == FINAL);
+            let _ = self.sender.send(Message::News(BakeNews::Light(light)));
+        }
+        Ok(Some(Baked { source: file, world }))
+    }
+}
+
+/// What was asked for, more quickly.
+fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
+    let density = match wanted.density {
+        Density::Automatic if area > 0.0 && area.is_finite() => {
+            Density::TexelsPerMeter(pass.density * (AUTOMATIC_TEXELS / area).sqrt())
+        }
+        Density::Automatic => Density::Automatic,
+        Density::TexelsPerMeter(texels) => Density::TexelsPerMeter(pass.density * texels),
+        Density::MapSize(side) => {
+            Density::MapSize(((pass.density * f64::from(side)) as u32).max(SMALLEST_MAP))
+        }
+    };
+    let (error, quality) = (pass.error.max(wanted.error), pass.quality);
+    // Frames do not read probes; the file that may be saved has them.
+    BakeOptions { density, error, quality, resolution_error: false, probes: Probes::Never, ..*wanted }
+}
+
+/// One core is left to the frames, unless threads were asked for.
+fn leaving_a_core(options: BakeOptions) -> BakeOptions {
+    let cores = thread::available_parallelism().map_or(1, |cores| (cores.get() - 1).max(1));
+    BakeOptions { threads: options.threads.or(Some(cores)), ..options }
+}
+
+/// Whether anything gives light that a bake takes: lamps, emission, a sky.
+fn shines(world: &mut World) -> bool {
+    let bright = |color: Vec3| color.max_element() > 0.0;
+    world.get_resource::<SceneSettings>().is_some_and(|settings| bright(settings.sky))
+        || world
+            .query::<&Light>()
+            .iter(world)
+            .any(|light| light.enabled && light.bake != BakeMode::Dynamic && bright(light.diffuse))
+        || world.query_filtered::<&Material, With<StaticObject>>().iter(world).any(|material| {
+            let back = material.back.as_ref().is_some_and(|back| bright(back.emission));
+            bright(material.front.emission) || back
+        })
+}
+
+/// Square metres of everything that stands still.
+fn area(world: &mut World) -> f64 {
+    let mut meshes = world.query_filtered::<(&Mesh, &GlobalTransform), With<StaticObject>>();
+    let of_mesh = |(mesh, place): (&Mesh, &GlobalTransform)| {
+        let corner = |index: u32| {
+            let position = mesh.0.positions.get(index as usize).copied().unwrap_or_default();
+            place.0.transform_point3(position.as_dvec3())
+        };
+        let areas = mesh.0.triangles().map(|triangle| {
+            let [a, b, c] = triangle.map(corner);
+            0.5 * (b - a).cross(c - a).length()
+        });
+        areas.filter(|area| area.is_finite()).sum::<f64>()
+    };
+    meshes.iter(world).map(of_mesh).sum()
+}

@@ -1,0 +1,339 @@
+//! What the window shows and does beside its frames: the file that is open, the one that is being opened, the bake that runs, the exposure
+//! that adapts. No events and no drawing: those are `app` and `stage`.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
+use std::time::Duration;
+
+use anyhow::Result;
+use lumbre_optics::Light;
+use lumbre_render::FrameOptions;
+
+use super::stage::Stage;
+use crate::opened::CLIPPED;
+use crate::{
+    Action, Adaptation, BackgroundBake, BakeNews, BakeStatus, Exposure, GameError, OpenOptions, Opened,
+    Viewpoint,
+};
+
+/// Between two looks at the meter.
+const METER_EVERY: Duration = Duration::from_millis(250);
+
+/// Something to say, until something else is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// In words.
+    pub text: String,
+    /// Whether something went wrong.
+    pub is_error: bool,
+}
+
+/// Who says how bright the picture is.
+#[derive(Clone, Copy, Debug)]
+enum Metered {
+    /// The camera, or a factor that was asked for.
+    Not(Option<f32>),
+    /// The camera, unless the first look at the meter says that it cannot be so.
+    IfNeeded,
+    /// The meter.
+    Always(Adaptation),
+}
+
+impl Metered {
+    fn of(opened: &Opened) -> Self {
+        match opened.exposure {
+            Exposure::Factor(factor) => Self::Not(Some(factor)),
+            Exposure::Auto => Self::Always(Adaptation::default()),
+            Exposure::AsNeeded if opened.is_photometric => Self::IfNeeded,
+            Exposure::AsNeeded => Self::Not(None),
+        }
+    }
+}
+
+/// What is known of the light that was baked here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightFacts {
+    /// Which of the bakes it is from.
+    pub pass: &'static str,
+    /// Its estimated relative error.
+    pub error: f64,
+    /// Whether an even sky was put over the file.
+    pub under_a_sky: bool,
+    /// Whether nothing better follows.
+    pub is_final: bool,
+    /// Surfaces that have a lightmap.
+    pub surfaces: usize,
+}
+
+/// A file in the window, and what is done with it.
+pub struct Viewing {
+    /// The file.
+    pub opened: Opened,
+    options: OpenOptions,
+    opening: Option<(PathBuf, Receiver<Result<Opened, GameError>>)>,
+    bake: Option<BackgroundBake>,
+    light: Option<LightFacts>,
+    metered: Metered,
+    since_metered: Option<Duration>,
+    message: Option<Message>,
+}
+
+impl Viewing {
+    /// A file that is open; others are opened by these options.
+    pub fn new(opened: Opened, options: OpenOptions) -> Self {
+        let metered = Metered::of(&opened);
+        Self {
+            opened,
+            options,
+            opening: None,
+            bake: None,
+            light: None,
+            metered,
+            since_metered: None,
+            message: None,
+        }
+    }
+
+    /// Begins to open another file. The old one stands until the new one is there.
+    pub fn open(&mut self, path: &Path) {
+        let (sender, receiver) = channel();
+        let (file, options) = (path.to_owned(), self.options.clone());
+        let started = thread::Builder::new().name("open".to_owned()).spawn(move || {
+            // The window may be gone, or have been given another file.
+            let _ = sender.send(Opened::open(&file, &options));
+        });
+        match started {
+            Ok(_) => {
+                self.say(format!("opening {} …", path.display()));
+                self.opening = Some((path.to_owned(), receiver));
+            }
+            Err(error) => self.complain(format!(
+                "{}: no thread can be started to open it: {error}; close other programs",
+                path.display()
+            )),
+        }
+    }
+
+    /// Carries out a command.
+    pub fn apply(&mut self, action: Action) {
+        match action {
+            Action::ToggleBake => self.toggle_bake(),
+            Action::SaveBake => self.save_bake(),
+            Action::ToggleAutoExposure => self.toggle_metering(),
+            _ => {}
+        }
+        self.opened.game.apply(action);
+        self.sync_default_lights();
+    }
+
+    /// Ends what runs, as Esc asks for; whether there was anything.
+    pub fn cancel(&mut self) -> bool {
+        let baking = self.bake.as_ref().filter(|bake| bake.is_baking());
+        baking.inspect(|bake| bake.cancel()).is_some()
+    }
+
+    /// Whether nothing is being opened, baked or written.
+    pub fn is_at_rest(&self) -> bool {
+        self.opening.is_none() && !self.bake.as_ref().is_some_and(BackgroundBake::is_running)
+    }
+
+    /// Takes over what other threads have done. Whether another file is shown now.
+    pub fn update(&mut self, passed: Duration) -> bool {
+        self.take_bake();
+        if let Metered::Always(adaptation) = &mut self.metered {
+            adaptation.step(passed.as_secs_f64());
+        }
+        if let Some(since) = &mut self.since_metered {
+            *since += passed;
+        }
+        self.take_opened()
+    }
+
+    /// Looks at the meter, if it is time.
+    ///
+    /// # Errors
+    /// What the renderer cannot draw.
+    pub fn measure(&mut self, stage: &mut Stage, options: &FrameOptions) -> Result<()> {
+        let is_due = self.since_metered.is_none_or(|since| since >= METER_EVERY);
+        if matches!(self.metered, Metered::Not(_)) || !is_due {
+            return Ok(());
+        }
+        self.since_metered = Some(Duration::ZERO);
+        let metering = stage.measure(&mut self.opened.game.world, options)?;
+        match (&mut self.metered, metering) {
+            (Metered::IfNeeded, Some(metering)) if metering.clipped > CLIPPED => {
+                let mut adaptation = Adaptation::default();
+                adaptation.metered(metering.exposure);
+                self.metered = Metered::Always(adaptation);
+            }
+            (Metered::IfNeeded, Some(_)) => self.metered = Metered::Not(None),
+            (Metered::Always(adaptation), Some(metering)) => adaptation.metered(metering.exposure),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The exposure of the next frame, if it is not the camera's.
+    pub fn exposure(&self) -> Option<f32> {
+        match &self.metered {
+            Metered::Not(factor) => *factor,
+            Metered::IfNeeded => None,
+            Metered::Always(adaptation) => adaptation.exposure(),
+        }
+    }
+
+    /// Whether the exposure adapts.
+    pub fn adapts(&self) -> bool {
+        matches!(self.metered, Metered::Always(_))
+    }
+
+    /// How far the bake is, if one runs.
+    pub fn bake_status(&self) -> Option<&BakeStatus> {
+        self.bake.as_ref()?.status()
+    }
+
+    /// The light that was baked here, if it is shown.
+    pub fn light(&self) -> Option<LightFacts> {
+        self.light
+    }
+
+    /// Whether there is a bake that can be written.
+    pub fn can_save(&self) -> bool {
+        self.bake.as_ref().is_some_and(BackgroundBake::can_be_saved)
+    }
+
+    /// What there is to say.
+    pub fn message(&self) -> Option<&Message> {
+        self.message.as_ref()
+    }
+
+    fn say(&mut self, text: String) {
+        self.message = Some(Message { text, is_error: false });
+    }
+
+    fn complain(&mut self, text: String) {
+        tracing::warn!("{text}");
+        self.message = Some(Message { text, is_error: true });
+    }
+
+    fn take_opened(&mut self) -> bool {
+        let Some((path, receiver)) = &self.opening else { return false };
+        let outcome = match receiver.try_recv() {
+            Err(TryRecvError::Empty) => return false,
+            Ok(outcome) => outcome.map_err(|error| error.to_string()),
+            Err(TryRecvError::Disconnected) => Err(format!(
+                "{}: the reader has ended unexpectedly: this is a fault of the program; please report it with the file",
+                path.display()
+            )),
+        };
+        self.opening = None;
+        match outcome {
+            Ok(mut opened) => {
+                // What the keys chose stays chosen.
+                opened.game.view = self.opened.game.view;
+                *self = Self::new(opened, self.options.clone());
+                true
+            }
+            Err(error) => {
+                self.complain(error);
+                false
+            }
+        }
+    }
+
+    fn toggle_bake(&mut self) {
+        if self.cancel() {
+            return;
+        }
+        if self.bake.as_ref().is_some_and(BackgroundBake::is_running) {
+            return self.say("the baked file is being written".to_owned());
+        }
+        match BackgroundBake::start(&self.opened.path, &self.options.load, &self.options.bake) {
+            Ok(bake) => {
+                self.bake = Some(bake);
+                self.message = None;
+            }
+            Err(error) => self.complain(error.to_string()),
+        }
+    }
+
+    fn save_bake(&mut self) {
+        let place = self.opened.place_of_bake();
+        match &mut self.bake {
+            Some(bake) if bake.can_be_saved() => {
+                bake.save(&place);
+                self.say(format!("writing {} …", place.display()));
+            }
+            Some(bake) if bake.is_running() => {
+                self.say("the bake can be saved when it has ended".to_owned());
+            }
+            _ => self.say("nothing is baked yet: B bakes".to_owned()),
+        }
+    }
+
+    fn take_bake(&mut self) {
+        let Some(bake) = &mut self.bake else { return };
+        let news = bake.news();
+        for one in news {
+            match one {
+                BakeNews::Light(light) => {
+                    light.apply(&mut self.opened.game.world, &self.opened.nodes);
+                    self.light = Some(LightFacts {
+                        pass: light.pass,
+                        error: light.error,
+                        under_a_sky: light.under_a_sky,
+                        is_final: light.is_final,
+                        surfaces: light.len(),
+                    });
+                    if light.is_empty() {
+                        self.say("nothing in this file stands still, so nothing was baked".to_owned());
+                    }
+                    self.opened.game.view.lightmaps = true;
+                    self.since_metered = None;
+                    self.sync_default_lights();
+                }
+                BakeNews::Saved(path) => self.say(format!("written: {}", path.display())),
+                BakeNews::Cancelled => self.say("the bake was cancelled; B begins again".to_owned()),
+                BakeNews::Failed(error) => self.complain(error.to_string()),
+            }
+        }
+    }
+
+    /// Lights from the camera stand in where there is no other light: not while baked light is shown.
+    fn sync_default_lights(&mut self) {
+        let game = &mut self.opened.game;
+        let lit = self.light.is_some_and(|light| light.surfaces > 0) && game.view.lightmaps;
+        for &entity in &self.opened.default_lights {
+            if let Some(mut light) = game.world.get_mut::<Light>(entity)
+                && light.enabled == lit
+            {
+                light.enabled = !lit;
+            }
+        }
+    }
+
+    fn toggle_metering(&mut self) {
+        self.metered = match self.metered {
+            Metered::Always(_) => match self.opened.exposure {
+                Exposure::Factor(factor) => Metered::Not(Some(factor)),
+                Exposure::AsNeeded | Exposure::Auto => Metered::Not(None),
+            },
+            Metered::Not(_) | Metered::IfNeeded => Metered::Always(Adaptation::default()),
+        };
+        self.since_metered = None;
+    }
+
+    /// Where the picture is taken from, in words.
+    pub fn viewpoint(&self) -> String {
+        let game = &self.opened.game;
+        match game.viewpoint() {
+            Viewpoint::Player if game.player().flying => "flying".to_owned(),
+            Viewpoint::Player => "walking".to_owned(),
+            Viewpoint::Orbit(_) => "turning around it".to_owned(),
+            Viewpoint::FileCamera(index) => {
+                game.cameras().get(*index).map_or_else(String::new, |(_, name)| format!("camera {name}"))
+            }
+        }
+    }
+}

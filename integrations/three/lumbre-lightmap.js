@@ -1,0 +1,165 @@
+// A plugin for three.js' GLTFLoader: hangs the lightmaps that `lumbre bake` wrote on the meshes of a baked glTF file.
+//
+//   const loader = new GLTFLoader();
+//   loader.register( parser => new LumbreLightmapPlugin( parser ) );
+//
+// A texel of a lightmap is E/π: irradiance over π, in the units of radiance that KHR_lights_punctual gives a frame. three.js wants irradiance
+// in `material.lightMap`, so its intensity is π.
+
+import { LinearFilter, LoaderUtils, NoColorSpace } from 'three';
+import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
+
+const NAME = 'LUMBRE_lightmap';
+const LIGHTS = 'LUMBRE_lights_phong';
+
+export class LumbreLightmapPlugin {
+
+	// ktx2Loader: a KTX2Loader on which detectSupport() was called; then the .ktx2 images beside the OpenEXR ones are taken
+	//   (`lumbre bake --ktx2 rgb9e5`): four bytes a texel instead of eight.
+	// staticLights: 'off' switches lights off whose light is in the lightmaps, 'on' leaves them shining, and counts their light twice on
+	//   lightmapped meshes.
+	constructor( parser, { ktx2Loader = null, staticLights = 'off' } = {} ) {
+
+		this.name = NAME;
+		this.parser = parser;
+		this.ktx2Loader = ktx2Loader;
+		this.staticLights = staticLights;
+		this.textures = new Map();
+		this.materials = new Map();
+
+	}
+
+	// GLTFLoader calls this once everything else is there.
+	async afterRoot( gltf ) {
+
+		const pending = [];
+		let lightmapped = false;
+
+		for ( const scene of gltf.scenes ) {
+
+			scene.traverse( ( object ) => {
+
+				const node = this.nodeOf( object );
+				const extension = node?.extensions?.[ NAME ];
+				if ( ! extension ) return;
+				lightmapped = true;
+				for ( const mesh of this.meshesOf( object ) ) pending.push( this.attach( mesh, extension ) );
+
+			} );
+
+		}
+
+		await Promise.all( pending );
+		if ( lightmapped && this.staticLights === 'off' ) this.switchStaticLightsOff( gltf );
+
+	}
+
+	// The glTF node that an object was made for.
+	nodeOf( object ) {
+
+		const index = this.parser.associations.get( object )?.nodes;
+		return index === undefined ? null : this.parser.json.nodes[ index ];
+
+	}
+
+	// The meshes of a node: the object itself, or a child for each primitive. Children that are nodes of their own have lightmaps of their own.
+	meshesOf( object ) {
+
+		return [ object, ...object.children.filter( ( child ) => this.nodeOf( child ) === null ) ]
+			.flatMap( ( one ) => one.isMesh ? [ one ] : one === object ? [] : one.children.filter( ( child ) => child.isMesh ) );
+
+	}
+
+	async attach( mesh, extension ) {
+
+		const set = extension.texCoord ?? 1;
+		if ( ! mesh.geometry.getAttribute( set === 0 ? 'uv' : `uv${ set }` ) ) {
+
+			console.warn( `LumbreLightmapPlugin: ${ mesh.name } has no TEXCOORD_${ set }; bake the file again` );
+			return;
+
+		}
+
+		const lightMap = await this.texture( extension.image, set );
+		// Nodes share materials and not lightmaps.
+		const materials = [].concat( mesh.material ).map( ( material ) => this.lit( material, lightMap ) );
+		mesh.material = Array.isArray( mesh.material ) ? materials : materials[ 0 ];
+
+	}
+
+	lit( material, lightMap ) {
+
+		const key = `${ material.uuid } ${ lightMap.uuid }`;
+		if ( ! this.materials.has( key ) ) {
+
+			const lit = material.clone();
+			lit.lightMap = lightMap;
+			lit.lightMapIntensity = Math.PI;
+			this.materials.set( key, lit );
+
+		}
+
+		return this.materials.get( key );
+
+	}
+
+	texture( image, set ) {
+
+		const key = `${ image } ${ set }`;
+		if ( ! this.textures.has( key ) ) this.textures.set( key, this.load( image, set ) );
+		return this.textures.get( key );
+
+	}
+
+	async load( image, set ) {
+
+		const packed = this.ktx2Loader !== null || /\.ktx2$/i.test( image );
+		if ( packed && this.ktx2Loader === null ) throw new Error( `LumbreLightmapPlugin: ${ image } wants a ktx2Loader` );
+		const name = packed ? image.replace( /\.exr$/i, '.ktx2' ) : image;
+		const url = LoaderUtils.resolveURL( name, this.parser.options.path );
+		const loader = packed ? this.ktx2Loader : new EXRLoader( this.parser.options.manager );
+		const texture = await loader.loadAsync( url );
+
+		if ( ! packed ) {
+
+			// EXRLoader puts the bottom row first, glTF's coordinates begin at the top.
+			texture.repeat.y = - 1;
+			texture.offset.y = 1;
+
+		}
+
+		texture.name = name;
+		texture.channel = set;
+		texture.colorSpace = NoColorSpace;
+		texture.minFilter = LinearFilter;
+		texture.magFilter = LinearFilter;
+		texture.generateMipmaps = false;
+		texture.needsUpdate = true;
+		return texture;
+
+	}
+
+	// What a light that was baked would add again. three.js cannot keep its highlight without its diffuse light.
+	switchStaticLightsOff( gltf ) {
+
+		const lights = this.parser.json.extensions?.KHR_lights_punctual?.lights ?? [];
+
+		for ( const scene of gltf.scenes ) {
+
+			scene.traverse( ( object ) => {
+
+				if ( ! object.isLight ) return;
+				// The object of the light is that of its node, or lies below it.
+				const node = this.nodeOf( object ) ?? this.nodeOf( object.parent );
+				const index = node?.extensions?.KHR_lights_punctual?.light;
+				const light = index === undefined ? null : lights[ index ];
+				const phong = light?.extensions?.[ LIGHTS ];
+				if ( phong?.enabled === false || ( light && ( phong?.bake ?? 'static' ) === 'static' ) ) object.visible = false;
+
+			} );
+
+		}
+
+	}
+
+}
