@@ -210,3 +210,48 @@ fn switched_settings_of_the_scene_leave_nothing_behind() {
     world.insert_resource(plain);
     assert!(canvas.draw(&mut world, &linear()).0 == seen[0]);
 }
+
+#[test]
+fn the_sky_is_the_background_and_lights_what_has_no_lightmap() {
+    let sky = Vec3::new(0.25, 0.5, 1.0);
+    let frame = |settings: SceneSettings, lightmapped: bool| {
+        let mut world = ball(Light { enabled: false, ..lamp() });
+        let given = SceneSettings {
+            ambient: Vec3::ZERO,
+            background: Vec3::ZERO,
+            ..*world.resource::<SceneSettings>()
+        };
+        world.insert_resource(SceneSettings {
+            ambient: settings.ambient,
+            background: settings.background,
+            sky: settings.sky,
+            ..given
+        });
+        if lightmapped {
+            let (encoding, texels) = (LightmapEncoding::Rgb32Float, vec![Vec3::ZERO; 4]);
+            let image = LightmapImage { name: "dark".to_owned(), width: 2, height: 2, texels, encoding };
+            let entity = world.query_filtered::<Entity, With<Mesh>>().single(&world).unwrap();
+            let mut mesh = (*world.get::<Mesh>(entity).unwrap().0).clone();
+            mesh.uv1 = vec![glam::Vec2::splat(0.5); mesh.positions.len()];
+            let map = Lightmap { image: std::sync::Arc::new(image) };
+            world.entity_mut(entity).insert((Mesh(std::sync::Arc::new(mesh)), map));
+        }
+        draw(&mut world, SIZE as u32, SIZE as u32, &linear()).0
+    };
+    let none = SceneSettings::default();
+    let under_sky = frame(SceneSettings { sky, ..none }, false);
+    // A sky of radiance L gives k_a what ambient light of L gives; the corner of the frame sees past the ball.
+    let in_ambient_light = frame(SceneSettings { ambient: sky, background: sky, ..none }, false);
+    assert_eq!(under_sky, in_ambient_light);
+    assert_eq!(under_sky[0], sky.as_dvec3());
+    assert!(
+        under_sky.iter().any(|pixel| (*pixel - sky.as_dvec3()).abs().max_element() > 0.05),
+        "the ball is seen"
+    );
+    // A background that is stated stays; a lightmap has the sky's light already.
+    let (background, black) = (Vec3::new(0.0, 0.0, 0.125), DVec3::ZERO);
+    let baked = frame(SceneSettings { sky, background, ..none }, true);
+    assert_eq!(baked[0], background.as_dvec3());
+    let middle = baked[SIZE * SIZE / 2 + SIZE / 2];
+    assert!(middle == black, "what is baked takes no sky twice: {middle}");
+}

@@ -130,7 +130,7 @@ fn a_texture_may_read_the_second_set_while_another_reads_the_first() {
     let textures = MaterialTextures {
         base_color: Some(sharp(&picture)),
         emissive: Some(TextureReference { tex_coord: 1, ..sharp(&picture) }),
-        metallic_roughness: None,
+        ..MaterialTextures::default()
     };
     let front = Surface { emission: Vec3::new(0.5, 2.0, 1.0), ..Material::matt(Vec3::ONE).front };
     let mut world = textured(textures.clone(), Material { front, ..Material::default() });
@@ -197,6 +197,7 @@ fn a_metallic_roughness_texture_is_the_material_of_each_texel() {
         base_color: base,
         metallic,
         roughness,
+        dielectric: Vec3::splat(0.04),
     };
     let mut textures = MaterialTextures { metallic_roughness: Some(mapped), ..MaterialTextures::default() };
     let base_texels = [[255, 255, 255, 255], [188, 188, 188, 255], [255, 128, 64, 255], [90, 255, 128, 255]];

@@ -8,6 +8,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("fresnel_normal_reflectance_channel", "three times in fresnel_normal_reflectance"),
     ("is_point_light", "in every evaluate_light"),
     ("specular_reflection", "in every light_contribution; its microfacets are microfacet_reflection"),
+    ("model_exponent", "a power of two, in every light_contribution"),
     ("contour_term", "five times in polygon_form_factor"),
     ("polygon_light_contribution", "polygon_form_factor, and polygon_highlight"),
     (

@@ -12,6 +12,7 @@ mod highlights;
 mod inputs;
 mod judge;
 mod lights;
+mod materials;
 mod microfacets;
 mod negative_controls;
 mod polygons;
@@ -45,6 +46,7 @@ fn all() -> &'static [Twin] {
             microfacets::twins(),
             refraction::twins(),
             shading::twins(),
+            materials::twins(),
             polygons::twins(),
             atmosphere::twins(),
         ]

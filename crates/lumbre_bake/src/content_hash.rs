@@ -324,7 +324,8 @@ impl Hasher {
     }
 
     fn mesh(&mut self, mesh: &TriangleMesh) {
-        let TriangleMesh { positions, normals, uv0, uv1, colors, indices } = mesh;
+        // Normal maps bend no light of a bake, so that tangents do not matter.
+        let TriangleMesh { positions, normals, tangents: _, uv0, uv1, colors, indices } = mesh;
         self.list(positions.len(), positions.iter().flat_map(|v| v.to_array()));
         self.list(normals.len(), normals.iter().flat_map(|v| v.to_array()));
         self.list(uv0.len(), uv0.iter().flat_map(|v| v.to_array()));
@@ -345,6 +346,7 @@ impl Hasher {
             mirror: _,
             transmission: _,
             ior: _,
+            lobe: _,
             distribution: _,
             fresnel: _,
         } = material;
@@ -376,7 +378,8 @@ impl Hasher {
     }
 
     fn textures(&mut self, textures: &MaterialTextures, images: &mut Images) {
-        let MaterialTextures { base_color, emissive, metallic_roughness } = textures;
+        // A lightmap holds the light on the surface as it was modelled: docs/decisions.md says why.
+        let MaterialTextures { base_color, emissive, metallic_roughness, normal: _, occlusion: _ } = textures;
         for texture in [base_color, emissive] {
             self.number(texture.is_some().into());
             if let Some(texture) = texture {
@@ -384,7 +387,7 @@ impl Hasher {
             }
         }
         self.number(metallic_roughness.is_some().into());
-        if let Some(MetallicRoughnessTexture { texture, base_color, metallic, roughness: _ }) =
+        if let Some(MetallicRoughnessTexture { texture, base_color, metallic, roughness: _, dielectric: _ }) =
             metallic_roughness
         {
             self.texture(texture, images);

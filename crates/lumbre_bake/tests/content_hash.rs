@@ -73,11 +73,13 @@ fn textured(change: impl FnOnce(&mut MaterialTextures)) -> ContentHash {
             base_color: Vec3::ONE,
             metallic: 0.5,
             roughness: 0.5,
+            dielectric: Vec3::splat(0.04),
         };
         let mut textures = MaterialTextures {
             base_color: Some(reference.clone()),
             emissive: Some(reference),
             metallic_roughness: Some(of_metal),
+            ..MaterialTextures::default()
         };
         change(&mut textures);
         let floor = object(world, "floor");

@@ -5,6 +5,7 @@
 //! ```text
 //!   surfaces ► shapes ┐              ┌─► normals (flat, smooth)
 //!                   ├─► TriangleMesh ┼─► flat (triangle, normal, centroid)
+//!                   │                ├─► tangents (MikkTSpace)
 //!   a file's mesh ──┘                ├─► weld ─► adjacency
 //!                                    └─► unwrap ─► charts ─► atlas ─► uv1 ─► uv_validation
 //! ```
@@ -31,6 +32,7 @@ pub mod normals;
 mod planar_overlap;
 pub mod shapes;
 pub mod surfaces;
+mod tangents;
 mod triangle_mesh;
 mod unwrap;
 pub mod uv_validation;
@@ -38,6 +40,7 @@ mod vertex_split;
 mod weld;
 
 pub use adjacency::Adjacency;
+pub use tangents::TextureCoordinateSet;
 pub use triangle_mesh::{MeshError, TriangleMesh};
 pub use unwrap::{Chart, Charted, UnwrapError, UnwrapOptions, Unwrapped, unwrap};
 pub use weld::weld_positions;

@@ -9,6 +9,9 @@ pub struct TriangleMesh {
     pub positions: Vec<Vec3>,
     /// Unit normals. A zero vector marks a normal that could not be computed.
     pub normals: Vec<Vec3>,
+    /// Unit tangents, which point where u grows, in the order of TANGENT: w is +1 or -1, and (normal x tangent) w points where the green of
+    /// a normal map leans, towards smaller v. Absent in most meshes: [`with_tangents`](Self::with_tangents) makes them.
+    pub tangents: Vec<Vec4>,
     /// TEXCOORD_0: material textures.
     pub uv0: Vec<Vec2>,
     /// TEXCOORD_1: lightmap, in [0, 1].
@@ -55,6 +58,7 @@ impl TriangleMesh {
         }
         for (attribute, found) in [
             ("normals", self.normals.len()),
+            ("tangents", self.tangents.len()),
             ("uv0", self.uv0.len()),
             ("uv1", self.uv1.len()),
             ("colors", self.colors.len()),
@@ -76,6 +80,7 @@ impl TriangleMesh {
         Self {
             positions: copy(&self.positions, sources),
             normals: copy(&self.normals, sources),
+            tangents: copy(&self.tangents, sources),
             uv0: copy(&self.uv0, sources),
             uv1: copy(&self.uv1, sources),
             colors: copy(&self.colors, sources),

@@ -16,7 +16,7 @@
 //!
 //!   beside it: polygon_light_contribution (an emissive polygon in place of a LightSample),
 //!              transmitted_direction (Snell), facing_normal (two-sided), LightMatrix (document [I]'s 3x3 matrices),
-//!              normalized_phong (highlights of one energy)
+//!              normalized_phong (highlights of one energy), map_normal and occlusion (textures that bend and weaken light)
 //! ```
 //!
 //! Directions are unit and point away from the surface: `normal`, `light`, `viewer`. The zero vector stands
@@ -47,6 +47,7 @@ mod angle;
 mod attenuation;
 mod blinn_phong;
 mod emission;
+mod energy_keeping;
 mod evaluate_light;
 mod fog;
 mod fog_validation;
@@ -60,8 +61,10 @@ mod material;
 mod material_validation;
 mod microfacet_reflection;
 mod microfacets;
+mod normal_map;
 mod normalization;
 mod normalized_highlight;
+mod occlusion;
 mod phong;
 mod polygon_light;
 mod power;
@@ -83,6 +86,7 @@ pub use attenuation::{
 };
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
 pub use emission::{add_emission, exitance};
+pub use energy_keeping::{distribution_ggx, gltf_reflection, lobe_peak, smith_attenuation};
 pub use evaluate_light::{LightSample, NoLight, evaluate_light, try_evaluate_light};
 pub use fog::{
     Fog, FogMode, apply_fog, fog_depth_cue, fog_exponential, fog_exponential_squared, fog_fraction,
@@ -97,7 +101,7 @@ pub use lambert::lambert;
 pub use light::{BakeMode, Light, LightKind};
 pub use light_matrix::{LightMatrix, ReflectionMatrix};
 pub use light_validation::{LARGEST_INTENSITY, LightError};
-pub use material::{AlphaMode, Material, SHARP_SHININESS, Surface};
+pub use material::{AlphaMode, Lobe, Material, SHARP_SHININESS, Surface};
 pub use material_validation::{LARGEST_COEFFICIENT, MaterialError};
 pub use microfacet_reflection::{
     Distribution, Fresnel, fresnel_normal_reflectance, microfacet_lobe, microfacet_reflection,
@@ -107,11 +111,15 @@ pub use microfacets::{
     distribution_cosine_power, distribution_gaussian, distribution_trowbridge_reitz, half_value_angle,
     half_value_sine_squared,
 };
+pub use normal_map::{
+    SHORTEST_BENT_SQUARED, map_normal, normal_map_spread, normal_map_widening, transformed_tangent,
+};
 pub use normalization::{TINY_LENGTH_SQUARED, safe_length, safe_normalize, try_normalize};
 pub use normalized_highlight::{
     blinn_phong_normalization, microfacet_normalization, normalized_blinn_phong, normalized_phong,
     phong_normalization,
 };
+pub use occlusion::occlusion;
 pub use phong::{phong, reflected_direction, try_reflected_direction};
 pub use polygon_light::{
     HIGHLIGHT_SAMPLES, PolygonLight, polygon_form_factor, polygon_highlight, polygon_light_contribution,
@@ -119,7 +127,8 @@ pub use polygon_light::{
 pub use power::{cosine_lobe, power_of_cosine, safe_pow};
 pub use roughness::{MAX_SHININESS, shininess_from_roughness};
 pub use shade::{
-    Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, shade, specular_factor, specular_reflection,
+    Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, model_exponent, shade, specular_factor,
+    specular_reflection,
 };
 pub use shading::{FlatRule, ReflectionModel, Shading};
 pub use snell::{

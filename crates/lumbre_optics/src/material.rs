@@ -64,6 +64,36 @@ pub enum AlphaMode {
     Blend,
 }
 
+/// What a highlight's brightness means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Lobe {
+    /// The documents' and OpenGL's: a bare power, k_s at the peak whatever the exponent.
+    #[default]
+    Bare,
+    /// glTF's: k_s is the part of the light that is reflected along the normal, so that sharp highlights are bright and wide ones faint.
+    /// The exponent is that of n·h in every model, and the Torrance-Sparrow model is glTF's own reflectance
+    /// ([`gltf_reflection`](crate::gltf_reflection)).
+    EnergyKeeping,
+}
+
+impl Lobe {
+    /// Both.
+    pub const ALL: &'static [Self] = &[Self::Bare, Self::EnergyKeeping];
+
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bare => "bare",
+            Self::EnergyKeeping => "energy-keeping",
+        }
+    }
+
+    /// The choice with that name, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|lobe| lobe.name() == name)
+    }
+}
+
 /// A material: what a surface does with light.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct Material {
@@ -85,9 +115,11 @@ pub struct Material {
     pub transmission: Vec3,
     /// Index of refraction, at least 1 (1.5 by default).
     pub ior: f32,
-    /// Spread of the microfacets (Torrance-Sparrow only).
+    /// What its highlight's brightness means.
+    pub lobe: Lobe,
+    /// Spread of the microfacets (bare lobes of Torrance-Sparrow only).
     pub distribution: Distribution,
-    /// What the microfacets reflect (Torrance-Sparrow only).
+    /// What the microfacets reflect (bare lobes of Torrance-Sparrow only).
     pub fresnel: Fresnel,
 }
 
@@ -103,6 +135,7 @@ impl Default for Material {
             mirror: Vec3::ZERO,
             transmission: Vec3::ZERO,
             ior: 1.5,
+            lobe: Lobe::default(),
             distribution: Distribution::default(),
             fresnel: Fresnel::default(),
         }
@@ -125,7 +158,7 @@ impl Material {
 
     /// The Phong coefficients for a glTF metallic-roughness material:
     /// k_d = base (1 - metallic), k_s = mix(0.04, base, metallic), n = 2/α² - 2 with α = roughness²,
-    /// clamped to [0, 10⁶] (beyond it f32 cannot tell the highlight from a point).
+    /// clamped to [0, 10⁶] (beyond it f32 cannot tell the highlight from a point), and the lobe that keeps its energy.
     pub fn from_metallic_roughness(base: Vec3, metallic: f32, roughness: f32) -> Self {
         let front = Surface {
             ambient: base,
@@ -134,7 +167,8 @@ impl Material {
             emission: Vec3::ZERO,
             shininess: shininess_from_roughness(roughness),
         };
-        Self { front, fresnel: Fresnel::NormalReflectance, ..Self::default() }
+        let (fresnel, lobe) = (Fresnel::NormalReflectance, Lobe::EnergyKeeping);
+        Self { front, fresnel, lobe, ..Self::default() }
     }
 }
 

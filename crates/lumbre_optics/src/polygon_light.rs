@@ -42,7 +42,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 use crate::normalization::{TINY_LENGTH_SQUARED, safe_normalize};
-use crate::shade::{Contribution, SurfaceSample, light_contribution};
+use crate::shade::{Contribution, SurfaceSample, light_contribution, model_exponent};
 use crate::{LightSample, ReflectionModel};
 
 /// Points along each edge that make a polygon's highlight.
@@ -257,7 +257,8 @@ pub fn polygon_highlight(
     let fall = (-reflected.dot(front)).max(GRAZING_COSINE);
     let hit_distance = height / fall;
     let hit = to_point + reflected * hit_distance;
-    let width = lobe_width(model, surface.shininess, view_cosine) * hit_distance;
+    let exponent = model_exponent(model, surface.lobe, surface.shininess);
+    let width = lobe_width(model, exponent, view_cosine) * hit_distance;
     let sideways = safe_normalize(normal.cross(viewer));
     let axis = |dual: DVec3| lobe_axis(dual, front, reflected, fall, hit, sideways, width);
     let u_axis = axis(light.edge_v.cross(front) / area);

@@ -4,11 +4,12 @@
 use glam::DVec3;
 
 use crate::blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
+use crate::energy_keeping::{gltf_reflection, lobe_peak};
 use crate::lambert::lambert;
 use crate::microfacet_reflection::{Distribution, Fresnel, microfacet_reflection};
 use crate::phong::phong;
 use crate::torrance_sparrow::torrance_sparrow;
-use crate::{LightSample, Material, ReflectionModel, Surface};
+use crate::{LightSample, Lobe, Material, ReflectionModel, Surface};
 
 /// Index of refraction of a surface that does not name one: glTF's default, that of window glass.
 pub const DEFAULT_IOR: f64 = 1.5;
@@ -27,6 +28,8 @@ pub struct SurfaceSample {
     pub shininess: f64,
     /// Index of refraction, read by the Torrance-Sparrow model only.
     pub ior: f64,
+    /// What the highlight's brightness means.
+    pub lobe: Lobe,
     /// Spread of the microfacets, read by the Torrance-Sparrow model only.
     pub distribution: Distribution,
     /// What the microfacets reflect, read by the Torrance-Sparrow model only.
@@ -41,6 +44,7 @@ impl SurfaceSample {
     pub fn new(material: &Material, front_facing: bool) -> Self {
         Self {
             ior: f64::from(material.ior),
+            lobe: material.lobe,
             distribution: material.distribution,
             fresnel: material.fresnel,
             ..Self::from(material.surface(front_facing))
@@ -57,6 +61,7 @@ impl From<&Surface> for SurfaceSample {
             specular: surface.specular.as_dvec3(),
             shininess: f64::from(surface.shininess_in_range()),
             ior: DEFAULT_IOR,
+            lobe: Lobe::Bare,
             distribution: Distribution::default(),
             fresnel: Fresnel::default(),
             peak: 1.0,
@@ -123,10 +128,22 @@ pub fn specular_factor(
     }
 }
 
+/// The exponent that a model's own equation takes for the one of n·h that an energy-keeping lobe states: of r·v a quarter.
+///
+/// # Error of the f32 twin
+///
+/// None: a power of two.
+pub fn model_exponent(model: ReflectionModel, lobe: Lobe, shininess: f64) -> f64 {
+    match (lobe, model) {
+        (Lobe::Bare, _) | (_, ReflectionModel::Blinn | ReflectionModel::TorranceSparrow) => shininess,
+        (Lobe::EnergyKeeping, _) => 0.25 * shininess,
+    }
+}
+
 /// k_s times the chosen model's factor, linear RGB, for the peak of a filtered highlight. With the Torrance-Sparrow model it has the
 /// material's distribution and Fresnel reflectance.
 ///
-/// In WGSL a material that chooses other than the defaults sets the feature `MICROFACETS`.
+/// In WGSL a material that chooses other than the defaults sets the feature `MICROFACETS`, and an energy-keeping lobe `ENERGY_KEEPING`.
 ///
 /// # Error of the f32 twin
 ///
@@ -139,7 +156,15 @@ pub fn specular_reflection(
     viewer: DVec3,
 ) -> DVec3 {
     let (shininess, ior) = (surface.shininess, surface.ior);
-    let reflected = if model == ReflectionModel::TorranceSparrow {
+    let reflected = if surface.lobe == Lobe::EnergyKeeping {
+        if model == ReflectionModel::TorranceSparrow {
+            gltf_reflection(normal, light, viewer, shininess, surface.specular)
+        } else {
+            let exponent = model_exponent(model, surface.lobe, shininess);
+            let factor = specular_factor(model, normal, light, viewer, exponent, ior);
+            surface.specular * (factor * (lobe_peak(shininess) * lambert(normal, light)))
+        }
+    } else if model == ReflectionModel::TorranceSparrow {
         let kind = (surface.distribution, surface.fresnel);
         microfacet_reflection(kind, normal, light, viewer, shininess, surface.specular, ior)
     } else {

@@ -56,10 +56,9 @@ impl ObjectData {
         let largest = normal.x_axis.abs().max(normal.y_axis.abs()).max(normal.z_axis.abs()).max_element();
         let factor = if largest > 0.0 && largest.is_finite() { 1.0 / largest } else { 0.0 };
         let column = |column: DVec3| (column * factor).as_vec3().extend(0.0).to_array();
-        Self {
-            rows: [row(0), row(1), row(2)],
-            normals: [column(normal.x_axis), column(normal.y_axis), column(normal.z_axis)],
-        }
+        let mut normals = [column(normal.x_axis), column(normal.y_axis), column(normal.z_axis)];
+        normals[0][3] = if transform.mirrors() { -1.0 } else { 1.0 };
+        Self { rows: [row(0), row(1), row(2)], normals }
     }
 }
 
@@ -133,6 +132,12 @@ impl CoordinatesData {
             v: [-sin * scale.x, cos * scale.y, offset.y, 0.0],
         }
     }
+
+    /// With a number that its shader reads in `v.w`.
+    fn with(mut self, number: f32) -> Self {
+        self.v[3] = finite(Vec3::splat(number)).x.clamp(-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT);
+        self
+    }
 }
 
 /// `Material`.
@@ -144,6 +149,8 @@ pub(crate) struct MaterialData {
     base_color: CoordinatesData,
     emissive: CoordinatesData,
     metallic_roughness: CoordinatesData,
+    normal_map: CoordinatesData,
+    occlusion: CoordinatesData,
     base_and_metallic: [f32; 4],
     roughness: [f32; 4],
     eta: [f32; 4],
@@ -157,6 +164,7 @@ impl MaterialData {
         let none = MaterialTextures::default();
         let textures = textures.unwrap_or(&none);
         let mapped = textures.metallic_roughness.as_ref();
+        let (normal, occlusion) = (textures.normal.as_ref(), textures.occlusion.as_ref());
         let (eta, absorption) = match material.fresnel {
             Fresnel::Conductor { eta, absorption } => (eta, absorption),
             Fresnel::Dielectric | Fresnel::NormalReflectance => (Vec3::ZERO, Vec3::ZERO),
@@ -167,10 +175,17 @@ impl MaterialData {
             base_color: CoordinatesData::new(textures.base_color.as_ref()),
             emissive: CoordinatesData::new(textures.emissive.as_ref()),
             metallic_roughness: CoordinatesData::new(mapped.map(|mapped| &mapped.texture)),
+            normal_map: CoordinatesData::new(normal.map(|slot| &slot.texture))
+                .with(normal.map_or(0.0, |slot| slot.scale)),
+            occlusion: CoordinatesData::new(occlusion.map(|slot| &slot.texture))
+                .with(occlusion.map_or(0.0, |slot| slot.strength)),
             base_and_metallic: mapped.map_or([0.0; 4], |m| {
                 coefficient(m.base_color).extend(finite(Vec3::splat(m.metallic)).x).to_array()
             }),
-            roughness: mapped.map_or([0.0; 4], |m| finite(Vec3::X * m.roughness).extend(0.0).to_array()),
+            roughness: mapped.map_or([0.0; 4], |m| {
+                let dielectric = coefficient(m.dielectric);
+                [finite(Vec3::X * m.roughness).x, dielectric.x, dielectric.y, dielectric.z]
+            }),
             eta: finite(eta).extend(0.0).to_array(),
             absorption: finite(absorption).extend(0.0).to_array(),
         }
@@ -293,7 +308,7 @@ mod tests {
     fn sizes_are_those_of_the_shaders() {
         assert_eq!(size_of::<FrameData>(), 144);
         assert_eq!(size_of::<ObjectData>(), 96);
-        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 4 * 16);
+        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 5 * 32 + 4 * 16);
         assert_eq!(size_of::<LightData>(), 96);
         assert_eq!(size_of::<InverseSquareLightData>(), 32);
         assert_eq!(size_of::<ClusterGridData>(), 48);

@@ -47,6 +47,8 @@ mod light_grid;
 mod light_lists;
 mod mesh_buffers;
 mod metering;
+mod mip_level;
+mod normal_map;
 mod offscreen;
 mod options;
 mod pipelines;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3, Vec4};
-use lumbre_mesh::TriangleMesh;
+use lumbre_mesh::{TextureCoordinateSet, TriangleMesh};
 use lumbre_optics::FlatRule;
 use wgpu::util::DeviceExt;
 
@@ -20,17 +20,18 @@ pub(crate) enum Attribute {
     Uv1,
     Color,
     Centroid,
+    Tangent,
 }
 
 impl Attribute {
-    pub const ALL: [Self; 6] =
-        [Self::Position, Self::Normal, Self::Uv0, Self::Uv1, Self::Color, Self::Centroid];
+    pub const ALL: [Self; 7] =
+        [Self::Position, Self::Normal, Self::Uv0, Self::Uv1, Self::Color, Self::Centroid, Self::Tangent];
 
     pub fn format(self) -> wgpu::VertexFormat {
         match self {
             Self::Position | Self::Normal | Self::Centroid => wgpu::VertexFormat::Float32x3,
             Self::Uv0 | Self::Uv1 => wgpu::VertexFormat::Float32x2,
-            Self::Color => wgpu::VertexFormat::Float32x4,
+            Self::Color | Self::Tangent => wgpu::VertexFormat::Float32x4,
         }
     }
 }
@@ -38,13 +39,18 @@ impl Attribute {
 /// The vertices of a mesh for one rate of evaluation.
 #[derive(Debug, Default)]
 struct VertexBuffers {
-    attributes: [Option<wgpu::Buffer>; 6],
+    attributes: [Option<wgpu::Buffer>; Attribute::ALL.len()],
 }
 
 /// The GPU's copy of one mesh.
 #[derive(Debug)]
 pub(crate) struct GpuMesh {
+    /// As the entities have it.
+    shared: Arc<TriangleMesh>,
+    /// The same, with tangents once something asked for them.
     source: Arc<TriangleMesh>,
+    /// The coordinates of the normal map that it is drawn with.
+    tangents: Option<TextureCoordinateSet>,
     indexed: VertexBuffers,
     indices: Option<wgpu::Buffer>,
     /// Three vertices per triangle, for flat shading by each rule.
@@ -63,7 +69,7 @@ pub(crate) struct MeshSlices<'a> {
 }
 
 impl GpuMesh {
-    fn new(source: Arc<TriangleMesh>) -> Self {
+    fn new(source: Arc<TriangleMesh>, tangents: Option<TextureCoordinateSet>) -> Self {
         let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for position in source.positions.iter().filter(|position| position.is_finite()) {
             (min, max) = (min.min(*position), max.max(*position));
@@ -75,7 +81,9 @@ impl GpuMesh {
             (DVec3::ZERO, DVec3::ZERO)
         };
         Self {
+            shared: Arc::clone(&source),
             source,
+            tangents,
             indexed: VertexBuffers::default(),
             indices: None,
             expanded: Default::default(),
@@ -91,6 +99,9 @@ impl GpuMesh {
 
     /// Makes what is missing of these attributes.
     pub fn prepare(&mut self, gpu: &Gpu, attributes: &[Attribute], flat: Option<FlatRule>) {
+        if attributes.contains(&Attribute::Tangent) {
+            self.make_tangents(gpu);
+        }
         let buffers = match flat {
             Some(rule) => &mut self.expanded[rule as usize],
             None => &mut self.indexed,
@@ -108,6 +119,21 @@ impl GpuMesh {
         if flat.is_none() && self.indices.is_none() {
             let bytes = bytemuck::cast_slice(&self.source.indices);
             self.indices = Some(vertex_buffer(gpu, bytes, wgpu::BufferUsages::INDEX));
+        }
+    }
+
+    /// Tangents for a mesh that has none. Vertices may be split, so that what was made of the indexed vertices is made again.
+    fn make_tangents(&mut self, gpu: &Gpu) {
+        let Some(set) = self.tangents.filter(|_| self.source.tangents.is_empty()) else { return };
+        // A mesh that is not sound shows its map as if it were flat.
+        let Ok(source) = self.source.with_tangents(set) else { return };
+        self.source = Arc::new(source);
+        self.indices = None;
+        let made = std::mem::take(&mut self.indexed.attributes);
+        let again: Vec<_> =
+            Attribute::ALL.into_iter().filter(|attribute| made[*attribute as usize].is_some()).collect();
+        if !again.is_empty() {
+            self.prepare(gpu, &again, None);
         }
     }
 
@@ -140,6 +166,7 @@ fn indexed_attribute(mesh: &TriangleMesh, attribute: Attribute) -> Vec<u8> {
         Attribute::Uv0 => filled(&mesh.uv0, glam::Vec2::ZERO, count, |uv| uv),
         Attribute::Uv1 => filled(&mesh.uv1, glam::Vec2::ZERO, count, |uv| uv),
         Attribute::Color => filled(&mesh.colors, Vec4::ONE, count, usable_color),
+        Attribute::Tangent => filled(&mesh.tangents, Vec4::ZERO, count, usable_tangent),
     }
 }
 
@@ -151,6 +178,12 @@ fn usable_normal(normal: Vec3) -> Vec3 {
         (true, true) => normal / largest,
         (true, false) => normal,
     }
+}
+
+/// A tangent whose square f32 can hold; one that is no vector is the zero vector, on which a normal map has no effect.
+fn usable_tangent(tangent: Vec4) -> Vec4 {
+    let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+    usable_normal(tangent.truncate()).extend(side)
 }
 
 /// Normals longer than this, in metres, are scaled down before they are squared.
@@ -210,6 +243,9 @@ fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule)
         (Attribute::Uv1, _) => {
             spread(mesh, |triangle, corner| value(&mesh.uv1, glam::Vec2::ZERO, triangle[corner]))
         }
+        (Attribute::Tangent, _) => spread(mesh, |triangle, corner| {
+            usable_tangent(value(&mesh.tangents, Vec4::ZERO, triangle[corner]))
+        }),
         (Attribute::Color, provoking) => spread(mesh, |triangle, corner| {
             let color = |corner: usize| usable_color(value(&mesh.colors, Vec4::ONE, triangle[corner]));
             let flat = match provoking {
@@ -222,8 +258,8 @@ fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule)
     }
 }
 
-/// Address of a shared mesh: what entities share, the GPU shares.
-pub(crate) type MeshKey = usize;
+/// Address of a shared mesh, and which tangents it needs where it has none: what entities share, the GPU shares.
+pub(crate) type MeshKey = (usize, Option<TextureCoordinateSet>);
 
 /// Every mesh in use.
 #[derive(Debug, Default)]
@@ -232,11 +268,11 @@ pub(crate) struct MeshBuffers {
 }
 
 impl MeshBuffers {
-    /// The key of a mesh, known from now on.
-    pub fn insert(&mut self, mesh: &Arc<TriangleMesh>) -> MeshKey {
-        let key = Arc::as_ptr(mesh) as usize;
+    /// The key of a mesh, known from now on. `normal_map` says which coordinates its normal map reads, if it has one.
+    pub fn insert(&mut self, mesh: &Arc<TriangleMesh>, normal_map: Option<TextureCoordinateSet>) -> MeshKey {
+        let key = (Arc::as_ptr(mesh) as usize, normal_map.filter(|_| mesh.tangents.is_empty()));
         // The copy keeps the Arc alive, so that an address never names another mesh.
-        self.meshes.entry(key).or_insert_with(|| GpuMesh::new(Arc::clone(mesh)));
+        self.meshes.entry(key).or_insert_with(|| GpuMesh::new(Arc::clone(mesh), key.1));
         key
     }
 
@@ -250,6 +286,11 @@ impl MeshBuffers {
 
     /// Forgets meshes that no entity holds any more.
     pub fn sweep(&mut self) {
-        self.meshes.retain(|_, mesh| Arc::strong_count(&mesh.source) > 1);
+        let mut held: HashMap<usize, usize> = HashMap::new();
+        for (key, mesh) in &self.meshes {
+            let own = if Arc::ptr_eq(&mesh.shared, &mesh.source) { 2 } else { 1 };
+            *held.entry(key.0).or_default() += own;
+        }
+        self.meshes.retain(|key, mesh| Arc::strong_count(&mesh.shared) > held[&key.0]);
     }
 }

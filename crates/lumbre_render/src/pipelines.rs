@@ -104,6 +104,7 @@ pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
             Attribute::Uv1 => variant.has(Feature::Uv1),
             Attribute::Color => variant.has(Feature::VertexColor),
             Attribute::Centroid => lit && variant.shading == Shading::Flat,
+            Attribute::Tangent => variant.has(Feature::NormalTexture),
         })
         .collect()
 }

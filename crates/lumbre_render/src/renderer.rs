@@ -240,7 +240,7 @@ impl Renderer {
             frame_groups: [self.frame_group.as_ref(), self.clustered_group.as_ref()],
             display: &self.display,
             display_key,
-            background: plan.in_range(radiance(settings.background)),
+            background: plan.in_range(radiance(settings.shown_background())),
         };
         let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
         self.gpu.check()?;
@@ -275,7 +275,7 @@ impl Renderer {
             exposure,
             backward: view.basis.z_axis.as_vec3(),
             padding: 0.0,
-            ambient: radiance(settings.ambient) + lights.ambient,
+            ambient: radiance(settings.ambient_with_sky()) + lights.ambient,
             padding_2: 0.0,
             fog_color: fog.map_or(glam::Vec3::ZERO, |fog| radiance(fog.color)),
             padding_3: 0.0,

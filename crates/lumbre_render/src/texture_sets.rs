@@ -6,17 +6,19 @@ use std::sync::Arc;
 use lumbre_scene::{Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
 
 use crate::shader::Feature;
-use crate::textures::Textures;
+use crate::textures::{Texels, Textures};
 use crate::{Gpu, RenderError};
 
-/// The slots of a set in binding order: the feature that reads it, and whether its bytes are sRGB-encoded.
-const SLOTS: [(Feature, bool); 3] = [
-    (Feature::BaseColorTexture, true),
-    (Feature::EmissiveTexture, true),
-    (Feature::MetallicRoughnessTexture, false),
+/// The slots of a set in binding order: the feature that reads it, and what its texels are.
+const SLOTS: [(Feature, Texels); 5] = [
+    (Feature::BaseColorTexture, Texels::Colors),
+    (Feature::EmissiveTexture, Texels::Colors),
+    (Feature::MetallicRoughnessTexture, Texels::Numbers),
+    (Feature::NormalTexture, Texels::Normals),
+    (Feature::OcclusionTexture, Texels::Numbers),
 ];
 
-/// A bind group of some of the three material textures.
+/// A bind group of some of the material textures.
 #[derive(Debug)]
 pub(crate) struct TextureSet {
     /// Bit i: slot i is bound.
@@ -24,7 +26,7 @@ pub(crate) struct TextureSet {
     pub bind_group: wgpu::BindGroup,
 }
 
-type SetKey = [Option<(usize, Sampler)>; 3];
+type SetKey = [Option<(usize, Sampler)>; SLOTS.len()];
 
 /// All sets in use.
 #[derive(Debug, Default)]
@@ -35,11 +37,13 @@ pub(crate) struct TextureSets {
     lightmaps: HashMap<usize, Arc<wgpu::BindGroup>>,
 }
 
-fn slots(textures: &MaterialTextures) -> [Option<&TextureReference>; 3] {
+fn slots(textures: &MaterialTextures) -> [Option<&TextureReference>; SLOTS.len()] {
     [
         textures.base_color.as_ref(),
         textures.emissive.as_ref(),
         textures.metallic_roughness.as_ref().map(|mapped| &mapped.texture),
+        textures.normal.as_ref().map(|slot| &slot.texture),
+        textures.occlusion.as_ref().map(|slot| &slot.texture),
     ]
 }
 
@@ -53,10 +57,10 @@ pub(crate) fn features(mask: u8) -> impl Iterator<Item = (Feature, bool)> {
     SLOTS.iter().enumerate().map(move |(i, (feature, _))| (*feature, mask & (1 << i) != 0))
 }
 
-/// The coordinate sets that a material's textures read: (uv0, uv1).
-pub(crate) fn coordinate_sets(textures: &MaterialTextures) -> (bool, bool) {
-    let used = |set: u32| slots(textures).into_iter().flatten().any(|texture| texture.tex_coord == set);
-    (used(0), used(1))
+/// Which of a material's slots read `uv1`.
+pub(crate) fn second_set(textures: &MaterialTextures) -> u8 {
+    let second = |slot: &Option<&TextureReference>| slot.is_some_and(|texture| texture.tex_coord != 0);
+    slots(textures).iter().enumerate().map(|(i, slot)| u8::from(second(slot)) << i).sum()
 }
 
 impl TextureSets {
@@ -80,9 +84,9 @@ impl TextureSets {
             return Ok(Some(Arc::clone(set)));
         }
         let mut bound = Vec::new();
-        for ((slot, (_, srgb)), binding) in slots.iter().zip(SLOTS).zip((0..).step_by(2)) {
+        for ((slot, (_, texels)), binding) in slots.iter().zip(SLOTS).zip((0..).step_by(2)) {
             if let Some(texture) = slot {
-                let view = textures.image(gpu, &texture.image, srgb)?;
+                let view = textures.image(gpu, &texture.image, texels)?;
                 bound.push((binding, view, textures.sampler(gpu, &texture.sampler)));
             }
         }
@@ -125,7 +129,7 @@ impl TextureSets {
 }
 
 fn make_layout(gpu: &Gpu, mask: u8) -> wgpu::BindGroupLayout {
-    let first: Vec<u32> = (0..3).filter(|i| mask & (1 << i) != 0).map(|i| i * 2).collect();
+    let first: Vec<u32> = (0..SLOTS.len() as u32).filter(|i| mask & (1 << i) != 0).map(|i| i * 2).collect();
     layout_of(gpu, &first)
 }
 

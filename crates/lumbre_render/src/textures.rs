@@ -6,28 +6,41 @@ use std::sync::Arc;
 use half::f16;
 use lumbre_scene::{Image, LightmapImage, Mipmap, Sampler, Wrap};
 
+use crate::mip_level::MipLevel;
+use crate::normal_map::normal_levels;
 use crate::{Gpu, RenderError};
+
+/// What the bytes of an image are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Texels {
+    /// sRGB-encoded colours.
+    Colors,
+    /// Linear numbers.
+    Numbers,
+    /// The vectors of a normal map.
+    Normals,
+}
 
 /// Textures and samplers in use, by the address of the shared image.
 #[derive(Debug, Default)]
 pub(crate) struct Textures {
-    images: HashMap<(usize, bool), (Arc<Image>, wgpu::TextureView)>,
+    images: HashMap<(usize, Texels), (Arc<Image>, wgpu::TextureView)>,
     lightmaps: HashMap<usize, (Arc<LightmapImage>, wgpu::TextureView)>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
 }
 
 impl Textures {
-    /// The view of an image, whose bytes are sRGB-encoded or linear.
+    /// The view of an image.
     pub fn image(
         &mut self,
         gpu: &Gpu,
         image: &Arc<Image>,
-        srgb: bool,
+        texels: Texels,
     ) -> Result<wgpu::TextureView, RenderError> {
         check(&image.name, image.width, image.height, image.rgba.len(), 4)?;
-        let key = (Arc::as_ptr(image) as usize, srgb);
+        let key = (Arc::as_ptr(image) as usize, texels);
         let entry = self.images.entry(key);
-        Ok(entry.or_insert_with(|| (Arc::clone(image), upload(gpu, image, srgb))).1.clone())
+        Ok(entry.or_insert_with(|| (Arc::clone(image), upload(gpu, image, texels))).1.clone())
     }
 
     /// The view of a lightmap: E/π, f16 per channel.
@@ -91,19 +104,23 @@ fn make_sampler(gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
     })
 }
 
-fn upload(gpu: &Gpu, image: &Image, srgb: bool) -> wgpu::TextureView {
-    let mut level = (image.width, image.height, image.rgba.clone());
+fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> wgpu::TextureView {
+    let mut levels = match texels {
+        Texels::Colors => color_levels(image, true),
+        Texels::Numbers => color_levels(image, false),
+        Texels::Normals => normal_levels(image),
+    };
     let limit = gpu.device.limits().max_texture_dimension_2d;
     // Beyond the device's limit the largest mip level that fits stands in.
-    while level.0 > limit || level.1 > limit {
-        level = halved(&level, srgb);
-    }
-    let levels = 32 - level.0.max(level.1).leading_zeros();
-    let format = if srgb { wgpu::TextureFormat::Rgba8UnormSrgb } else { wgpu::TextureFormat::Rgba8Unorm };
-    let texture = texture_2d(gpu, level.0, level.1, levels, format);
-    for mip in 0..levels {
-        write(gpu, &texture, mip, level.0, level.1, 4, &level.2);
-        level = halved(&level, srgb);
+    levels.retain(|level| level.width <= limit && level.height <= limit);
+    let format = match texels {
+        Texels::Colors => wgpu::TextureFormat::Rgba8UnormSrgb,
+        Texels::Numbers | Texels::Normals => wgpu::TextureFormat::Rgba8Unorm,
+    };
+    let (width, height) = levels.first().map_or((1, 1), |level| (level.width, level.height));
+    let texture = texture_2d(gpu, width, height, levels.len().max(1) as u32, format);
+    for (mip, level) in (0..).zip(&levels) {
+        write(gpu, &texture, mip, level.width, level.height, 4, &level.rgba);
     }
     texture.create_view(&Default::default())
 }
@@ -154,8 +171,17 @@ fn write(
     );
 }
 
+/// The levels of an image of colours or of numbers, the first one as it is.
+fn color_levels(image: &Image, srgb: bool) -> Vec<MipLevel> {
+    let first = MipLevel { width: image.width, height: image.height, rgba: image.rgba.clone() };
+    let count = 32 - image.width.max(image.height).leading_zeros();
+    let next = |level: &MipLevel| Some(halved(level, srgb));
+    std::iter::successors(Some(first), next).take(count as usize).collect()
+}
+
 /// The next mip level: a box filter in linear light, so that a minified wall keeps its brightness.
-fn halved((width, height, texels): &(u32, u32, Vec<u8>), srgb: bool) -> (u32, u32, Vec<u8>) {
+fn halved(level: &MipLevel, srgb: bool) -> MipLevel {
+    let MipLevel { width, height, rgba: texels } = level;
     let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
     let decode = |byte: u8, channel: usize| {
         let value = f32::from(byte) / 255.0;
@@ -180,7 +206,7 @@ fn halved((width, height, texels): &(u32, u32, Vec<u8>), srgb: bool) -> (u32, u3
             }
         }
     }
-    (half_width, half_height, result)
+    MipLevel { width: half_width, height: half_height, rgba: result }
 }
 
 /// IEC 61966-2-1.
@@ -199,11 +225,12 @@ mod tests {
 
     #[test]
     fn minifying_averages_light_and_not_codes() {
-        let checker = (2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255]);
-        let (width, height, texels) = halved(&checker, true);
+        let rgba = vec![0, 0, 0, 255, 255, 255, 255, 255];
+        let checker = MipLevel { width: 2, height: 1, rgba };
+        let MipLevel { width, height, rgba: texels } = halved(&checker, true);
         assert_eq!((width, height), (1, 1));
         // Half the light is sRGB code 188 (0.7354); half the code would be 128.
         assert_eq!(texels, [188, 188, 188, 255]);
-        assert_eq!(halved(&checker, false).2, [128, 128, 128, 255]);
+        assert_eq!(halved(&checker, false).rgba, [128, 128, 128, 255]);
     }
 }

@@ -38,6 +38,8 @@ pub struct Census {
     pub shadow_lights: usize,
     /// Whether there is global ambient light.
     pub global_ambient: bool,
+    /// Whether there is a sky.
+    pub sky: bool,
     /// Entities with a mesh that is shown.
     pub meshes: usize,
     /// Different meshes among them.
@@ -60,6 +62,10 @@ pub struct Census {
     pub emissive_textures: usize,
     /// Meshes with a metallic-roughness texture.
     pub metallic_roughness_textures: usize,
+    /// Meshes with a normal texture.
+    pub normal_textures: usize,
+    /// Meshes with an occlusion texture.
+    pub occlusion_textures: usize,
     /// Texture images.
     pub texture_images: usize,
     /// Meshes with vertex colours.
@@ -127,6 +133,7 @@ impl Census {
         let mut census = Self {
             fog: settings.fog.is_some(),
             global_ambient: settings.ambient != Vec3::ZERO,
+            sky: settings.sky != Vec3::ZERO,
             cameras: world.query::<&Camera>().iter(world).count(),
             ..Self::default()
         };
@@ -188,6 +195,8 @@ impl Census {
                     (&mut self.base_color_textures, textures.base_color.as_ref()),
                     (&mut self.emissive_textures, textures.emissive.as_ref()),
                     (&mut self.metallic_roughness_textures, roughness),
+                    (&mut self.normal_textures, textures.normal.as_ref().map(|slot| &slot.texture)),
+                    (&mut self.occlusion_textures, textures.occlusion.as_ref().map(|slot| &slot.texture)),
                 ] {
                     if let Some(texture) = texture {
                         *count += 1;
@@ -259,8 +268,14 @@ impl Census {
             let count = self.reflection_models.get(model.name()).copied().unwrap_or_default();
             mesh(effect, count, "with a highlight of that model", "no highlight is of that model")
         };
-        let textured =
-            self.base_color_textures.max(self.emissive_textures).max(self.metallic_roughness_textures);
+        let textured = [
+            self.emissive_textures,
+            self.metallic_roughness_textures,
+            self.normal_textures,
+            self.occlusion_textures,
+        ]
+        .into_iter()
+        .fold(self.base_color_textures, usize::max);
         let scene = |effect, on: bool, yes: &str, no: &str| CensusLine {
             effect,
             called_for: on,
@@ -288,6 +303,12 @@ impl Census {
                 self.global_ambient,
                 "the scene's ambient light is not black",
                 "the scene's ambient light is black",
+            ),
+            scene(
+                "sky",
+                self.sky,
+                "the scene's sky shines: as background, and as ambient light of what has no lightmap",
+                "the scene's sky is black",
             ),
             light("ambient lights", self.ambient_lights, "ambient"),
             light("directional lights", self.directional_lights, "directional"),
@@ -321,6 +342,8 @@ impl Census {
                 "with one",
                 "no material has one",
             ),
+            mesh("normal textures", self.normal_textures, "with one", "no material has one"),
+            mesh("occlusion textures", self.occlusion_textures, "with one", "no material has one"),
             mesh("vertex colours", self.vertex_colors, "with COLOR_0", "no mesh has COLOR_0"),
             mesh("alpha mask", self.alpha_mask, "cut out by alpha", "no material is masked"),
             mesh("alpha blending", self.alpha_blend, "blended", "no material is blended"),

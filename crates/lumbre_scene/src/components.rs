@@ -23,14 +23,58 @@ pub struct MaterialTextures {
     pub emissive: Option<TextureReference>,
     /// Green is roughness, blue is metallic (linear); present only for glTF materials without Phong coefficients.
     pub metallic_roughness: Option<MetallicRoughnessTexture>,
+    /// Turns the normal of every fragment under Phong shading (linear).
+    pub normal: Option<NormalTexture>,
+    /// Weakens indirect light: ambient terms and lightmaps (red, linear).
+    pub occlusion: Option<OcclusionTexture>,
 }
 
 impl MaterialTextures {
     /// The textures that there are.
     pub fn references(&self) -> impl Iterator<Item = &TextureReference> {
-        let mapped = self.metallic_roughness.as_ref().map(|mapped| &mapped.texture);
-        [self.base_color.as_ref(), self.emissive.as_ref(), mapped].into_iter().flatten()
+        let Self { base_color, emissive, metallic_roughness, normal, occlusion } = self;
+        let slots = [
+            base_color.as_ref(),
+            emissive.as_ref(),
+            metallic_roughness.as_ref().map(|mapped| &mapped.texture),
+            normal.as_ref().map(|normal| &normal.texture),
+            occlusion.as_ref().map(|occlusion| &occlusion.texture),
+        ];
+        slots.into_iter().flatten()
     }
+
+    /// The textures that there are, to be changed.
+    pub fn references_mut(&mut self) -> impl Iterator<Item = &mut TextureReference> {
+        let Self { base_color, emissive, metallic_roughness, normal, occlusion } = self;
+        let slots = [
+            base_color.as_mut(),
+            emissive.as_mut(),
+            metallic_roughness.as_mut().map(|mapped| &mut mapped.texture),
+            normal.as_mut().map(|normal| &mut normal.texture),
+            occlusion.as_mut().map(|occlusion| &mut occlusion.texture),
+        ];
+        slots.into_iter().flatten()
+    }
+}
+
+/// A tangent-space normal map: red points along the mesh's tangents, green against v, blue along the normal (glTF's convention).
+///
+/// A mesh that has no tangents gets those of MikkTSpace when it is first drawn, over the coordinates that the texture reads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalTexture {
+    /// The texture.
+    pub texture: TextureReference,
+    /// Factor of red and green after decoding; any number that is finite.
+    pub scale: f32,
+}
+
+/// How much of the indirect light reaches each texel, in red.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OcclusionTexture {
+    /// The texture.
+    pub texture: TextureReference,
+    /// 0 for no occlusion, 1 for all of it.
+    pub strength: f32,
 }
 
 /// A metallic-roughness texture with the factors that the per-texel mapping to Phong needs.
@@ -44,6 +88,8 @@ pub struct MetallicRoughnessTexture {
     pub metallic: f32,
     /// Factor of the green channel, [0, 1].
     pub roughness: f32,
+    /// k_s where nothing is metal: .04, unless a file states an index of refraction or a specular colour.
+    pub dielectric: glam::Vec3,
 }
 
 /// An entity whose indirect (and static direct) light comes from a baked texture through the mesh's `uv1`.

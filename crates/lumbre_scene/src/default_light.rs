@@ -19,14 +19,14 @@ const AMBIENT: f32 = 0.2;
 
 /// Whether a frame of a World would be black where it should show surfaces: a mesh is shown that takes light, and there is none.
 ///
-/// Light is a `Light` that is on and not black, global ambient light, a lightmap, or a mesh with [`EmissiveLight`]. Emission alone lights
-/// nothing else in a frame, and neither does the sky; both do in a bake.
+/// Light is a `Light` that is on and not black, global ambient light, a sky, a lightmap, or a mesh with [`EmissiveLight`]. Emission alone
+/// lights nothing else in a frame; it does in a bake.
 pub fn is_without_light(world: &mut World) -> bool {
     let shines = |color: Vec3| color.max_element() > 0.0;
     let lamp = |light: &Light| {
         light.enabled && [light.ambient, light.diffuse, light.specular].into_iter().any(shines)
     };
-    if world.get_resource::<SceneSettings>().is_some_and(|settings| shines(settings.ambient))
+    if world.get_resource::<SceneSettings>().is_some_and(|settings| shines(settings.ambient_with_sky()))
         || world.query::<&Light>().iter(world).any(lamp)
         || world.query_filtered::<(), (With<Lightmap>, With<Mesh>)>().iter(world).next().is_some()
         || world
@@ -115,6 +115,9 @@ mod tests {
         let mut ambient = grey();
         ambient.insert_resource(SceneSettings { ambient: Vec3::splat(0.1), ..SceneSettings::default() });
         assert!(!is_without_light(&mut ambient));
+        let mut outside = grey();
+        outside.insert_resource(SceneSettings { sky: Vec3::splat(0.1), ..SceneSettings::default() });
+        assert!(!is_without_light(&mut outside));
         let mut baked = grey();
         let (encoding, texels) = (LightmapEncoding::Rgb32Float, vec![Vec3::ONE]);
         let image = LightmapImage { name: String::new(), width: 1, height: 1, texels, encoding };

@@ -53,7 +53,8 @@ pub use bounds::scene_bounds;
 pub use census::{Census, CensusLine};
 pub use components::{
     ActiveCamera, Bounds, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, MaterialTextures,
-    Mesh, MetallicRoughnessTexture, Primitive, Projection, SharedImage, StaticObject,
+    Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, Primitive, Projection, SharedImage,
+    StaticObject,
 };
 pub use default_camera::default_camera;
 pub use default_light::{add_default_light, is_without_light};

@@ -9,10 +9,10 @@ use lumbre_optics::{FlatRule, Fog, ReflectionModel, Shading};
 pub struct SceneSettings {
     /// Global ambient light I_a, linear RGB.
     pub ambient: Vec3,
-    /// Background, linear RGB.
+    /// Background, linear RGB. Where it is black the sky is.
     pub background: Vec3,
-    /// Radiance of the sky, W/(m² sr), linear RGB, the same in every direction: what rays of the bake see that meet nothing. The
-    /// frame draws `background` and knows the sky's light by its lightmaps only.
+    /// Radiance of the sky, W/(m² sr), linear RGB, the same in every direction: what rays of the bake see that meet nothing, the background
+    /// of a frame, and ambient light for all that has no lightmap.
     pub sky: Vec3,
     /// The viewer is at the eye (true) or infinitely far along +Z of the camera (false).
     pub local_viewer: bool,
@@ -31,6 +31,19 @@ pub struct SceneSettings {
     pub specular_antialiasing: bool,
     /// Fog, if any.
     pub fog: Option<Fog>,
+}
+
+impl SceneSettings {
+    /// Radiance of what a frame shows where no surface is: the background, or the sky where that is black.
+    pub fn shown_background(&self) -> Vec3 {
+        if self.background == Vec3::ZERO { self.sky } else { self.background }
+    }
+
+    /// Ambient light of what has no lightmap: I_a, and the sky's radiance L. A sky of one radiance gives every point the irradiance π L from
+    /// all around, of which k_d π L/π = k_d L is reflected; that things stand in each other's way only a bake knows.
+    pub fn ambient_with_sky(&self) -> Vec3 {
+        self.ambient + self.sky
+    }
 }
 
 impl Default for SceneSettings {

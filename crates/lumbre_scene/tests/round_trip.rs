@@ -22,6 +22,11 @@ fn triangle(shift: f32) -> Arc<TriangleMesh> {
             Vec3::new(shift, 1.0, 0.1),
         ],
         normals: vec![Vec3::Z, Vec3::Y, Vec3::new(0.6, 0.8, 0.0)],
+        tangents: vec![
+            Vec4::new(1.0, 0.0, 0.0, 1.0),
+            Vec4::new(0.0, 0.6, 0.8, -1.0),
+            Vec4::new(0.0, 0.0, 1.0, 1.0),
+        ],
         uv0: vec![Vec2::ZERO, Vec2::X, Vec2::new(0.1, 0.7)],
         uv1: vec![Vec2::ZERO, Vec2::X, Vec2::Y],
         colors: vec![Vec4::ONE, Vec4::new(0.1, 0.2, 0.3, 0.4), Vec4::W],
@@ -107,6 +112,7 @@ fn everything() -> World {
             mirror: Vec3::splat(0.1),
             transmission: Vec3::new(0.0, 0.2, 0.0),
             ior: 1.33,
+            lobe: lumbre_optics::Lobe::EnergyKeeping,
             distribution: Distribution::Gaussian,
             fresnel: Fresnel::Conductor {
                 eta: Vec3::new(0.17, 0.42, 1.38),
@@ -127,7 +133,10 @@ fn everything() -> World {
             base_color: Vec3::new(0.7, 0.3, 0.1),
             metallic: 0.25,
             roughness: 0.6,
+            dielectric: Vec3::splat(0.04),
         }),
+        normal: Some(NormalTexture { texture: texture(&image("bumps", 3)), scale: -0.75 }),
+        occlusion: Some(OcclusionTexture { texture: texture(&picture), strength: 0.25 }),
     };
     for instance in 0..2 {
         let node = world

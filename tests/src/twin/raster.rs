@@ -39,7 +39,7 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
     let mut frame = TwinFrame {
         width,
         height,
-        color: vec![settings.background.as_dvec3(); width * height],
+        color: vec![settings.shown_background().as_dvec3(); width * height],
         surface: vec![None; width * height],
     };
     let lens = Lens {

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3, DVec4};
+use lumbre_mesh::{TextureCoordinateSet, TriangleMesh};
 use lumbre_optics::{FlatRule, Light, Material, PolygonLight, ReflectionModel, Shading, safe_normalize};
 use lumbre_scene::{
-    EmissiveLight, GlobalTransform, Hidden, Lightmap, LightmapImage, Mesh, SceneSettings, StaticObject,
+    EmissiveLight, GlobalTransform, Hidden, Lightmap, LightmapImage, MaterialTextures, Mesh, NormalTexture,
+    OcclusionTexture, SceneSettings, StaticObject,
 };
 
 use super::TwinOptions;
@@ -14,7 +16,9 @@ use super::TwinOptions;
 pub(super) struct Vertex {
     pub(super) point: DVec3,
     pub(super) normal: DVec3,
-    pub(super) uv1: DVec2,
+    /// Direction in the world, and its side there.
+    pub(super) tangent: DVec4,
+    pub(super) uv: [DVec2; 2],
 }
 
 pub(super) struct Scene {
@@ -42,6 +46,8 @@ pub(super) struct Object {
     pub(super) shading: Shading,
     pub(super) reflection: ReflectionModel,
     pub(super) lightmap: Option<Arc<LightmapImage>>,
+    pub(super) normal_map: Option<NormalTexture>,
+    pub(super) occlusion: Option<OcclusionTexture>,
     pub(super) triangles: Vec<[Vertex; 3]>,
     /// Its transform mirrors: the second and third corner of every triangle have changed places.
     pub(super) mirrored: bool,
@@ -82,8 +88,8 @@ impl Object {
 }
 
 type Choices<'a> = (Option<&'a Shading>, Option<&'a ReflectionModel>);
-type Found<'a> =
-    (&'a Mesh, &'a Material, &'a GlobalTransform, Choices<'a>, Option<&'a Lightmap>, (bool, bool));
+type Found<'a> = (&'a Mesh, &'a Material, &'a GlobalTransform, Choices<'a>, Maps<'a>, (bool, bool));
+type Maps<'a> = (Option<&'a Lightmap>, Option<&'a MaterialTextures>);
 
 /// The objects that are seen.
 pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &TwinOptions) -> Vec<Object> {
@@ -92,22 +98,30 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
         &Material,
         &GlobalTransform,
         (Option<&Shading>, Option<&ReflectionModel>),
-        Option<&Lightmap>,
+        (Option<&Lightmap>, Option<&MaterialTextures>),
         (Has<EmissiveLight>, Has<StaticObject>),
     ), Without<Hidden>>();
     let object = |(index, found): (usize, Found<'_>)| {
-        let (mesh, material, place, (shading, reflection), lightmap, (shines, fixed)) = found;
+        let (mesh, material, place, (shading, reflection), (lightmap, textures), (shines, fixed)) = found;
+        let (normal_map, occlusion) =
+            textures.map_or((None, None), |textures| (textures.normal.clone(), textures.occlusion.clone()));
+        let mesh = with_tangents(&mesh.0, normal_map.as_ref());
         // Of unit size, so that what counts as no normal does not depend on the scale.
         let normals = place.normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let normals = if largest > 0.0 { normals * (1.0 / largest) } else { normals };
         let vertex = |index: u32| {
             let index = index as usize;
-            let normal = mesh.0.normals.get(index).map_or(DVec3::ZERO, |normal| normal.as_dvec3());
+            let normal = mesh.normals.get(index).map_or(DVec3::ZERO, |normal| normal.as_dvec3());
+            let tangent = mesh.tangents.get(index).map_or(DVec4::ZERO, |tangent| tangent.as_dvec4());
+            let direction = safe_normalize(place.0.matrix3 * tangent.truncate());
+            let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+            let uv = [&mesh.uv0, &mesh.uv1];
             Vertex {
-                point: place.0.transform_point3(mesh.0.positions[index].as_dvec3()),
+                point: place.0.transform_point3(mesh.positions[index].as_dvec3()),
+                tangent: direction.extend(if place.mirrors() { -side } else { side }),
                 normal: safe_normalize(normals * normal),
-                uv1: mesh.0.uv1.get(index).map_or(DVec2::ZERO, |uv| uv.as_dvec2()),
+                uv: uv.map(|list| list.get(index).map_or(DVec2::ZERO, |uv| uv.as_dvec2())),
             }
         };
         Object {
@@ -118,8 +132,9 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
             reflection: options.reflection.or(reflection.copied()).unwrap_or(settings.reflection),
             mirrored: place.mirrors(),
             lightmap: lightmap.map(|lightmap| Arc::clone(&lightmap.image)),
+            normal_map,
+            occlusion,
             triangles: mesh
-                .0
                 .triangles()
                 .map(|triangle| {
                     // A mirrored triangle winds the other way; its front stays its front.
@@ -130,4 +145,14 @@ pub(super) fn collect(world: &mut World, settings: &SceneSettings, options: &Twi
         }
     };
     query.iter(world).enumerate().map(object).collect()
+}
+
+/// The mesh as its normal map needs it.
+fn with_tangents(mesh: &Arc<TriangleMesh>, map: Option<&NormalTexture>) -> Arc<TriangleMesh> {
+    let Some(map) = map.filter(|_| mesh.tangents.is_empty()) else { return Arc::clone(mesh) };
+    let set = match map.texture.tex_coord {
+        0 => TextureCoordinateSet::First,
+        _ => TextureCoordinateSet::Second,
+    };
+    mesh.with_tangents(set).map_or_else(|_| Arc::clone(mesh), Arc::new)
 }

@@ -1,20 +1,27 @@
 //! The twin's shading: once per polygon, per vertex or per pixel, with the f64 equations of `lumbre_optics`.
 
-use glam::{DVec2, DVec3};
-use lumbre_optics::{
-    Contribution, FlatRule, LightKind, LightSample, ReflectionModel, Shading, SurfaceSample, add_emission,
-    apply_fog, evaluate_light, facing_normal, filtered_lobe, fog_weight, light_contribution, lobe_widening,
-    polygon_light_contribution, safe_normalize, viewer_direction,
-};
-use lumbre_scene::LightmapImage;
-
 use super::scene::{Object, Scene, Vertex};
+use super::texture::{sample, sample_lightmap, transform};
+use glam::{DVec2, DVec3, DVec4};
+use lumbre_optics::{
+    Contribution, FlatRule, LightKind, LightSample, Lobe, ReflectionModel, Shading, SurfaceSample,
+    add_emission, apply_fog, evaluate_light, facing_normal, filtered_lobe, fog_weight, light_contribution,
+    lobe_widening, map_normal, occlusion, polygon_light_contribution, safe_normalize, transformed_tangent,
+    viewer_direction,
+};
 
 /// Perspective-correct weights of a triangle's corners at a pixel and at the ends of its two fine derivatives.
 pub(super) struct PixelWeights {
     pub center: [f64; 3],
     pub across: [[f64; 3]; 2],
     pub down: [[f64; 3]; 2],
+}
+
+/// Light that a texture occludes, and light that it does not.
+#[derive(Clone, Copy)]
+struct Lit {
+    ambient: DVec3,
+    direct: DVec3,
 }
 
 /// A triangle with what is computed once of it.
@@ -24,7 +31,7 @@ pub(super) struct ShadedTriangle<'a> {
     triangle: &'a [Vertex; 3],
     front: bool,
     /// Of the vertices (Gouraud) or of the face (flat, three times the same).
-    colors: Option<[DVec3; 3]>,
+    colors: Option<[Lit; 3]>,
 }
 
 impl<'a> ShadedTriangle<'a> {
@@ -33,7 +40,9 @@ impl<'a> ShadedTriangle<'a> {
         let [a, b, c] = triangle.each_ref().map(|vertex| vertex.point);
         shaded.colors = match object.shading {
             Shading::Phong => None,
-            Shading::Gouraud => Some(triangle.each_ref().map(|v| shaded.lit(v.point, v.normal, 0.0))),
+            Shading::Gouraud => {
+                Some(triangle.each_ref().map(|v| shaded.lit(v.point, shaded.facing(v.normal), 0.0)))
+            }
             Shading::Flat => {
                 let normal = (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::ZERO);
                 let last = &triangle[if object.mirrored { 1 } else { 2 }];
@@ -42,7 +51,7 @@ impl<'a> ShadedTriangle<'a> {
                     FlatRule::FirstVertex => (triangle[0].point, triangle[0].normal),
                     FlatRule::LastVertex => (last.point, last.normal),
                 };
-                Some([shaded.lit(point, normal, 0.0); 3])
+                Some([shaded.lit(point, shaded.facing(normal), 0.0); 3])
             }
         };
         shaded
@@ -54,8 +63,12 @@ impl<'a> ShadedTriangle<'a> {
             |values: [DVec3; 3]| values[0] * weights[0] + values[1] * weights[1] + values[2] * weights[2];
         let vertices = self.triangle;
         let point = mix(vertices.each_ref().map(|vertex| vertex.point));
-        let mut color = match self.colors {
-            Some(colors) => mix(colors),
+        let uv =
+            |set: u32| -> DVec2 { (0..3).map(|i| vertices[i].uv[usize::from(set != 0)] * weights[i]).sum() };
+        let lit = match self.colors {
+            Some(colors) => {
+                Lit { ambient: mix(colors.map(|lit| lit.ambient)), direct: mix(colors.map(|lit| lit.direct)) }
+            }
             None => {
                 let normal = |weights: [f64; 3]| -> DVec3 {
                     safe_normalize((0..3).map(|i| vertices[i].normal * weights[i]).sum())
@@ -65,12 +78,26 @@ impl<'a> ShadedTriangle<'a> {
                     true => lobe_widening(change(pixel.across), change(pixel.down)),
                     false => 0.0,
                 };
-                self.lit(point, normal(weights), widening)
+                let mapped = self.object.normal_map.as_ref().map(|map| {
+                    let texel = sample(&map.texture, uv(map.texture.tex_coord)).truncate();
+                    let [u, v] = transform(&map.texture);
+                    let tangent: DVec4 = (0..3)
+                        .map(|i| {
+                            transformed_tangent(u, v, vertices[i].tangent, vertices[i].normal) * weights[i]
+                        })
+                        .sum();
+                    let smooth: DVec3 = (0..3).map(|i| vertices[i].normal * weights[i]).sum();
+                    map_normal(texel, f64::from(map.scale), tangent, smooth)
+                });
+                self.lit(point, self.facing(mapped.unwrap_or_else(|| normal(weights))), widening)
             }
         };
+        let unoccluded = self.object.occlusion.as_ref().map_or(1.0, |map| {
+            occlusion(sample(&map.texture, uv(map.texture.tex_coord)).x, f64::from(map.strength))
+        });
+        let mut color = lit.direct + lit.ambient * unoccluded;
         if let Some(lightmap) = &self.object.lightmap {
-            let uv = (0..3).map(|i| vertices[i].uv1 * weights[i]).sum();
-            let baked = sample_bilinear(lightmap, uv);
+            let baked = sample_lightmap(lightmap, uv(1)) * unoccluded;
             color += self.object.material.surface(self.lit_as_front()).diffuse.as_dvec3() * baked;
         }
         match &self.scene.settings.fog {
@@ -87,25 +114,34 @@ impl<'a> ShadedTriangle<'a> {
         self.front || !(self.object.material.double_sided && self.scene.settings.two_sided)
     }
 
+    /// A normal of the front, on the side that is lit.
+    fn facing(&self, normal: DVec3) -> DVec3 {
+        facing_normal(normal, self.lit_as_front())
+    }
+
     /// `widening` of the highlight: 0 for none.
-    fn lit(&self, point: DVec3, normal: DVec3, widening: f64) -> DVec3 {
+    fn lit(&self, point: DVec3, normal: DVec3, widening: f64) -> Lit {
         let scene = self.scene;
         let front = self.lit_as_front();
         let side = self.object.material.surface(front);
         let mut surface = SurfaceSample::new(&self.object.material, front);
         if widening > 0.0 {
-            let of_half_vector =
-                matches!(self.object.reflection, ReflectionModel::Blinn | ReflectionModel::TorranceSparrow);
+            let energy_keeping = surface.lobe == Lobe::EnergyKeeping;
+            let of_half_vector = energy_keeping
+                || matches!(
+                    self.object.reflection,
+                    ReflectionModel::Blinn | ReflectionModel::TorranceSparrow
+                );
             let lobe = filtered_lobe(surface.shininess, if of_half_vector { 1.0 } else { 4.0 }, widening);
             surface.shininess = lobe.shininess;
-            surface.peak = lobe.peak;
+            surface.peak = if energy_keeping { 1.0 } else { lobe.peak };
         }
-        let normal = facing_normal(normal, front);
         let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
         let mapped = self.object.lightmap.is_some();
         let mut sum = Contribution::ZERO;
         if !mapped {
-            sum.ambient += surface.ambient * scene.settings.ambient.as_dvec3();
+            sum.ambient +=
+                surface.ambient * (scene.settings.ambient.as_dvec3() + scene.settings.sky.as_dvec3());
         }
         for (light, position, axis) in &scene.lights {
             let sample: LightSample = evaluate_light(light, *position, *axis, point);
@@ -127,19 +163,8 @@ impl<'a> ShadedTriangle<'a> {
             }
             sum = sum + added;
         }
-        add_emission(sum.total(), side.emission.as_dvec3())
+        let ambient = sum.ambient;
+        let direct = Contribution { ambient: DVec3::ZERO, ..sum };
+        Lit { ambient, direct: add_emission(direct.total(), side.emission.as_dvec3()) }
     }
-}
-
-/// Bilinear, clamped to the edge.
-fn sample_bilinear(image: &LightmapImage, uv: DVec2) -> DVec3 {
-    let (width, height) = (image.width as i64, image.height as i64);
-    let at = uv * DVec2::new(width as f64, height as f64) - 0.5;
-    let (corner, part) = (at.floor(), at - at.floor());
-    let texel = |dx: i64, dy: i64| {
-        let x = (corner.x as i64 + dx).clamp(0, width - 1);
-        let y = (corner.y as i64 + dy).clamp(0, height - 1);
-        image.texels[(y * width + x) as usize].as_dvec3()
-    };
-    texel(0, 0).lerp(texel(1, 0), part.x).lerp(texel(0, 1).lerp(texel(1, 1), part.x), part.y)
 }

@@ -6,6 +6,7 @@
 pub mod atmosphere;
 pub mod lights;
 pub mod lobes;
+pub mod materials;
 pub mod microfacets;
 pub mod polygons;
 pub mod powers;

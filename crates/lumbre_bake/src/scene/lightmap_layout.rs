@@ -358,6 +358,7 @@ fn split(object: &Object, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<Triang
         meshes.push(Arc::new(TriangleMesh {
             positions: copy(&part.mesh.positions, &sources),
             normals: copy(&part.mesh.normals, &sources),
+            tangents: copy(&part.mesh.tangents, &sources),
             uv0: copy(&part.mesh.uv0, &sources),
             uv1: sources.iter().map(|&(index, _)| unwrapped.mesh.uv1[index] * shrink).collect(),
             colors: copy(&part.mesh.colors, &sources),

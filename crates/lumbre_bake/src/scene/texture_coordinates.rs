@@ -21,8 +21,7 @@ pub(crate) fn sets_read(textures: Option<&MaterialTextures>) -> [bool; 2] {
 /// The textures, reading `uv0`.
 pub(crate) fn reading_first(textures: &MaterialTextures) -> MaterialTextures {
     let mut textures = textures.clone();
-    let mapped = textures.metallic_roughness.as_mut().map(|mapped| &mut mapped.texture);
-    for texture in [textures.base_color.as_mut(), textures.emissive.as_mut(), mapped].into_iter().flatten() {
+    for texture in textures.references_mut() {
         texture.tex_coord = 0;
     }
     textures

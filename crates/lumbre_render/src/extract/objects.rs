@@ -8,6 +8,7 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use glam::DVec3;
+use lumbre_mesh::TextureCoordinateSet;
 use lumbre_optics::{Material, ReflectionModel, Shading};
 use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh};
 
@@ -119,9 +120,14 @@ impl Objects {
                 let maps = maps.map(Ref::into_inner);
                 let lightmap = lightmap.map(Ref::into_inner);
                 let traits = Traits::new(&material, maps, &mesh.0, lightmap.is_some(), choices);
+                let normal_map =
+                    maps.and_then(|maps| maps.normal.as_ref()).map(|map| match map.texture.tex_coord {
+                        0 => TextureCoordinateSet::First,
+                        _ => TextureCoordinateSet::Second,
+                    });
                 let mut object = match self.objects[slot].take() {
                     Some(object) => object,
-                    None => Object::new(entity, meshes.insert(&mesh.0), traits),
+                    None => Object::new(entity, meshes.insert(&mesh.0, normal_map), traits),
                 };
                 // A component that was removed leaves no change behind: compare presence too.
                 let rematerialized = new
@@ -129,8 +135,8 @@ impl Objects {
                     || maps_changed
                     || object.traits.texture_mask != traits.texture_mask;
                 self.stale |= !new && (remeshed || rematerialized || map_changed);
-                if remeshed {
-                    object.mesh = meshes.insert(&mesh.0);
+                if remeshed || rematerialized {
+                    object.mesh = meshes.insert(&mesh.0, normal_map);
                 }
                 if transformed {
                     self.transforms.set(slot, ObjectData::new(&transform, self.origin));

@@ -3,7 +3,9 @@
 
 use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{AlphaMode, Distribution, FogMode, Fresnel, Material, ReflectionModel, Shading, Surface};
+use lumbre_optics::{
+    AlphaMode, Distribution, FogMode, Fresnel, Lobe, Material, ReflectionModel, Shading, Surface,
+};
 use lumbre_scene::{MaterialTextures, SceneSettings};
 
 use super::lights::{LightCounts, LightSet, UNIFORM_LIGHTS};
@@ -15,8 +17,8 @@ use crate::texture_sets;
 pub(crate) struct Traits {
     /// Which material textures there are.
     pub texture_mask: u8,
-    pub uv0: bool,
-    pub uv1: bool,
+    /// Which of them read the second set of coordinates.
+    pub second_set: u8,
     pub vertex_color: bool,
     pub alpha_mode: AlphaMode,
     pub double_sided: bool,
@@ -26,6 +28,8 @@ pub(crate) struct Traits {
     /// Whether a highlight may be sharper than plain powers can tell.
     pub sharp: bool,
     pub lightmapped: bool,
+    /// Whether its highlight is as glTF has it.
+    pub energy_keeping: bool,
     pub distribution: Distribution,
     pub fresnel: Fresnel,
     pub shading: Option<Shading>,
@@ -63,12 +67,10 @@ impl Traits {
         lightmapped: bool,
         (shading, reflection): (Option<Shading>, Option<ReflectionModel>),
     ) -> Self {
-        let (uv0, uv1) = maps.map_or((false, false), texture_sets::coordinate_sets);
         let back = material.back.as_ref().map_or(Vec3::ZERO, |back| back.specular);
         Self {
             texture_mask: maps.map_or(0, texture_sets::mask),
-            uv0,
-            uv1,
+            second_set: maps.map_or(0, texture_sets::second_set),
             vertex_color: !mesh.colors.is_empty(),
             alpha_mode: material.alpha_mode,
             double_sided: material.double_sided,
@@ -80,6 +82,7 @@ impl Traits {
                 || material.back.as_ref().is_some_and(Surface::has_sharp_highlight)
                 || maps.is_some_and(|maps| maps.metallic_roughness.is_some()),
             lightmapped: lightmapped && !mesh.uv1.is_empty(),
+            energy_keeping: material.lobe == Lobe::EnergyKeeping,
             distribution: material.distribution,
             fresnel: material.fresnel,
             shading,
@@ -111,8 +114,6 @@ impl Traits {
         for (feature, bound) in texture_sets::features(self.texture_mask) {
             variant.set(feature, bound);
         }
-        variant.set(Feature::Uv0, self.uv0);
-        variant.set(Feature::Uv1, self.uv1 || lightmapped);
         variant.set(Feature::VertexColor, self.vertex_color);
         variant.set(Feature::Alpha, self.alpha_mode != AlphaMode::Opaque);
         variant.set(Feature::AlphaMask, matches!(self.alpha_mode, AlphaMode::Mask { .. }));
@@ -142,6 +143,7 @@ impl Traits {
         if self.specular {
             let (distribution, fresnel) = (self.distribution, self.fresnel);
             let chosen = (distribution, fresnel) != (Distribution::default(), Fresnel::default());
+            variant.set(Feature::EnergyKeeping, self.energy_keeping);
             variant.set(Feature::Microfacets, chosen);
             variant.set(Feature::DistributionCosinePower, distribution == Distribution::CosinePower);
             variant.set(Feature::DistributionGaussian, distribution == Distribution::Gaussian);
@@ -168,6 +170,17 @@ impl Traits {
         variant.set(Feature::HalfRange, frame.half && !frame.clamp);
         variant.set(Feature::ClampVertices, frame.clamp && per_vertex);
         variant.set(Feature::Modulated, per_vertex && variant.has(Feature::BaseColorTexture));
-        variant.reduced()
+        let mut variant = variant.reduced();
+        // The coordinates of the textures that are left.
+        let read = |second: bool| {
+            let slots = (0..).zip(texture_sets::features(self.texture_mask));
+            slots
+                .filter(|(slot, _)| (self.second_set & (1 << slot) != 0) == second)
+                .any(|(_, (feature, _))| variant.has(feature))
+        };
+        let (first, second) = (read(false), read(true));
+        variant.set(Feature::Uv0, first);
+        variant.set(Feature::Uv1, second || variant.has(Feature::Lightmap));
+        variant
     }
 }

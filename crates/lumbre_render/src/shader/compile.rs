@@ -85,7 +85,10 @@ mod tests {
         // What a feature needs beside itself.
         let with = |feature: Feature| match feature {
             Feature::BaseColorTexture => vec![Feature::Uv0, Feature::Modulated],
-            Feature::EmissiveTexture | Feature::MetallicRoughnessTexture => vec![Feature::Uv0],
+            Feature::EmissiveTexture
+            | Feature::MetallicRoughnessTexture
+            | Feature::NormalTexture
+            | Feature::OcclusionTexture => vec![Feature::Uv0],
             Feature::Lightmap => vec![Feature::Uv1, Feature::StaticLights],
             Feature::AlphaMask => vec![Feature::Alpha],
             Feature::FogLinear
@@ -124,6 +127,10 @@ mod tests {
             "discard",
             "phong_4n",
             "dpdx",
+            "map_normal",
+            "tangent",
+            "occlusion",
+            "peak",
             "polygon",
             "contour",
             "cluster",

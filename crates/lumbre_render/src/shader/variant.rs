@@ -104,6 +104,12 @@ features! {
     UniformLights = 37 => "UNIFORM_LIGHTS",
     /// Loops over a cluster's other lights with a range.
     RangedClusters = 38 => "RANGED_CLUSTERS",
+    /// Samples a normal map.
+    NormalTexture = 39 => "NORMAL_TEXTURE",
+    /// Samples an occlusion texture.
+    OcclusionTexture = 40 => "OCCLUSION_TEXTURE",
+    /// Its highlight keeps its energy, as glTF's do.
+    EnergyKeeping = 41 => "ENERGY_KEEPING",
 }
 
 /// A variant of the forward shader.
@@ -145,13 +151,16 @@ impl Variant {
                 | Feature::LocalViewer as u64
                 | Feature::TwoSided as u64
                 | Feature::Lightmap as u64
+                | Feature::NormalTexture as u64
+                | Feature::OcclusionTexture as u64
                 | Feature::MetallicRoughnessTexture as u64);
             self.bits &= keep;
             (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
         }
         if self.shading != Shading::Phong {
-            // No highlight is evaluated in a pixel, and no vertex is in a cluster.
+            // Nothing is lit in a pixel, and no vertex is in a cluster.
             self.bits &= !(Feature::SpecularAntialiasing as u64
+                | Feature::NormalTexture as u64
                 | Feature::InverseSquareClusters as u64
                 | Feature::RangedClusters as u64);
         }
@@ -173,6 +182,8 @@ impl Variant {
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
                 | Feature::LocalViewer as u64
+                | Feature::NormalTexture as u64
+                | Feature::EnergyKeeping as u64
                 | Feature::Matt as u64);
             self.reflection = ReflectionModel::Phong;
         }
@@ -180,10 +191,11 @@ impl Variant {
             // Without a highlight nothing depends on the viewer.
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
+                | Feature::EnergyKeeping as u64
                 | Feature::LocalViewer as u64);
             self.reflection = ReflectionModel::Phong;
         }
-        if self.reflection != ReflectionModel::TorranceSparrow {
+        if self.reflection != ReflectionModel::TorranceSparrow || self.has(Feature::EnergyKeeping) {
             self.bits &= !(Feature::Microfacets as u64
                 | Feature::DistributionCosinePower as u64
                 | Feature::DistributionGaussian as u64

@@ -103,8 +103,8 @@ pub(crate) struct Material {
     pub name: Option<String>,
     #[serde(default)]
     pub pbr_metallic_roughness: MetallicRoughness,
-    pub normal_texture: Option<Value>,
-    pub occlusion_texture: Option<Value>,
+    pub normal_texture: Option<NormalTextureInfo>,
+    pub occlusion_texture: Option<OcclusionTextureInfo>,
     pub emissive_texture: Option<TextureInfo>,
     pub emissive_factor: Option<[f64; 3]>,
     pub alpha_mode: Option<String>,
@@ -133,6 +133,20 @@ pub(crate) struct TextureInfo {
     pub tex_coord: u32,
     #[serde(default)]
     pub extensions: Extensions,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct NormalTextureInfo {
+    #[serde(flatten)]
+    pub texture: TextureInfo,
+    pub scale: Option<f64>,
+}
+
+#[derive(Deserialize, Debug)]
+pub(crate) struct OcclusionTextureInfo {
+    #[serde(flatten)]
+    pub texture: TextureInfo,
+    pub strength: Option<f64>,
 }
 
 #[derive(Deserialize, Debug)]

@@ -62,7 +62,7 @@ impl Data {
         let uvs = [&mesh.uv0, &mesh.uv1];
         let finite = attributes.iter().all(|list| list.iter().all(|value| value.is_finite()))
             && uvs.iter().all(|list| list.iter().all(|value| value.is_finite()))
-            && mesh.colors.iter().all(|value| value.is_finite());
+            && mesh.colors.iter().chain(&mesh.tangents).all(|value| value.is_finite());
         if !finite {
             return Err(SaveError::NotFinite { place: place.to_owned(), field: "its mesh".to_owned() });
         }
@@ -86,6 +86,11 @@ impl Data {
             let normals = mesh.normals.iter().flat_map(|normal| written(normal).to_array());
             let accessor = self.floats(normals, "VEC3", count);
             attributes.insert("NORMAL".to_owned(), accessor.into());
+        }
+        // The format knows no tangents without a direction; a reader makes its own.
+        if !mesh.tangents.is_empty() && mesh.tangents.iter().all(|tangent| tangent.truncate() != Vec3::ZERO) {
+            let accessor = self.floats(mesh.tangents.iter().flat_map(|v| v.to_array()), "VEC4", count);
+            attributes.insert("TANGENT".to_owned(), accessor.into());
         }
         for (name, uv) in [("TEXCOORD_0", &mesh.uv0), ("TEXCOORD_1", &mesh.uv1)] {
             if !uv.is_empty() {

@@ -1,13 +1,13 @@
 //! `Material` and its textures into a glTF material, with LUMBRE_materials_phong where metallic-roughness cannot say it.
 
 use glam::Vec3;
-use lumbre_optics::{AlphaMode, Fresnel, Material, Surface, shininess_from_roughness};
+use lumbre_optics::{AlphaMode, Fresnel, Lobe, Material, Surface, shininess_from_roughness};
 use serde_json::{Map, Value, json};
 
 use super::export::SaveError;
 use super::export_data::Data;
 use super::extensions::{PhongMaterial, PhongSurface};
-use super::import_material::front_from_metallic_roughness;
+use super::import_material::{default_lobe, front_from_metallic_roughness};
 use crate::MaterialTextures;
 
 /// The JSON of a material. Without our extension it reads back the same, or the extension is there.
@@ -31,6 +31,12 @@ pub(crate) fn material(
         let strength = json!({"emissiveStrength": f64::from(strength)});
         extensions.insert("KHR_materials_emissive_strength".to_owned(), strength);
     }
+    if let Some(slot) =
+        textures.metallic_roughness.as_ref().filter(|slot| slot.dielectric != Vec3::splat(0.04))
+    {
+        let tint = json!({"specularColorFactor": color(slot.dielectric / 0.04)});
+        extensions.insert("KHR_materials_specular".to_owned(), tint);
+    }
     if material.unlit {
         extensions.insert("KHR_materials_unlit".to_owned(), json!({}));
     }
@@ -49,6 +55,7 @@ pub(crate) fn material(
         || material.transmission != defaults.transmission
         || material.ior != defaults.ior
         || material.distribution != defaults.distribution
+        || material.lobe != Lobe::EnergyKeeping
         || !plain_fresnel;
     if !exact || beyond {
         let front = if textures.metallic_roughness.is_some() {
@@ -61,7 +68,7 @@ pub(crate) fn material(
             Fresnel::Conductor { eta, absorption } => Some((eta, absorption)),
             Fresnel::Dielectric | Fresnel::NormalReflectance => None,
         };
-        let phong = PhongMaterial {
+        let mut phong = PhongMaterial {
             front,
             back: material.back.as_ref().map(surface),
             mirror: (material.mirror != defaults.mirror).then(|| color(material.mirror)),
@@ -75,7 +82,11 @@ pub(crate) fn material(
             .then(|| material.fresnel.name().to_owned()),
             eta: conductor.map(|(eta, _)| color(eta)),
             absorption: conductor.map(|(_, absorption)| color(absorption)),
+            lobe: None,
         };
+        if material.lobe != default_lobe(Some(&phong), textured) {
+            phong.lobe = Some(material.lobe.name().to_owned());
+        }
         let phong = serde_json::to_value(phong).map_err(|source| SaveError::Json { source })?;
         extensions.insert("LUMBRE_materials_phong".to_owned(), phong);
     }
@@ -100,6 +111,16 @@ pub(crate) fn material(
     }
     if let Some(texture) = &textures.emissive {
         written["emissiveTexture"] = data.texture(texture, place)?;
+    }
+    if let Some(normal) = &textures.normal {
+        let mut info = data.texture(&normal.texture, place)?;
+        info["scale"] = json!(f64::from(normal.scale));
+        written["normalTexture"] = info;
+    }
+    if let Some(occlusion) = &textures.occlusion {
+        let mut info = data.texture(&occlusion.texture, place)?;
+        info["strength"] = json!(f64::from(occlusion.strength));
+        written["occlusionTexture"] = info;
     }
     match material.alpha_mode {
         AlphaMode::Opaque => {}

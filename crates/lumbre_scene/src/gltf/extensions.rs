@@ -20,6 +20,9 @@ pub(crate) struct PhongMaterial {
     pub transmission: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ior: Option<f64>,
+    /// bare or energy-keeping.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lobe: Option<String>,
     /// cosine-power, gaussian or trowbridge-reitz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distribution: Option<String>,
@@ -238,6 +241,30 @@ pub(crate) struct AnimationPointer {
 #[serde(rename_all = "camelCase")]
 pub(crate) struct EmissiveStrength {
     pub emissive_strength: Option<f64>,
+}
+
+/// KHR_materials_ior.
+#[derive(Deserialize, Debug, Default)]
+pub(crate) struct IndexOfRefraction {
+    pub ior: Option<f64>,
+}
+
+/// KHR_materials_specular.
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Specular {
+    pub specular_factor: Option<f64>,
+    pub specular_color_factor: Option<Color>,
+    pub specular_texture: Option<serde_json::Value>,
+    pub specular_color_texture: Option<serde_json::Value>,
+}
+
+/// KHR_materials_transmission.
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Transmission {
+    pub transmission_factor: Option<f64>,
+    pub transmission_texture: Option<serde_json::Value>,
 }
 
 /// KHR_texture_transform.

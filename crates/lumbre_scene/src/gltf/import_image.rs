@@ -38,6 +38,8 @@ pub(crate) struct Images<'a> {
     pub limits: LoadLimits,
     pub budget: Budget,
     pub decoded: Vec<Option<Arc<Image>>>,
+    /// What stands in for images that cannot be read.
+    pub stand_in: Arc<Image>,
 }
 
 impl Images<'_> {
@@ -98,6 +100,18 @@ impl Images<'_> {
         Ok(Some(TextureReference { image, sampler, tex_coord, offset, rotation, scale }))
     }
 
+    /// As [`texture`](Self::texture) for a slot in which white would mean something, such as a slope: an image that cannot be read is
+    /// left out.
+    pub(crate) fn texture_without_stand_in(
+        &mut self,
+        info: &TextureInfo,
+        place: &str,
+        notes: &mut Notes,
+    ) -> Result<Option<TextureReference>, LoadProblem> {
+        let texture = self.texture(info, place, notes)?;
+        Ok(texture.filter(|texture| !Arc::ptr_eq(&texture.image, &self.stand_in)))
+    }
+
     /// An image, decoded once. White stands in for one that cannot be read, where that may be.
     fn image(&mut self, index: usize, used_by: &str, notes: &mut Notes) -> Result<Arc<Image>, LoadProblem> {
         if let Some(Some(image)) = self.decoded.get(index) {
@@ -114,7 +128,7 @@ impl Images<'_> {
             Err(problem @ LoadProblem::TooLarge { .. }) => return Err(problem),
             Err(problem) => {
                 notes.repair(&place, problem, "white stands in for it")?;
-                Arc::new(white())
+                Arc::clone(&self.stand_in)
             }
         };
         if let Some(slot) = self.decoded.get_mut(index) {

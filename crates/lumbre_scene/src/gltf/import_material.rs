@@ -3,17 +3,19 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use lumbre_optics::{AlphaMode, Distribution, Fresnel, Material, Surface};
+use lumbre_optics::{AlphaMode, Distribution, Fresnel, Lobe, Material, Surface};
 
 use super::document::{self, extension, shortened};
 use super::error::{LoadProblem, Notes};
-use super::extensions::{EmissiveStrength, PhongMaterial, PhongSurface};
+use super::extensions::{
+    EmissiveStrength, IndexOfRefraction, PhongMaterial, PhongSurface, Specular, Transmission,
+};
 use super::import_image::{Images, white};
 use super::import_scene::unknown;
 use super::value::{color, number};
-use crate::{MaterialTextures, MetallicRoughnessTexture, TextureReference};
+use crate::{MaterialTextures, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, TextureReference};
 
-/// Reads one material. Textures that only other renderings use (normal, occlusion) are left out with a note.
+/// Reads one material.
 pub(crate) fn material(
     source: &document::Material,
     place: &str,
@@ -31,6 +33,7 @@ pub(crate) fn material(
             return Err(LoadProblem::Value { place: place.to_owned(), field, value, expected });
         }
     }
+    let dielectric = dielectric(source, place, notes)?;
     let strength =
         extension::<EmissiveStrength>(&source.extensions, "KHR_materials_emissive_strength", place)?;
     let strength = number(strength.and_then(|strength| strength.emissive_strength), 1.0);
@@ -53,6 +56,7 @@ pub(crate) fn material(
             base_color: base,
             metallic,
             roughness,
+            dielectric: dielectric.specular,
         });
     }
     // A metal's highlight has the colour of its base texture: that takes the per-texel mapping, here with factors alone.
@@ -62,21 +66,29 @@ pub(crate) fn material(
         && let Some(base_texture) = &textures.base_color
     {
         let texture = TextureReference { image: Arc::new(white()), ..base_texture.clone() };
-        textures.metallic_roughness =
-            Some(MetallicRoughnessTexture { texture, base_color: base, metallic, roughness });
+        textures.metallic_roughness = Some(MetallicRoughnessTexture {
+            texture,
+            base_color: base,
+            metallic,
+            roughness,
+            dielectric: dielectric.specular,
+        });
     }
-    for (unused, what) in [(&source.normal_texture, "normal"), (&source.occlusion_texture, "occlusion")] {
-        if unused.is_some() {
-            notes.add(place, format!("{what} textures are not supported; left out"));
-        }
-    }
+    textures.normal = normal_texture(source, place, images, notes)?;
+    textures.occlusion = occlusion_texture(source, place, images, notes)?;
 
     let unlit = source.extensions.contains_key("KHR_materials_unlit");
-    let front = front_from_metallic_roughness(base, metallic, roughness, emission, unlit);
+    let mut front = front_from_metallic_roughness(base, metallic, roughness, emission, unlit);
+    if let Some(specular) = dielectric.stated() {
+        front.specular = specular.lerp(base, metallic);
+    }
     // Of a metallic-roughness material k_s is the reflectance at normal incidence.
     let replaced = phong.is_some() && textures.metallic_roughness.is_none();
     let fresnel = if replaced { Fresnel::Dielectric } else { Fresnel::NormalReflectance };
     let mut material = Material { front, unlit, fresnel, ..Material::default() };
+    material.ior = dielectric.ior;
+    material.transmission = transmission(source, base * (1.0 - metallic), place, notes)?;
+    material.lobe = default_lobe(phong.as_ref(), textures.metallic_roughness.is_some());
     if let Some(phong) = phong {
         if textures.metallic_roughness.is_none() {
             let default = Surface { ambient: base, diffuse: base, emission, ..Surface::default() };
@@ -95,6 +107,12 @@ pub(crate) fn material(
             })?;
         }
         material.fresnel = fresnel_of(&phong, material.fresnel, place)?;
+        if let Some(name) = &phong.lobe {
+            material.lobe = Lobe::from_name(name).ok_or_else(|| {
+                let names = Lobe::ALL.iter().map(|choice| choice.name());
+                unknown(place, "LUMBRE_materials_phong.lobe", name, names)
+            })?;
+        }
     }
     material.alpha = alpha as f32;
     material.alpha_mode = match source.alpha_mode.as_deref() {
@@ -113,6 +131,145 @@ pub(crate) fn material(
     Ok((material, textures))
 }
 
+/// What is left of a material where nothing is metal.
+struct Dielectric {
+    ior: f32,
+    specular: Vec3,
+}
+
+impl Dielectric {
+    /// Its k_s, if it is not that of every glTF material.
+    fn stated(&self) -> Option<Vec3> {
+        (self.specular != Vec3::splat(PLAIN_DIELECTRIC)).then_some(self.specular)
+    }
+}
+
+/// Reflectance of the index 1.5 along the normal.
+const PLAIN_DIELECTRIC: f32 = 0.04;
+
+/// `KHR_materials_ior` and `KHR_materials_specular`: k_s = min(((ior - 1)/(ior + 1))^2 specularColor, 1) specular. An index of 0 reflects all, as
+/// the extension says; the equations then take the largest index that they know.
+fn dielectric(
+    source: &document::Material,
+    place: &str,
+    notes: &mut Notes,
+) -> Result<Dielectric, LoadProblem> {
+    let default = Material::default().ior;
+    let index = extension::<IndexOfRefraction>(&source.extensions, "KHR_materials_ior", place)?;
+    let ior = number(index.and_then(|index| index.ior), default);
+    let refused = |field: &str, value: String, expected: &str| LoadProblem::Value {
+        place: place.to_owned(),
+        field: field.to_owned(),
+        value,
+        expected: expected.to_owned(),
+    };
+    if !(ior == 0.0 || (1.0..=LARGEST_INDEX).contains(&ior)) {
+        let expected = "use 0 (reflects all) or a number from 1 to 10000";
+        return Err(refused("KHR_materials_ior.ior", ior.to_string(), expected));
+    }
+    let (ior, along_normal) = match ior {
+        0.0 => (LARGEST_INDEX, 1.0),
+        ior if ior == default => (ior, PLAIN_DIELECTRIC),
+        ior => (ior, ((ior - 1.0) / (ior + 1.0)).powi(2)),
+    };
+    let name = "KHR_materials_specular";
+    let Some(stated) = extension::<Specular>(&source.extensions, name, place)? else {
+        return Ok(Dielectric { ior, specular: Vec3::splat(along_normal) });
+    };
+    let (factor, tint) =
+        (number(stated.specular_factor, 1.0), stated.specular_color_factor.map_or(Vec3::ONE, color));
+    if !(0.0..=1.0).contains(&factor) {
+        let field = format!("{name}.specularFactor");
+        return Err(refused(&field, factor.to_string(), "use a number from 0 to 1"));
+    }
+    if !(tint.is_finite() && tint.min_element() >= 0.0) {
+        let field = format!("{name}.specularColorFactor");
+        return Err(refused(&field, tint.to_string(), "use numbers that are finite and at least 0"));
+    }
+    for (texture, field) in [
+        (&stated.specular_texture, "specularTexture"),
+        (&stated.specular_color_texture, "specularColorTexture"),
+    ] {
+        if texture.is_some() {
+            notes.add(place, format!("{name}.{field} is not read; its factor holds everywhere"));
+        }
+    }
+    Ok(Dielectric { ior, specular: (along_normal * tint).min(Vec3::ONE) * factor })
+}
+
+/// Largest index of refraction of a material.
+const LARGEST_INDEX: f32 = 1e4;
+
+/// `KHR_materials_transmission`: k_t of a material whose diffuse colour is `color`.
+fn transmission(
+    source: &document::Material,
+    color: Vec3,
+    place: &str,
+    notes: &mut Notes,
+) -> Result<Vec3, LoadProblem> {
+    let name = "KHR_materials_transmission";
+    let Some(stated) = extension::<Transmission>(&source.extensions, name, place)? else {
+        return Ok(Vec3::ZERO);
+    };
+    let factor = number(stated.transmission_factor, 0.0);
+    if !(0.0..=1.0).contains(&factor) {
+        return Err(LoadProblem::Value {
+            place: place.to_owned(),
+            field: format!("{name}.transmissionFactor"),
+            value: factor.to_string(),
+            expected: "use a number from 0 to 1".to_owned(),
+        });
+    }
+    if stated.transmission_texture.is_some() {
+        notes.add(place, format!("{name}.transmissionTexture is not read; its factor holds everywhere"));
+    }
+    if factor > 0.0 {
+        notes.add(
+            place,
+            format!(
+                "{name} is kept as the coefficient of transmission; frames and bakes show the surface opaque"
+            ),
+        );
+    }
+    Ok(factor * color)
+}
+
+fn normal_texture(
+    source: &document::Material,
+    place: &str,
+    images: &mut Images<'_>,
+    notes: &mut Notes,
+) -> Result<Option<NormalTexture>, LoadProblem> {
+    let Some(info) = &source.normal_texture else { return Ok(None) };
+    let scale = number(info.scale, 1.0);
+    if !scale.is_finite() {
+        let (field, value) = ("normalTexture.scale".to_owned(), format!("{:?}", info.scale));
+        let expected = "use a number that f32 can hold".to_owned();
+        return Err(LoadProblem::Value { place: place.to_owned(), field, value, expected });
+    }
+    let slot = format!("{place}.normalTexture");
+    let texture = images.texture_without_stand_in(&info.texture, &slot, notes)?;
+    Ok(texture.map(|texture| NormalTexture { texture, scale }))
+}
+
+fn occlusion_texture(
+    source: &document::Material,
+    place: &str,
+    images: &mut Images<'_>,
+    notes: &mut Notes,
+) -> Result<Option<OcclusionTexture>, LoadProblem> {
+    let Some(info) = &source.occlusion_texture else { return Ok(None) };
+    let strength = number(info.strength, 1.0);
+    if !(0.0..=1.0).contains(&strength) {
+        let (field, value) = ("occlusionTexture.strength".to_owned(), strength.to_string());
+        let expected = "use a number from 0 to 1".to_owned();
+        return Err(LoadProblem::Value { place: place.to_owned(), field, value, expected });
+    }
+    let slot = format!("{place}.occlusionTexture");
+    let texture = images.texture(&info.texture, &slot, notes)?;
+    Ok(texture.map(|texture| OcclusionTexture { texture, strength }))
+}
+
 /// The front of a material without LUMBRE_materials_phong.
 pub(crate) fn front_from_metallic_roughness(
     base: Vec3,
@@ -128,6 +285,18 @@ pub(crate) fn front_from_metallic_roughness(
         front.diffuse = base;
     }
     front
+}
+
+/// The lobe of a material that does not state it: bare where it has the documents' coefficients or chooses its microfacets.
+pub(crate) fn default_lobe(phong: Option<&PhongMaterial>, textured: bool) -> Lobe {
+    let bare = phong.is_some_and(|phong| {
+        let chooses = phong.distribution.is_some()
+            || phong.fresnel.is_some()
+            || phong.eta.is_some()
+            || phong.absorption.is_some();
+        !textured || chooses
+    });
+    if bare { Lobe::Bare } else { Lobe::EnergyKeeping }
 }
 
 /// A conductor where either part of its index is given, unless it says otherwise. The other part is then that of air: 1, and 0.

@@ -59,6 +59,14 @@ pub(crate) fn triangle_mesh(
     };
     let vertices = positions.len();
     let normals = attributes.read_unchecked("NORMAL", &["VEC3"], [0.0; 3], vertices)?;
+    let tangents = match attributes.read_unchecked("TANGENT", &["VEC4"], [0.0; 4], vertices) {
+        Ok(tangents) => tangents,
+        Err(problem @ LoadProblem::TooLarge { .. }) => return Err(problem),
+        Err(problem) => {
+            notes.repair(&used_by("TANGENT"), problem, "tangents are made anew")?;
+            None
+        }
+    };
     let stand_in = attributes.first_coordinates_stand_in();
     let uv0 =
         if stand_in { None } else { attributes.read("TEXCOORD_0", &["VEC2"], [0.0; 2], Some(vertices))? };
@@ -81,6 +89,7 @@ pub(crate) fn triangle_mesh(
     let mut mesh = TriangleMesh {
         positions: positions.into_iter().map(Vec3::from).collect(),
         normals: normals.unwrap_or_default().into_iter().map(Vec3::from).collect(),
+        tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from).collect(),
         uv0: uv0.unwrap_or_default().into_iter().map(Vec2::from).collect(),
         uv1: uv1.unwrap_or_default().into_iter().map(Vec2::from).collect(),
         colors: colors.unwrap_or_default().into_iter().map(Vec4::from).collect(),
@@ -92,8 +101,11 @@ pub(crate) fn triangle_mesh(
             return Err(LoadProblem::TooLarge { what: used_by("NORMAL"), needed, limit });
         }
         budget.charge(mesh.indices.len() as u64, 64, || used_by("NORMAL"))?;
+        // Tangents of a file without normals are to be ignored (section 3.7.2.1).
+        mesh.tangents = Vec::new();
         mesh = flat(&mesh);
     } else {
+        repair_tangents(&mut mesh, place, notes);
         repair_normals(&mut mesh, place, notes);
     }
     Ok(Some(mesh))
@@ -262,6 +274,7 @@ fn flat(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh {
         positions: split(&mesh.positions, &mesh.indices),
         normals: normals.collect(),
+        tangents: split(&mesh.tangents, &mesh.indices),
         uv0: split(&mesh.uv0, &mesh.indices),
         uv1: split(&mesh.uv1, &mesh.indices),
         colors: split(&mesh.colors, &mesh.indices),
@@ -273,6 +286,26 @@ fn flat(mesh: &TriangleMesh) -> TriangleMesh {
 fn face_normal(mesh: &TriangleMesh, [a, b, c]: [u32; 3]) -> Vec3 {
     let at = |vertex: u32| mesh.positions[vertex as usize].as_dvec3();
     (at(b) - at(a)).cross(at(c) - at(a)).try_normalize().unwrap_or_default().as_vec3()
+}
+
+/// Makes every tangent a unit vector with a side of +1 or -1. One that has no direction is the zero vector, on which a normal map has no
+/// effect.
+fn repair_tangents(mesh: &mut TriangleMesh, place: &str, notes: &mut Notes) {
+    let mut broken = 0usize;
+    for tangent in &mut mesh.tangents {
+        let direction = tangent.truncate().as_dvec3();
+        let length_squared = direction.length_squared();
+        let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+        if !(length_squared.is_finite() && length_squared > 0.0 && tangent.w.is_finite()) {
+            *tangent = Vec4::ZERO;
+            broken += 1;
+        } else if (length_squared - 1.0).abs() > f64::from(UNIT_TOLERANCE) || tangent.w != side {
+            *tangent = (direction / length_squared.sqrt()).as_vec3().extend(side);
+        }
+    }
+    if broken > 0 {
+        notes.add(place, format!("{broken} tangents were zero or NaN; a normal map has no effect there"));
+    }
 }
 
 /// Makes every normal a unit vector. Zero and NaN ones become the average of the faces around them.

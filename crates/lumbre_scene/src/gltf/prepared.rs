@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{BakeMode, Light, Material, ReflectionModel, Shading};
+use lumbre_optics::{BakeMode, Light, Lobe, Material, ReflectionModel, Shading};
 
 use super::accessor::Buffers;
 use super::document::{self, Document, element, extension};
@@ -16,7 +16,7 @@ use super::extensions::{
     ObjectExtension, ShadingExtension,
 };
 use super::hierarchy::{Hierarchy, hierarchy, transform};
-use super::import_image::Images;
+use super::import_image::{Images, white};
 use super::import_irradiance_volume::irradiance_volume;
 use super::import_lightmap::Lightmaps;
 use super::limits::{Budget, LoadLimits};
@@ -82,12 +82,13 @@ pub(crate) fn prepare(
 ) -> Result<Prepared, LoadProblem> {
     note_extensions(document, notes);
     let Hierarchy { order, parents, scene } = hierarchy(document, notes)?;
-    let settings = import_scene::settings(document, scene.unwrap_or(0))?;
+    let mut settings = import_scene::settings(document, scene.unwrap_or(0))?;
     let dynamic = dynamic_nodes(document, &order, &parents, notes)?;
 
     let decoded = vec![None; document.images.len()];
     let image_budget = Budget::new(limits.image_bytes);
-    let mut images = Images { buffers, base, limits, budget: image_budget, decoded };
+    let mut images =
+        Images { buffers, base, limits, budget: image_budget, decoded, stand_in: Arc::new(white()) };
     // Also those that nothing uses: what is wrong with them should be known before it matters.
     let mut materials = Vec::new();
     for (index, source) in document.materials.iter().enumerate() {
@@ -97,6 +98,9 @@ pub(crate) fn prepare(
             &mut images,
             notes,
         )?);
+    }
+    if !import_scene::states_reflection(document, scene.unwrap_or(0))? && is_plain_gltf(&materials) {
+        settings.reflection = ReflectionModel::TorranceSparrow;
     }
     let mut lights = Vec::new();
     let animated_lights = animated_lights(document)?;
@@ -220,6 +224,13 @@ pub(crate) fn prepare(
     Ok(Prepared { nodes, meshes, settings, node_count, files, photometric_lights, states_exposure })
 }
 
+/// Whether materials are by metallic-roughness, and none by the documents' coefficients: then a scene that names no specular model is drawn
+/// with the one that is glTF's own for them.
+fn is_plain_gltf(materials: &[(Material, MaterialTextures)]) -> bool {
+    let keeps = |lobe| materials.iter().any(|(material, _)| !material.unlit && material.lobe == lobe);
+    keeps(Lobe::EnergyKeeping) && !keeps(Lobe::Bare)
+}
+
 /// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.
 /// `None` for those that make no triangles.
 type Geometries = HashMap<String, Option<Arc<TriangleMesh>>>;
@@ -289,6 +300,8 @@ fn usable(
     textures.base_color = textures.base_color.filter(|texture| !missing(texture.tex_coord));
     textures.emissive = textures.emissive.filter(|texture| !missing(texture.tex_coord));
     textures.metallic_roughness = textures.metallic_roughness.filter(|slot| !missing(slot.texture.tex_coord));
+    textures.normal = textures.normal.filter(|slot| !missing(slot.texture.tex_coord));
+    textures.occlusion = textures.occlusion.filter(|slot| !missing(slot.texture.tex_coord));
     if textures != before {
         notes.add(place, "has a textured material but not the texture coordinates it asks for; those textures are left out");
     }

@@ -1,0 +1,216 @@
+//! Tangents over texture coordinates, by MikkTSpace: what normal maps lean on. Not the normal maps.
+//!
+//! glTF asks for this algorithm where a file has no tangents, and the tools that bake normal maps use it too; any other would show their
+//! seams. Its bitangent points where v grows. The green of glTF's normal maps points the other way, as v runs down the picture, so that w
+//! has the opposite sign here.
+
+use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
+use glam::{Vec2, Vec3, Vec4};
+
+use crate::{MeshError, TriangleMesh};
+
+/// One of a mesh's sets of texture coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum TextureCoordinateSet {
+    /// `uv0`.
+    #[default]
+    First,
+    /// `uv1`.
+    Second,
+}
+
+impl TriangleMesh {
+    /// The mesh with tangents over one of its sets of texture coordinates. Triangles keep their place in the list; a vertex whose triangles
+    /// disagree, because the texture is mirrored or cut there, is split.
+    ///
+    /// Where coordinates or positions of a triangle coincide, or are no numbers, it takes the tangents of its neighbours; without any,
+    /// or without coordinates at all, the zero vector, on which a normal map has no effect.
+    ///
+    /// ```
+    /// use glam::{Vec3, Vec4};
+    /// use lumbre_mesh::{TextureCoordinateSet, shapes};
+    ///
+    /// // u grows along x, and v along z.
+    /// let floor = shapes::plane(1.0, 1.0, 1, 1).with_tangents(TextureCoordinateSet::First)?;
+    /// assert_eq!(floor.tangents[0].truncate(), Vec3::X);
+    /// # Ok::<(), lumbre_mesh::MeshError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MeshError`] where the mesh does not [validate](Self::validate).
+    pub fn with_tangents(&self, set: TextureCoordinateSet) -> Result<Self, MeshError> {
+        self.validate()?;
+        let coordinates = match set {
+            TextureCoordinateSet::First => &self.uv0,
+            TextureCoordinateSet::Second => &self.uv1,
+        };
+        let tangents = if coordinates.is_empty() || self.normals.is_empty() {
+            vec![Vec4::ZERO; self.indices.len()]
+        } else {
+            let mut corners =
+                Corners { mesh: self, coordinates, tangents: vec![Vec4::ZERO; self.indices.len()] };
+            match generate_tangents(&mut corners) {
+                Ok(()) => corners.tangents,
+                // There is no such error, and none of it could be mended.
+                Err(_) => vec![Vec4::ZERO; self.indices.len()],
+            }
+        };
+        Ok(self.split_by(&tangents))
+    }
+
+    /// Splits vertices whose corners have different tangents.
+    fn split_by(&self, corners: &[Vec4]) -> Self {
+        const NONE: u32 = u32::MAX;
+        // Of each vertex, its first copy; of each copy, the next one of the same vertex.
+        let mut first = vec![NONE; self.positions.len()];
+        let mut next: Vec<u32> = Vec::new();
+        let (mut sources, mut tangents): (Vec<u32>, Vec<Vec4>) = (Vec::new(), Vec::new());
+        let mut copy_of = |vertex: u32, tangent: Vec4| {
+            let mut copy = first[vertex as usize];
+            while copy != NONE && tangents[copy as usize] != tangent {
+                copy = next[copy as usize];
+            }
+            if copy == NONE {
+                copy = sources.len() as u32;
+                sources.push(vertex);
+                tangents.push(tangent);
+                next.push(first[vertex as usize]);
+                first[vertex as usize] = copy;
+            }
+            copy
+        };
+        let indices = self.indices.iter().zip(corners).map(|(&vertex, &tangent)| copy_of(vertex, tangent));
+        let indices = indices.collect();
+        Self { tangents, ..self.with_vertices(&sources, indices) }
+    }
+}
+
+/// A mesh as MikkTSpace asks for it: corner by corner.
+struct Corners<'a> {
+    mesh: &'a TriangleMesh,
+    coordinates: &'a [Vec2],
+    tangents: Vec<Vec4>,
+}
+
+impl Corners<'_> {
+    fn vertex(&self, face: usize, corner: usize) -> usize {
+        self.mesh.indices[3 * face + corner] as usize
+    }
+}
+
+impl Geometry for Corners<'_> {
+    fn num_faces(&self) -> usize {
+        self.mesh.triangle_count()
+    }
+
+    fn num_vertices_of_face(&self, _face: usize) -> usize {
+        3
+    }
+
+    fn position(&self, face: usize, corner: usize) -> [f32; 3] {
+        let position = self.mesh.positions[self.vertex(face, corner)];
+        if position.is_finite() { position.to_array() } else { [0.0; 3] }
+    }
+
+    fn normal(&self, face: usize, corner: usize) -> [f32; 3] {
+        let normal = self.mesh.normals[self.vertex(face, corner)];
+        if normal.is_finite() { normal.to_array() } else { [0.0; 3] }
+    }
+
+    fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
+        let uv = self.coordinates[self.vertex(face, corner)];
+        if uv.is_finite() { uv.to_array() } else { [0.0; 2] }
+    }
+
+    fn set_tangent(&mut self, space: Option<TangentSpace>, face: usize, corner: usize) {
+        let tangent = space.map_or(Vec4::ZERO, |space| Vec4::from(space.tangent_encoded()));
+        let direction = tangent.truncate();
+        let usable = direction.is_finite() && direction != Vec3::ZERO;
+        self.tangents[3 * face + corner] = if usable { direction.extend(-tangent.w) } else { Vec4::ZERO };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square in the xy plane whose right half has the left half's texture, mirrored.
+    fn folded() -> TriangleMesh {
+        let columns = [0.0, 1.0, 2.0];
+        let point = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        TriangleMesh {
+            positions: columns.iter().flat_map(|&x| [point(x, 0.0), point(x, 1.0)]).collect(),
+            normals: vec![Vec3::Z; 6],
+            uv0: columns
+                .iter()
+                .flat_map(|&x: &f32| [0.0, 1.0].map(|y| Vec2::new(1.0 - (x - 1.0).abs(), 1.0 - y)))
+                .collect(),
+            indices: vec![0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5],
+            ..TriangleMesh::default()
+        }
+    }
+
+    #[test]
+    fn a_mirrored_texture_splits_the_vertices_of_its_seam() {
+        let mesh = folded().with_tangents(TextureCoordinateSet::First).unwrap();
+        mesh.validate().unwrap();
+        // Two vertices lie on the fold.
+        assert_eq!(mesh.positions.len(), 8);
+        for (at, triangle) in mesh.triangles().enumerate() {
+            for vertex in triangle {
+                let (tangent, side) = (mesh.tangents[vertex as usize], if at < 2 { 1.0 } else { -1.0 });
+                assert_eq!(tangent.truncate(), side * Vec3::X);
+                // Green leans up the picture, towards smaller v, on both sides: along y.
+                assert_eq!(Vec3::Z.cross(tangent.truncate()) * tangent.w, Vec3::Y);
+            }
+        }
+        // The triangles are where they were.
+        let places = |mesh: &TriangleMesh| mesh.triangle_positions().unwrap();
+        assert_eq!(places(&mesh), places(&folded()));
+    }
+
+    #[test]
+    fn what_has_no_direction_has_no_tangent() {
+        let mut point = folded();
+        point.uv0 = vec![Vec2::splat(0.5); 6];
+        let mesh = point.with_tangents(TextureCoordinateSet::First).unwrap();
+        assert!(mesh.tangents.iter().all(|tangent| tangent.is_finite()), "{:?}", mesh.tangents);
+        let none = folded().with_tangents(TextureCoordinateSet::Second).unwrap();
+        assert_eq!((none.tangents, none.positions), (vec![Vec4::ZERO; 6], none_split()));
+        let broken = TriangleMesh { indices: vec![0, 1, 9], ..folded() };
+        assert!(broken.with_tangents(TextureCoordinateSet::First).is_err());
+    }
+
+    /// The positions of the fold in the order in which triangles name them.
+    fn none_split() -> Vec<Vec3> {
+        [0, 2, 1, 3, 4, 5].map(|vertex: usize| folded().positions[vertex]).to_vec()
+    }
+
+    #[test]
+    fn meshes_of_any_numbers_get_tangents_that_are_numbers() {
+        // A linear congruential generator: few vertices, so that triangles share, degenerate and coincide.
+        let mut state = 1u64;
+        let mut next = move |below: u32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as u32 % below
+        };
+        const NUMBERS: [f32; 10] =
+            [0.0, -0.0, 1.0, -1.0, 0.5, 1e-38, 1e30, f32::MAX, f32::NAN, f32::INFINITY];
+        for _ in 0..3000 {
+            let vertices = 1 + next(7);
+            let calm = next(2) == 0;
+            let mut number = || if calm { next(5) as f32 } else { NUMBERS[next(10) as usize] };
+            let vectors = |number: &mut dyn FnMut() -> f32| {
+                (0..vertices).map(|_| Vec3::new(number(), number(), number())).collect::<Vec<_>>()
+            };
+            let (positions, normals) = (vectors(&mut number), vectors(&mut number));
+            let uv0 = (0..vertices).map(|_| Vec2::new(number(), number())).collect();
+            let triangles = next(9);
+            let indices = (0..3 * triangles).map(|_| next(vertices)).collect();
+            let mesh = TriangleMesh { positions, normals, uv0, indices, ..TriangleMesh::default() };
+            let made = mesh.with_tangents(TextureCoordinateSet::First).unwrap();
+            made.validate().unwrap();
+            assert!(made.tangents.iter().all(|tangent| tangent.is_finite()), "{mesh:?}");
+        }
+    }
+}

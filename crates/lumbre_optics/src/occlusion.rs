@@ -1,0 +1,23 @@
+//! Occlusion textures: the part of the indirect light that reaches a texel. Not shadows: light that comes straight from a lamp is left alone.
+
+/// 1 + strength (sample - 1), as glTF says: what ambient terms and lightmaps are multiplied by.
+///
+/// # Error of the f32 twin
+///
+/// 3 u of 1 + 2 |strength|.
+pub fn occlusion(sample: f64, strength: f64) -> f64 {
+    1.0 + strength * (sample - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strength_goes_from_none_to_all() {
+        assert_eq!(occlusion(0.25, 0.0), 1.0);
+        assert_eq!(occlusion(0.25, 1.0), 0.25);
+        assert_eq!(occlusion(0.25, 0.5), 0.625);
+        assert_eq!(occlusion(1.0, 1.0), 1.0);
+    }
+}
