@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Distribution, Fresnel, Light, Material, ReflectionModel, Shading, Surface};
+use lumbre_optics::{Distribution, Fresnel, Light, Lobe, Material, ReflectionModel, Shading, Surface};
 use lumbre_render::FrameOptions;
 use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 use lumbre_tests::compare::compare;
@@ -158,9 +158,14 @@ fn metallic_roughness_materials_reflect_what_gltf_says_at_normal_incidence() {
     for (name, material, expected) in
         [("plastic", plastic, DVec3::splat(0.04)), ("metal", metal, base.as_dvec3())]
     {
-        let got = straight_on(material);
-        // Some tens of roundings in the Fresnel term, and f32's 0.04.
-        assert!((got - expected).abs().max_element() < 1e-5, "{name}: {got} is not {expected}");
+        // The peak of the lobe is 1/(4 alpha^2) as high where it keeps its energy; as a bare one it is 1.
+        let alpha = 0.3f64 * 0.3;
+        for (lobe, peak) in [(Lobe::EnergyKeeping, 0.25 / (alpha * alpha)), (Lobe::Bare, 1.0)] {
+            let got = straight_on(Material { lobe, ..material.clone() });
+            // Some tens of roundings in the Fresnel term, and f32's 0.04.
+            let apart = (got - peak * expected).abs().max_element();
+            assert!(apart < 1e-5 * peak, "{name}, {}: {got} is not {}", lobe.name(), peak * expected);
+        }
     }
     let front = Surface { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess: 80.0, ..Surface::default() };
     let glass = straight_on(Material { front, ..Material::default() });

@@ -149,8 +149,6 @@ pub(crate) struct MaterialData {
     base_color: CoordinatesData,
     emissive: CoordinatesData,
     metallic_roughness: CoordinatesData,
-    normal_map: CoordinatesData,
-    occlusion: CoordinatesData,
     base_and_metallic: [f32; 4],
     roughness: [f32; 4],
     eta: [f32; 4],
@@ -164,7 +162,6 @@ impl MaterialData {
         let none = MaterialTextures::default();
         let textures = textures.unwrap_or(&none);
         let mapped = textures.metallic_roughness.as_ref();
-        let (normal, occlusion) = (textures.normal.as_ref(), textures.occlusion.as_ref());
         let (eta, absorption) = match material.fresnel {
             Fresnel::Conductor { eta, absorption } => (eta, absorption),
             Fresnel::Dielectric | Fresnel::NormalReflectance => (Vec3::ZERO, Vec3::ZERO),
@@ -175,10 +172,6 @@ impl MaterialData {
             base_color: CoordinatesData::new(textures.base_color.as_ref()),
             emissive: CoordinatesData::new(textures.emissive.as_ref()),
             metallic_roughness: CoordinatesData::new(mapped.map(|mapped| &mapped.texture)),
-            normal_map: CoordinatesData::new(normal.map(|slot| &slot.texture))
-                .with(normal.map_or(0.0, |slot| slot.scale)),
-            occlusion: CoordinatesData::new(occlusion.map(|slot| &slot.texture))
-                .with(occlusion.map_or(0.0, |slot| slot.strength)),
             base_and_metallic: mapped.map_or([0.0; 4], |m| {
                 coefficient(m.base_color).extend(finite(Vec3::splat(m.metallic)).x).to_array()
             }),
@@ -189,6 +182,27 @@ impl MaterialData {
             eta: finite(eta).extend(0.0).to_array(),
             absorption: finite(absorption).extend(0.0).to_array(),
         }
+    }
+}
+
+/// `SurfaceMaps`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SurfaceMapsData {
+    normal_map: CoordinatesData,
+    occlusion: CoordinatesData,
+}
+
+impl SurfaceMapsData {
+    /// Of a material that has either; nothing of one that has neither.
+    pub fn new(textures: &MaterialTextures) -> Option<Self> {
+        let (normal, occlusion) = (textures.normal.as_ref(), textures.occlusion.as_ref());
+        (normal.is_some() || occlusion.is_some()).then(|| Self {
+            normal_map: CoordinatesData::new(normal.map(|slot| &slot.texture))
+                .with(normal.map_or(0.0, |slot| slot.scale)),
+            occlusion: CoordinatesData::new(occlusion.map(|slot| &slot.texture))
+                .with(occlusion.map_or(0.0, |slot| slot.strength)),
+        })
     }
 }
 
@@ -308,7 +322,8 @@ mod tests {
     fn sizes_are_those_of_the_shaders() {
         assert_eq!(size_of::<FrameData>(), 144);
         assert_eq!(size_of::<ObjectData>(), 96);
-        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 5 * 32 + 4 * 16);
+        assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 4 * 16);
+        assert_eq!(size_of::<SurfaceMapsData>(), 2 * 32);
         assert_eq!(size_of::<LightData>(), 96);
         assert_eq!(size_of::<InverseSquareLightData>(), 32);
         assert_eq!(size_of::<ClusterGridData>(), 48);

@@ -5,6 +5,9 @@ use std::sync::Arc;
 
 use lumbre_scene::{Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
 
+use wgpu::util::DeviceExt;
+
+use crate::layout::SurfaceMapsData;
 use crate::shader::Feature;
 use crate::textures::{Texels, Textures};
 use crate::{Gpu, RenderError};
@@ -26,7 +29,8 @@ pub(crate) struct TextureSet {
     pub bind_group: wgpu::BindGroup,
 }
 
-type SetKey = [Option<(usize, Sampler)>; SLOTS.len()];
+/// The images with their samplers, and the bytes of the maps' numbers.
+type SetKey = ([Option<(usize, Sampler)>; SLOTS.len()], Option<[u8; size_of::<SurfaceMapsData>()]>);
 
 /// All sets in use.
 #[derive(Debug, Default)]
@@ -79,7 +83,9 @@ impl TextureSets {
         let mask = mask(material);
         let Some(layout) = self.layout(gpu, mask) else { return Ok(None) };
         let slots = slots(material);
-        let key = slots.map(|slot| slot.map(|t| (Arc::as_ptr(&t.image) as usize, t.sampler)));
+        let maps = SurfaceMapsData::new(material);
+        let images = slots.map(|slot| slot.map(|t| (Arc::as_ptr(&t.image) as usize, t.sampler)));
+        let key = (images, maps.map(bytemuck::cast));
         if let Some(set) = self.sets.get(&key) {
             return Ok(Some(Arc::clone(set)));
         }
@@ -90,14 +96,14 @@ impl TextureSets {
                 bound.push((binding, view, textures.sampler(gpu, &texture.sampler)));
             }
         }
-        let set = Arc::new(TextureSet { mask, bind_group: bind(gpu, &layout, &bound) });
+        let set = Arc::new(TextureSet { mask, bind_group: bind(gpu, &layout, &bound, maps.as_ref()) });
         self.sets.insert(key, Arc::clone(&set));
         Ok(Some(set))
     }
 
     /// The layout of a lightmap's group.
     pub fn lightmap_layout(&mut self, gpu: &Gpu) -> wgpu::BindGroupLayout {
-        self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, &[0])).clone()
+        self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, &[0], false)).clone()
     }
 
     /// The group of a lightmap.
@@ -116,7 +122,7 @@ impl TextureSets {
         let (wrap_u, wrap_v) = (Wrap::ClampToEdge, Wrap::ClampToEdge);
         let sampler =
             textures.sampler(gpu, &Sampler { wrap_u, wrap_v, mipmap: Mipmap::None, ..Sampler::default() });
-        let group = Arc::new(bind(gpu, &layout, &[(0, view, sampler)]));
+        let group = Arc::new(bind(gpu, &layout, &[(0, view, sampler)], None));
         self.lightmaps.insert(key, Arc::clone(&group));
         Ok(group)
     }
@@ -130,11 +136,16 @@ impl TextureSets {
 
 fn make_layout(gpu: &Gpu, mask: u8) -> wgpu::BindGroupLayout {
     let first: Vec<u32> = (0..SLOTS.len() as u32).filter(|i| mask & (1 << i) != 0).map(|i| i * 2).collect();
-    layout_of(gpu, &first)
+    let reads_maps =
+        |(feature, bound)| bound && matches!(feature, Feature::NormalTexture | Feature::OcclusionTexture);
+    layout_of(gpu, &first, features(mask).any(reads_maps))
 }
 
-/// A texture and a sampler at each of these bindings.
-fn layout_of(gpu: &Gpu, first: &[u32]) -> wgpu::BindGroupLayout {
+/// Where `SurfaceMaps` is bound, behind all textures.
+const SURFACE_MAPS_BINDING: u32 = 10;
+
+/// A texture and a sampler at each of these bindings, and the numbers of the maps if there are any.
+fn layout_of(gpu: &Gpu, first: &[u32], maps: bool) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::FRAGMENT,
@@ -147,8 +158,17 @@ fn layout_of(gpu: &Gpu, first: &[u32]) -> wgpu::BindGroupLayout {
         multisampled: false,
     };
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let entries: Vec<_> =
-        first.iter().flat_map(|&binding| [entry(binding, texture), entry(binding + 1, sampler)]).collect();
+    let uniform = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let maps = maps.then(|| wgpu::BindGroupLayoutEntry {
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ..entry(SURFACE_MAPS_BINDING, uniform)
+    });
+    let textures = first.iter().flat_map(|&binding| [entry(binding, texture), entry(binding + 1, sampler)]);
+    let entries: Vec<_> = textures.chain(maps).collect();
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("textures"),
         entries: &entries,
@@ -159,7 +179,19 @@ fn bind(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
     bound: &[(u32, wgpu::TextureView, wgpu::Sampler)],
+    maps: Option<&SurfaceMapsData>,
 ) -> wgpu::BindGroup {
+    let maps = maps.map(|maps| {
+        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("surface maps"),
+            contents: bytemuck::bytes_of(maps),
+            usage: wgpu::BufferUsages::UNIFORM,
+        })
+    });
+    let maps = maps.as_ref().map(|buffer| wgpu::BindGroupEntry {
+        binding: SURFACE_MAPS_BINDING,
+        resource: buffer.as_entire_binding(),
+    });
     let entries: Vec<_> = bound
         .iter()
         .flat_map(|(binding, view, sampler)| {
@@ -174,6 +206,7 @@ fn bind(
                 },
             ]
         })
+        .chain(maps)
         .collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("textures"),

@@ -18,6 +18,7 @@ modules!(
     "material_textures",
     "normal_map",
     "occlusion_map",
+    "surface_maps",
     "tone_curve",
     "optics/angle",
     "optics/attenuation",
