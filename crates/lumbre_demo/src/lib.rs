@@ -1,4 +1,4 @@
-//! The playable level: its rules, its input, its window, its overlay.
+//! The playable level, and any other glTF file in a window: rules, input, window, overlay.
 //!
 //! ```text
 //!   level::build ──► lumbre_scene::save ──► assets/demo.glb ──► bake ──► Game::load
@@ -7,6 +7,8 @@
 //!        ▲               │             │  player: walking (gravity, walls, steps)
 //!   Recording ◄──────────┘             │  motion: lights and props move with the time
 //! ```
+//!
+//! A file that is no level is [`Opened`], framed, and turned by [`OrbitView`]; a [`BackgroundBake`] lights it beside the frames.
 //!
 //! The rules know no window: a recorded walk runs in a test as it runs on a screen.
 //!

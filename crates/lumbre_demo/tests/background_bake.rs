@@ -1,5 +1,7 @@
 //! A bake beside the frames: light comes in steps, lands on the surfaces it was made for, can be cancelled and saved.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
