@@ -46,14 +46,16 @@ pub fn distribution_ggx(sine_squared: f64, alpha_squared: f64) -> f64 {
 }
 
 /// Smith's masking and shadowing of microfacets at one height (Heitz 2014) over n·v:
-/// 2 n·l/(n·l √(α² + (1 - α²)(n·v)²) + n·v √(α² + (1 - α²)(n·l)²)). In [0, 2/α]; cosines below 0 count as 0.
+/// 2 n·l/(n·l √(α² + (1 - α²)(n·v)²) + n·v √(α² + (1 - α²)(n·l)²)). In [0, 2/α]; cosines below 0 count as 0, and
+/// α² is held in [0, 1].
 ///
 /// # Error of the f32 twin
 ///
 /// 24 u: two roots of sums of positive terms (11 u), products, a sum, a division.
 pub fn smith_attenuation(n_light: f64, n_viewer: f64, alpha_squared: f64) -> f64 {
     let (light, viewer) = (n_light.max(0.0), n_viewer.max(0.0));
-    let root = |cosine: f64| (alpha_squared + (1.0 - alpha_squared) * cosine * cosine).sqrt();
+    let alpha = alpha_squared.clamp(0.0, 1.0);
+    let root = |cosine: f64| (alpha + (1.0 - alpha) * cosine * cosine).sqrt();
     2.0 * light / (light * root(viewer) + viewer * root(light)).max(TINY_DIVISOR)
 }
 
