@@ -35,7 +35,7 @@ const LIGHT: &str = "LUMBRE_lights_phong";
 /// Which of a bake's images are loaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightmapImages {
-    /// The .ktx2 images of `lumbre bake --ktx2 rgb9e5`: four bytes a texel, and every device filters them.
+    /// The .ktx2 images of a bake: four bytes a texel, and every device filters them.
     #[default]
     Ktx2,
     /// The images that the file names: OpenEXR, which needs the feature `exr` and a device that filters 32-bit floats.

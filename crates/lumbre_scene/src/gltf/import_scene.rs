@@ -58,13 +58,6 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     Ok(settings)
 }
 
-/// Whether a scene names the specular model that it is drawn with.
-pub(crate) fn states_reflection(document: &Document, scene: usize) -> Result<bool, LoadProblem> {
-    let Some(source) = document.scenes.get(scene) else { return Ok(false) };
-    let found = extension::<SceneExtension>(&source.extensions, "LUMBRE_scene", &format!("scenes[{scene}]"))?;
-    Ok(found.is_some_and(|found| found.reflection.is_some()))
-}
-
 /// The shading technique with a name.
 pub(crate) fn shading(name: &str, place: &str, field: &str) -> Result<Shading, LoadProblem> {
     Shading::from_name(name)

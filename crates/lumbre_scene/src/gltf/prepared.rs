@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::{BakeMode, Light, Lobe, Material, ReflectionModel, Shading};
+use lumbre_optics::{BakeMode, Light, Material, ReflectionModel, Shading};
 
 use super::accessor::Buffers;
 use super::document::{self, Document, element, extension};
@@ -82,7 +82,7 @@ pub(crate) fn prepare(
 ) -> Result<Prepared, LoadProblem> {
     note_extensions(document, notes);
     let Hierarchy { order, parents, scene } = hierarchy(document, notes)?;
-    let mut settings = import_scene::settings(document, scene.unwrap_or(0))?;
+    let settings = import_scene::settings(document, scene.unwrap_or(0))?;
     let dynamic = dynamic_nodes(document, &order, &parents, notes)?;
 
     let decoded = vec![None; document.images.len()];
@@ -98,9 +98,6 @@ pub(crate) fn prepare(
             &mut images,
             notes,
         )?);
-    }
-    if !import_scene::states_reflection(document, scene.unwrap_or(0))? && is_plain_gltf(&materials) {
-        settings.reflection = ReflectionModel::TorranceSparrow;
     }
     let mut lights = Vec::new();
     let animated_lights = animated_lights(document)?;
@@ -222,13 +219,6 @@ pub(crate) fn prepare(
     }
     let (node_count, files) = (document.nodes.len(), Vec::new());
     Ok(Prepared { nodes, meshes, settings, node_count, files, photometric_lights, states_exposure })
-}
-
-/// Whether materials are by metallic-roughness, and none by the documents' coefficients: then a scene that names no specular model is drawn
-/// with the one that is glTF's own for them.
-fn is_plain_gltf(materials: &[(Material, MaterialTextures)]) -> bool {
-    let keeps = |lobe| materials.iter().any(|(material, _)| !material.unlit && material.lobe == lobe);
-    keeps(Lobe::EnergyKeeping) && !keeps(Lobe::Bare)
 }
 
 /// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.
