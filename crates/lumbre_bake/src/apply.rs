@@ -13,7 +13,7 @@ use lumbre_scene::{
 
 use crate::UnwrappedFrom;
 use crate::pages::Pages;
-use crate::scene::{LightmapLayout, Object, reading_first};
+use crate::scene::{LightmapLayout, Object, textures_of};
 
 /// How far each texel of an entity's [`Lightmap`] may be off: one standard error in the map's own unit (E/π, mean of the channels), row
 /// by row; NaN where the map shows no surface. Against a converged bake of the same map at least 95 % of the texels are within two.
@@ -67,8 +67,7 @@ pub(crate) fn apply(
                 Some(_) => pages.on_page(layout, index, mesh),
                 None => Arc::clone(mesh),
             };
-            let textures =
-                part.textures.as_ref().map(|own| if moved { reading_first(own) } else { own.clone() });
+            let textures = textures_of(part, moved);
             if let Some(textures) = textures.as_ref().filter(|own| entity.get() != Some(*own)) {
                 entity.insert(textures.clone());
             }

@@ -10,7 +10,8 @@ use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{
-    Image, Lightmap, MaterialTextures, Mesh, Name, Sampler, StaticObject, TextureReference, Transform,
+    Image, Lightmap, MaterialTextures, Mesh, Name, OcclusionTexture, Sampler, StaticObject, TextureReference,
+    Transform,
 };
 
 /// A floor whose first coordinates are all in one place and whose second tile three times.
@@ -112,6 +113,22 @@ fn both_sets_in_use_are_refused_by_name_unless_they_are_the_same() {
     let before = texture_reading(&world, entity);
     run(&mut world).expect("the scene bakes");
     assert_eq!(texture_reading(&world, entity), before);
+}
+
+#[test]
+fn occlusion_on_the_second_set_makes_way_for_the_lightmap() {
+    let textures = MaterialTextures {
+        base_color: Some(stripes(0)),
+        occlusion: Some(OcclusionTexture { texture: stripes(1), strength: 1.0 }),
+        ..MaterialTextures::default()
+    };
+    let mut world = World::new();
+    let entity = spawn(&mut world, "painted floor", textures);
+    let before = texture_reading(&world, entity);
+    run(&mut world).expect("the scene bakes");
+    assert_eq!(texture_reading(&world, entity), before);
+    let kept = world.get::<MaterialTextures>(entity).expect("it is painted still");
+    assert!(kept.occlusion.is_none(), "it would read the lightmap's coordinates");
 }
 
 #[test]

@@ -4,10 +4,16 @@
 //! seams. Its bitangent points where v grows. The green of glTF's normal maps points the other way, as v runs down the picture, so that w
 //! has the opposite sign here.
 
+use std::collections::HashMap;
+
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::{MeshError, TriangleMesh};
+
+/// Most triangles that may meet in one place. The library's time grows with their square, and its stack with their number; a cap or a pole
+/// has some hundred.
+const MOST_AROUND: usize = 4096;
 
 /// One of a mesh's sets of texture coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -24,7 +30,8 @@ impl TriangleMesh {
     /// disagree, because the texture is mirrored or cut there, is split.
     ///
     /// Where coordinates or positions of a triangle coincide, or are no numbers, it takes the tangents of its neighbours; without any,
-    /// or without coordinates at all, the zero vector, on which a normal map has no effect.
+    /// or without coordinates at all, the zero vector, on which a normal map has no effect. So does a mesh of which more than 4,096 triangles
+    /// meet in one place.
     ///
     /// ```
     /// use glam::{Vec3, Vec4};
@@ -44,7 +51,10 @@ impl TriangleMesh {
             TextureCoordinateSet::First => &self.uv0,
             TextureCoordinateSet::Second => &self.uv1,
         };
-        let tangents = if coordinates.is_empty() || self.normals.is_empty() {
+        let tangents = if coordinates.is_empty()
+            || self.normals.is_empty()
+            || self.most_triangles_around_a_place() > MOST_AROUND
+        {
             vec![Vec4::ZERO; self.indices.len()]
         } else {
             let mut corners =
@@ -56,6 +66,18 @@ impl TriangleMesh {
             }
         };
         Ok(self.split_by(&tangents))
+    }
+
+    /// The most corners that lie in one place.
+    fn most_triangles_around_a_place(&self) -> usize {
+        let mut around: HashMap<[u32; 3], usize> = HashMap::new();
+        for &vertex in &self.indices {
+            // As MikkTSpace welds vertices: by what they are, not by their index. Zeros of both signs are one place.
+            *around
+                .entry((self.positions[vertex as usize] + 0.0).to_array().map(f32::to_bits))
+                .or_default() += 1;
+        }
+        around.into_values().max().unwrap_or(0)
     }
 
     /// Splits vertices whose corners have different tangents.
@@ -148,6 +170,26 @@ mod tests {
             indices: vec![0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5],
             ..TriangleMesh::default()
         }
+    }
+
+    #[test]
+    fn a_fan_of_more_triangles_than_a_stack_holds_ends() {
+        let count = 200_000u32;
+        let rim = (0..=count).map(|i| {
+            let angle = std::f32::consts::TAU * i as f32 / count as f32;
+            Vec3::new(angle.cos(), 0.0, angle.sin())
+        });
+        let positions: Vec<Vec3> = std::iter::once(Vec3::ZERO).chain(rim).collect();
+        let fan = TriangleMesh {
+            normals: vec![Vec3::Y; positions.len()],
+            uv0: positions.iter().map(|p| Vec2::new(p.x, p.z)).collect(),
+            indices: (1..=count).flat_map(|i| [0, i + 1, i]).collect(),
+            positions,
+            ..TriangleMesh::default()
+        };
+        let with = fan.with_tangents(TextureCoordinateSet::First).expect("it is sound");
+        assert_eq!(with.triangle_count(), count as usize);
+        assert!(with.tangents.iter().all(|tangent| *tangent == Vec4::ZERO));
     }
 
     #[test]

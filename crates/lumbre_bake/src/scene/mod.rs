@@ -21,6 +21,6 @@ pub(crate) use collect::{
 pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, lay_out_with, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
-pub(crate) use texture_coordinates::reading_first;
+pub(crate) use texture_coordinates::textures_of;
 pub(crate) use triangles::{BakeScene, Canonical, SceneTriangle};
 pub(crate) use wanted_probes::WantedProbes;

@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_optics::{FlatRule, FogMode, Lobe, Material};
+use lumbre_optics::{FlatRule, FogMode};
 use serde_json::{Value, json};
 
 use super::export::SaveError;
@@ -10,14 +10,10 @@ use super::export_material::color;
 use super::extensions::{FogExtension, SceneExtension};
 use crate::{Camera, Projection, SceneSettings};
 
-/// LUMBRE_scene; nothing where the World has only the default settings, and no material for which a reader would choose another specular
-/// model.
+/// LUMBRE_scene; nothing where the World has only the default settings.
 pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-    let keeps = |material: &Material| material.lobe == Lobe::EnergyKeeping;
-    let mut materials = world.try_query::<&Material>();
-    let energy_keeping = materials.as_mut().is_some_and(|materials| materials.iter(world).any(keeps));
-    if settings == SceneSettings::default() && !energy_keeping {
+    if settings == SceneSettings::default() {
         return Ok(None);
     }
     if ![settings.ambient, settings.background, settings.sky].iter().all(|color| color.is_finite()) {
