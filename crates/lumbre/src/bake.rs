@@ -7,18 +7,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use bevy_ecs::query::{With, Without};
 use bevy_ecs::world::World;
-use glam::Vec3;
 use lumbre::bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
     SamplesError, Solver, content_hash, rebake,
 };
-use lumbre::optics::{BakeMode, Light, LightKind, Material};
-use lumbre::scene::{
-    DynamicObject, Hidden, LightmapEncoding, SaveOptions, SceneSettings, StaticObject, Supercompression,
-    save_baked,
-};
+use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
+use lumbre::scene::{LightmapEncoding, SaveOptions, SceneSettings, Supercompression, save_baked};
 
 use crate::arguments::{Bake, BakeFormFactors, BakeProbes, BakeQuality, BakeSolver, ExrTexels};
 use crate::bake_record::{Asked, BakeRecord, folder_of_bake, hash_of_files};
@@ -74,9 +69,6 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
     print(&report, &lightmaps, asked.json)
 }
-
-/// Side of the atlases that small meshes share, in texels: what every device can bind, and most levels fit into a few of them.
-const ATLAS_SIDE: u32 = 2048;
 
 fn options(asked: &Bake) -> BakeOptions {
     let density = match (asked.texels_per_meter, asked.map_size) {
@@ -239,22 +231,7 @@ fn print(report: &BakeReport, files: &[FileLine], json: bool) -> anyhow::Result<
 
 /// A level in which nothing shines would cost the time of a bake and be black.
 fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
-    let shines = |color: Vec3| color.max_element() > 0.0;
-    let baked = |light: &Light| {
-        let kept = light.bake != BakeMode::Dynamic && light.kind != LightKind::Ambient;
-        light.enabled && kept && shines(light.diffuse)
-    };
-    let emits = |material: &Material| {
-        let back = material.back.as_ref().filter(|_| material.double_sided);
-        !material.unlit && (shines(material.front.emission) || back.is_some_and(|back| shines(back.emission)))
-    };
-    let lit = shines(world.resource::<SceneSettings>().sky)
-        || world.query::<&Light>().iter(world).any(baked)
-        || world
-            .query_filtered::<&Material, (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>()
-            .iter(world)
-            .any(emits);
-    if lit {
+    if has_light_to_bake(world) {
         return Ok(());
     }
     let (input, output) = (asked.input.display(), asked.output.display());
@@ -292,6 +269,11 @@ fn check_output(asked: &Bake) -> anyhow::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         bail!("{}: there is no folder {}; make it first", path.display(), folder.display());
+    }
+    for own in [path.with_extension("lightmaps"), folder_of_bake(path)] {
+        if own.exists() && !own.is_dir() {
+            bail!("{}: this is to be a folder, but it is a file; move it away", own.display());
+        }
     }
     tempfile::tempfile_in(folder)
         .map(drop)

@@ -131,12 +131,15 @@ impl BakeRecord {
     }
 }
 
-/// Removes the lightmaps of the bake whose record is there that are not among the new files. Those that are no more as they were written
-/// are somebody else's.
+/// Removes the lightmaps of the bake whose record is there, if it is of this output, that are not among the new files. Those that are no more
+/// as they were written are somebody else's.
 fn remove_former_lightmaps(record: &Path, output: &Path, files: &[FileRecord]) {
     let former = std::fs::read(record).ok().and_then(|text| serde_json::from_slice::<BakeRecord>(&text).ok());
     let folder = output.with_extension("lightmaps");
-    for file in former.into_iter().flat_map(|former| former.files) {
+    let is_of_output = |former: &BakeRecord| {
+        former.files.iter().any(|file| output.file_name().is_some_and(|name| *name == *file.name))
+    };
+    for file in former.filter(is_of_output).into_iter().flat_map(|former| former.files) {
         let path = output.with_file_name(&file.name);
         let new = files.iter().any(|new| new.name == file.name);
         if !new

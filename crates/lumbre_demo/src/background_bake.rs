@@ -9,16 +9,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
-use lumbre_optics::{BakeMode, Light, Material};
+use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
-    GlobalTransform, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, Primitive, SaveError,
-    SaveOptions, SceneSettings, SourceFile, StaticObject, save_baked,
+    DynamicObject, GlobalTransform, Hidden, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh,
+    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, save_baked,
 };
 
 /// One bake of several, each better than the one before.
@@ -181,7 +181,7 @@ enum Work {
     Nothing,
 }
 
-/// A bake that runs, or has run, beside the frames. Dropping it cancels it.
+/// A bake that runs, or has run, beside the frames. Dropping it cancels it; a file that is being written is finished first.
 pub struct BackgroundBake {
     messages: Receiver<Message>,
     sender: Sender<Message>,
@@ -189,6 +189,8 @@ pub struct BackgroundBake {
     status: Option<BakeStatus>,
     work: Work,
     baked: Option<Box<Baked>>,
+    /// The thread that writes the file.
+    saving: Option<JoinHandle<()>>,
 }
 
 impl BackgroundBake {
@@ -208,7 +210,15 @@ impl BackgroundBake {
             sender: sender.clone(),
         };
         thread::Builder::new().name("bake".to_owned()).spawn(move || job.run())?;
-        Ok(Self { messages, sender, is_cancelled, status: None, work: Work::Baking, baked: None })
+        Ok(Self {
+            messages,
+            sender,
+            is_cancelled,
+            status: None,
+            work: Work::Baking,
+            baked: None,
+            saving: None,
+        })
     }
 
     /// Whether it still works at something: a bake, or the writing of the file.
@@ -241,7 +251,7 @@ impl BackgroundBake {
         let Some(mut baked) = self.baked.take() else { return };
         let (sender, path) = (self.sender.clone(), path.to_owned());
         let written = thread::Builder::new().name("save".to_owned()).spawn(move || {
-            let saved = save_baked(&mut baked.world, &baked.source, &path, &SaveOptions::default());
+            let saved = save_baked(&mut baked.world, &baked.source, &path, &written_as());
             // Whoever waited for it may be gone.
             let _ = sender.send(Message::News(match saved {
                 Ok(_) => BakeNews::Saved(path),
@@ -249,9 +259,12 @@ impl BackgroundBake {
             }));
             let _ = sender.send(Message::Done(baked));
         });
-        self.work = if written.is_ok() { Work::Saving } else { Work::Nothing };
-        if let Err(error) = written {
-            let _ = self.sender.send(Message::News(BakeNews::Failed(error.into())));
+        match written {
+            Ok(thread) => (self.work, self.saving) = (Work::Saving, Some(thread)),
+            Err(error) => {
+                self.work = Work::Nothing;
+                let _ = self.sender.send(Message::News(BakeNews::Failed(error.into())));
+            }
         }
     }
 
@@ -271,10 +284,23 @@ impl BackgroundBake {
                     }
                     news.push(one);
                 }
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return news,
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
         }
+        // A panic while saving is a fault of ours; the window outlives it and says so.
+        if let Some(thread) = self.saving.take_if(|thread| thread.is_finished())
+            && thread.join().is_err()
+        {
+            self.work = Work::Nothing;
+            news.push(BakeNews::Failed(BakeError::Lost));
+        }
+        news
     }
+}
+
+/// As `lumbre bake` writes without being asked otherwise: KTX2 beside OpenEXR.
+fn written_as() -> SaveOptions {
+    SaveOptions { ktx2: Some(PackedFormat::Rgb9E5), ..SaveOptions::default() }
 }
 
 /// Whether nothing follows this failure; after one of saving the bake is handed back.
@@ -285,6 +311,10 @@ fn is_of_the_bake(news: &BakeNews) -> bool {
 impl Drop for BackgroundBake {
     fn drop(&mut self) {
         self.cancel();
+        if let Some(thread) = self.saving.take() {
+            // Nobody is left to be told.
+            let _ = thread.join();
+        }
     }
 }
 
@@ -319,7 +349,7 @@ impl Job {
         let mut world = World::new();
         let mut file = SourceFile::read(&self.path, &self.options)?;
         let nodes = file.load_into(&mut world)?.nodes;
-        let under_a_sky = !shines(&mut world);
+        let under_a_sky = !has_light_to_bake(&mut world);
         if under_a_sky {
             world.get_resource_or_init::<SceneSettings>().sky = Vec3::splat(SKY);
         }
@@ -376,17 +406,22 @@ fn leaving_a_core(options: BakeOptions) -> BakeOptions {
 }
 
 /// Whether anything gives light that a bake takes: lamps, emission, a sky.
-fn shines(world: &mut World) -> bool {
+pub fn has_light_to_bake(world: &mut World) -> bool {
     let bright = |color: Vec3| color.max_element() > 0.0;
+    let is_baked = |light: &Light| {
+        let kept = light.bake != BakeMode::Dynamic && light.kind != LightKind::Ambient;
+        light.enabled && kept && bright(light.diffuse)
+    };
+    let emits = |material: &Material| {
+        let back = material.back.as_ref().filter(|_| material.double_sided);
+        !material.unlit && (bright(material.front.emission) || back.is_some_and(|back| bright(back.emission)))
+    };
     world.get_resource::<SceneSettings>().is_some_and(|settings| bright(settings.sky))
+        || world.query::<&Light>().iter(world).any(is_baked)
         || world
-            .query::<&Light>()
+            .query_filtered::<&Material, (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>()
             .iter(world)
-            .any(|light| light.enabled && light.bake != BakeMode::Dynamic && bright(light.diffuse))
-        || world.query_filtered::<&Material, With<StaticObject>>().iter(world).any(|material| {
-            let back = material.back.as_ref().is_some_and(|back| bright(back.emission));
-            bright(material.front.emission) || back
-        })
+            .any(emits)
 }
 
 /// Square metres of everything that stands still.

@@ -349,8 +349,11 @@ impl Game {
             && let Some(Camera { projection: seen @ Projection::Perspective { .. }, .. }) =
                 self.world.get(*entity)
         {
-            // The picture keeps its angle.
+            // The picture keeps its angle; how far one may go is no matter of the camera's.
             self.lens.projection = *seen;
+            if let Projection::Perspective { far, .. } = &mut self.lens.projection {
+                *far = None;
+            }
         }
         self.viewpoint = Viewpoint::Orbit(moved);
     }

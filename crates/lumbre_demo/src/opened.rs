@@ -11,6 +11,9 @@ use crate::{Game, GameError};
 /// Share of a picture that has to be white for want of an exposure before one is metered unasked.
 pub(crate) const CLIPPED: f64 = 0.02;
 
+/// Side of the atlases that small meshes share, in texels: what every device can bind, and most levels fit into a few of them.
+pub const ATLAS_SIDE: u32 = 2048;
+
 /// How bright pictures are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Exposure {
@@ -39,7 +42,7 @@ pub struct OpenOptions {
 impl Default for OpenOptions {
     fn default() -> Self {
         let load = LoadOptions { lenient: true, ..LoadOptions::default() };
-        let bake = BakeOptions { error: 0.02, ..BakeOptions::default() };
+        let bake = BakeOptions { error: 0.02, atlas_size: Some(ATLAS_SIDE), ..BakeOptions::default() };
         Self { load, default_light: true, exposure: Exposure::default(), bake }
     }
 }
@@ -105,7 +108,13 @@ impl Opened {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let stem = stem.strip_suffix(".baked").unwrap_or(&stem);
         let beside = self.path.with_file_name(format!("{stem}.baked.glb"));
-        if beside == self.path { self.path.with_file_name(format!("{stem}.baked-again.glb")) } else { beside }
+        // By the stem, whatever its letters' case: a `.baked.gltf` would share its folder of lightmaps with the new file.
+        let stem_of = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
+        if stem_of(&beside) == stem_of(&self.path) {
+            self.path.with_file_name(format!("{stem}.baked-again.glb"))
+        } else {
+            beside
+        }
     }
 }
 

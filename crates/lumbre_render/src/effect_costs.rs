@@ -34,8 +34,15 @@ pub fn removable_effects(census: &Census) -> Vec<Removable> {
 
 const EFFECTS: &[Removable] = &[
     // Against the next cheaper shading.
-    Removable { effect: "Gouraud shading", without: |_, options| options.shading = Some(Shading::Flat) },
-    Removable { effect: "Phong shading", without: |_, options| options.shading = Some(Shading::Gouraud) },
+    Removable {
+        effect: "Gouraud shading",
+        without: |world, options| shade_otherwise(world, options, Shading::Gouraud, Shading::Flat),
+    },
+    Removable {
+        effect: "Phong shading",
+        without: |world, options| shade_otherwise(world, options, Shading::Phong, Shading::Gouraud),
+    },
+    Removable { effect: "sky", without: |world, _| settings(world, |settings| settings.sky = Vec3::ZERO) },
     Removable {
         effect: "global ambient",
         without: |world, _| settings(world, |settings| settings.ambient = Vec3::ZERO),
@@ -59,7 +66,11 @@ const EFFECTS: &[Removable] = &[
     Removable { effect: "polygon lights", without: |world, _| remove::<EmissiveLight>(world) },
     Removable {
         effect: "specular",
-        without: |world, _| each_surface(world, |surface| surface.specular = Vec3::ZERO),
+        without: |world, _| {
+            each_surface(world, |surface| surface.specular = Vec3::ZERO);
+            // A metallic-roughness texture makes the coefficient per texel.
+            each_textures(world, |textures| textures.metallic_roughness = None);
+        },
     },
     Removable {
         effect: "emission",
@@ -67,6 +78,14 @@ const EFFECTS: &[Removable] = &[
     },
     Removable { effect: "lightmaps", without: |_, options| options.lightmaps = false },
     Removable { effect: "textures", without: |world, _| remove::<MaterialTextures>(world) },
+    Removable {
+        effect: "normal textures",
+        without: |world, _| each_textures(world, |textures| textures.normal = None),
+    },
+    Removable {
+        effect: "occlusion textures",
+        without: |world, _| each_textures(world, |textures| textures.occlusion = None),
+    },
     Removable {
         effect: "alpha mask",
         without: |world, _| opaque(world, |mode| matches!(mode, AlphaMode::Mask { .. })),
@@ -96,6 +115,25 @@ fn switch_off(world: &mut World, which: impl Fn(LightKind, bool) -> bool) {
 
 fn each_material(world: &mut World, change: impl Fn(&mut Material)) {
     world.query::<&mut Material>().iter_mut(world).for_each(|mut material| change(&mut material));
+}
+
+fn each_textures(world: &mut World, change: impl Fn(&mut MaterialTextures)) {
+    world.query::<&mut MaterialTextures>().iter_mut(world).for_each(|mut textures| change(&mut textures));
+}
+
+/// Shades objects of one technique by another, whether they chose it themselves or the scene for them.
+fn shade_otherwise(world: &mut World, options: &mut FrameOptions, from: Shading, to: Shading) {
+    if options.shading == Some(from) {
+        options.shading = Some(to);
+    }
+    settings(world, |settings| {
+        if settings.shading == from {
+            settings.shading = to;
+        }
+    });
+    for mut shading in world.query::<&mut Shading>().iter_mut(world).filter(|shading| **shading == from) {
+        *shading = to;
+    }
 }
 
 fn each_surface(world: &mut World, change: impl Fn(&mut Surface)) {

@@ -78,7 +78,7 @@ impl App {
 
     /// The recording of what was played, if one was asked for.
     pub fn take_recording(&mut self) -> Option<Recording> {
-        self.viewing.opened.game.take_recording()
+        self.viewing.take_recording()
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {

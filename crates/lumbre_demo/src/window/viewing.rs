@@ -14,7 +14,7 @@ use super::stage::Stage;
 use crate::opened::CLIPPED;
 use crate::{
     Action, Adaptation, BackgroundBake, BakeNews, BakeStatus, Exposure, GameError, OpenOptions, Opened,
-    Viewpoint,
+    Recording, Viewpoint,
 };
 
 /// Between two looks at the meter.
@@ -77,6 +77,8 @@ pub struct Viewing {
     metered: Metered,
     since_metered: Option<Duration>,
     message: Option<Message>,
+    /// What was played in a file that another has taken the place of.
+    recording: Option<Recording>,
 }
 
 impl Viewing {
@@ -92,7 +94,13 @@ impl Viewing {
             metered,
             since_metered: None,
             message: None,
+            recording: None,
         }
+    }
+
+    /// What was played in the first file that was recorded.
+    pub fn take_recording(&mut self) -> Option<Recording> {
+        self.recording.take().or_else(|| self.opened.game.take_recording())
     }
 
     /// Begins to open another file. The old one stands until the new one is there.
@@ -232,7 +240,8 @@ impl Viewing {
             Ok(mut opened) => {
                 // What the keys chose stays chosen.
                 opened.game.view = self.opened.game.view;
-                *self = Self::new(opened, self.options.clone());
+                let recording = self.take_recording();
+                *self = Self { recording, ..Self::new(opened, self.options.clone()) };
                 true
             }
             Err(error) => {
