@@ -441,14 +441,15 @@ impl Game {
     }
 }
 
-/// The cameras of a World, by their entities.
+/// The cameras of a World, in the order in which they were spawned.
 fn cameras_of(world: &mut World) -> Vec<(Entity, String)> {
     let mut query = world.query_filtered::<(Entity, Option<&Name>), With<Camera>>();
     let mut cameras: Vec<(Entity, String)> = query
         .iter(world)
         .map(|(entity, name)| (entity, name.map_or_else(String::new, ToString::to_string)))
         .collect();
-    cameras.sort();
+    // As they were spawned; entities themselves are ordered otherwise.
+    cameras.sort_by_key(|(entity, _)| entity.index_u32());
     for (index, (_, name)) in cameras.iter_mut().enumerate().filter(|(_, (_, name))| name.is_empty()) {
         *name = format!("camera {index}");
     }
@@ -557,6 +558,8 @@ mod tests {
         game.step_once(&Input { forward: true, ..Input::default() });
         assert_eq!(game.viewpoint(), &Viewpoint::Player);
         assert!(game.player().flying);
+        // What is seen lies between the last two steps.
+        game.step_once(&Input { forward: true, ..Input::default() });
         let after = eye(&game);
         let ahead = after.translation - before.translation;
         let speed = game.player().flight_speed;

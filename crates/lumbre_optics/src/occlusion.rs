@@ -1,12 +1,12 @@
 //! Occlusion textures: the part of the indirect light that reaches a texel. Not shadows: light that comes straight from a lamp is left alone.
 
-/// 1 + strength (sample - 1), as glTF says: what ambient terms and lightmaps are multiplied by.
+/// 1 + strength (texel - 1), as glTF says: what ambient terms and lightmaps are multiplied by.
 ///
 /// # Error of the f32 twin
 ///
 /// 3 u of 1 + 2 |strength|.
-pub fn occlusion(sample: f64, strength: f64) -> f64 {
-    1.0 + strength * (sample - 1.0)
+pub fn occlusion(texel: f64, strength: f64) -> f64 {
+    1.0 + strength * (texel - 1.0)
 }
 
 #[cfg(test)]

@@ -215,6 +215,9 @@ pub(crate) fn write_lightmaps(
     files: &mut Files,
 ) -> Result<Vec<LightmapFile>, SaveError> {
     let folder = path.with_file_name(&lightmaps.folder);
+    if !lightmaps.images.is_empty() || !lightmaps.volumes.is_empty() {
+        files.make_folder(&folder);
+    }
     let mut written = Vec::new();
     for (name, image) in &lightmaps.images {
         let failed = |error: LightmapFileError| SaveError::Image {

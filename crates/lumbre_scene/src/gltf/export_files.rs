@@ -53,7 +53,14 @@ fn tidy(folder: &Path) {
 }
 
 impl Files {
-    /// Writes a file beside `path`, into a folder that is made if its own folder is there.
+    /// Makes a folder if it is not there, and its own folder is; if it cannot be made, writing into it says why.
+    pub(crate) fn make_folder(&mut self, folder: &Path) {
+        if fs::create_dir(folder).is_ok() {
+            self.made.push(folder.to_owned());
+        }
+    }
+
+    /// Writes a file beside `path`.
     pub(crate) fn write(&mut self, path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
         let failed = |source| SaveError::Write { path: path.to_owned(), source };
         let Some(name) = path.file_name() else {
@@ -67,11 +74,7 @@ impl Files {
             _ => Path::new("."),
         };
         if self.tidied.insert(folder.to_owned()) {
-            match fs::create_dir(folder) {
-                Ok(()) => self.made.push(folder.to_owned()),
-                // It is there already, or writing says what is wrong with it.
-                Err(_) => tidy(folder),
-            }
+            tidy(folder);
         }
         for attempt in 0..100 {
             let mut hidden = OsString::from(".");
@@ -165,6 +168,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut files = Files::default();
         files.write(&folder.path().join("room.glb"), b"new").unwrap();
+        files.make_folder(&folder.path().join("room.lightmaps"));
         files.write(&folder.path().join("room.lightmaps/floor.exr"), b"new").unwrap();
         drop(files);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -48,7 +48,7 @@ fn bake(world: &mut World) {
         });
         if reads_second {
             let mut textures = textures.unwrap();
-            textures.base_color.as_mut().unwrap().tex_coord = 0;
+            textures.references_mut().for_each(|texture| texture.tex_coord = 0);
             world.entity_mut(entity).insert(textures);
         }
         let image = LightmapImage {
