@@ -25,6 +25,10 @@ const LARGEST_LOBE: f64 = 1.3e5;
 
 /// Smallest number that the Smith term divides by.
 const TINY_DIVISOR: f64 = 1e-30;
+/// The α² of an exponent of 10⁶.
+const SMOOTHEST: f64 = 1.998e-6;
+/// Less than the α² of any exponent.
+const TINY_ALPHA_SQUARED: f64 = 1e-37;
 
 /// (n + 2)/8: the brightness of a highlight's peak where the exponent n of n·h reflects all light.
 ///
@@ -41,20 +45,21 @@ pub fn lobe_peak(shininess: f64) -> f64 {
 ///
 /// 2 (1 - q) 8 u and 14 u of it, with q its root.
 pub fn distribution_ggx(sine_squared: f64, alpha_squared: f64) -> f64 {
-    let ratio = alpha_squared / (alpha_squared + sine_squared.clamp(0.0, 1.0) * (1.0 - alpha_squared));
+    let alpha = alpha_squared.clamp(TINY_ALPHA_SQUARED, 1.0);
+    let ratio = alpha / (alpha + sine_squared.clamp(0.0, 1.0) * (1.0 - alpha));
     ratio * ratio
 }
 
 /// Smith's masking and shadowing of microfacets at one height (Heitz 2014) over n·v:
 /// 2 n·l/(n·l √(α² + (1 - α²)(n·v)²) + n·v √(α² + (1 - α²)(n·l)²)). In [0, 2/α]; cosines below 0 count as 0, and
-/// α² is held in [0, 1].
+/// α² is held in [1.998·10⁻⁶, 1], from an exponent of 10⁶ to one of 0.
 ///
 /// # Error of the f32 twin
 ///
 /// 24 u: two roots of sums of positive terms (11 u), products, a sum, a division.
 pub fn smith_attenuation(n_light: f64, n_viewer: f64, alpha_squared: f64) -> f64 {
-    let (light, viewer) = (n_light.max(0.0), n_viewer.max(0.0));
-    let alpha = alpha_squared.clamp(0.0, 1.0);
+    let (light, viewer) = (n_light.clamp(0.0, 1.0), n_viewer.clamp(0.0, 1.0));
+    let alpha = alpha_squared.clamp(SMOOTHEST, 1.0);
     let root = |cosine: f64| (alpha + (1.0 - alpha) * cosine * cosine).sqrt();
     2.0 * light / (light * root(viewer) + viewer * root(light)).max(TINY_DIVISOR)
 }

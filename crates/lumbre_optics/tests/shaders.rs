@@ -229,6 +229,7 @@ fn twins_have_the_same_names_and_arguments() {
     let choices = [
         "model",
         "mode",
+        "lobe",
         "parameters",
         "light_position",
         "light_axis",
