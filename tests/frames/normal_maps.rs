@@ -19,8 +19,8 @@ use lumbre_tests::panes::{EYE, image, orthographic, pane, pixel_point, pixel_uv,
 use lumbre_tests::twin::{self, TwinOptions};
 
 use crate::adapter::{draw, linear};
+use crate::textures::{self, SIZE};
 
-const SIZE: usize = 32;
 /// Texels along a side of the maps here.
 const TEXELS: usize = 8;
 
@@ -97,12 +97,7 @@ fn lit_pixel(x: usize, y: usize, normal: DVec3, side: f64) -> DVec3 {
 }
 
 fn difference(world: &mut World, expected: impl Fn(usize, usize) -> Option<DVec3>) -> Difference {
-    let (got, _) = draw(world, SIZE as u32, SIZE as u32, &linear());
-    let got: Vec<_> = got.into_iter().map(Some).collect();
-    let expected: Vec<_> = (0..SIZE * SIZE).map(|at| expected(at % SIZE, at / SIZE)).collect();
-    let difference = compare(&got, &expected);
-    assert!(difference.pixels > SIZE * SIZE / 2, "{} pixels are too few to compare", difference.pixels);
-    difference
+    textures::difference(world, &linear(), expected)
 }
 
 #[test]

@@ -20,7 +20,7 @@ use lumbre_tests::panes::{
 
 use crate::adapter::{draw, linear};
 
-const SIZE: usize = 32;
+pub(crate) const SIZE: usize = 32;
 
 /// Of a decoded sRGB texel: decoding may be off by half an eight-bit code (the Direct3D functional specification's bound, which drivers
 /// keep), and the curve is steepest at white, 2.275: 0.5/255*2.275.
@@ -56,7 +56,8 @@ fn base_color(texture: TextureReference) -> MaterialTextures {
     MaterialTextures { base_color: Some(texture), ..MaterialTextures::default() }
 }
 
-fn difference(
+/// A frame of [`SIZE`] pixels a side against what each pixel is to show.
+pub(crate) fn difference(
     world: &mut World,
     options: &FrameOptions,
     expected: impl Fn(usize, usize) -> Option<DVec3>,

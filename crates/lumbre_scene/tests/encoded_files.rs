@@ -3,13 +3,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
+#[path = "support/allocation.rs"]
+mod allocation;
 #[path = "support/encoded.rs"]
 mod encoded;
 mod support;
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
@@ -18,36 +18,8 @@ use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::File;
 
-/// Counts the bytes in use and the most there were.
-struct Counting;
-
-static USED: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
 /// Held by whoever measures, so that another test's memory is not counted with it.
 static MEASURING: Mutex<()> = Mutex::new(());
-
-#[allow(
-    unsafe_code,
-    reason = "a global allocator is unsafe by its trait; every call goes to the system's with the same arguments"
-)]
-// SAFETY: the system's allocator keeps the contract, and nothing but counting is added.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let used = USED.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        PEAK.fetch_max(used, Ordering::Relaxed);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        USED.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn numbers(value: &Value) -> Vec<f32> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap() as f32).collect()
@@ -302,8 +274,7 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
                 None if name == "instances" => bytes,
                 None => encoded_picture(name, &bytes).glb(),
             };
-            let before = USED.load(Ordering::Relaxed);
-            PEAK.store(before, Ordering::Relaxed);
+            let before = allocation::begin();
             let start = Instant::now();
             match load_slice_within(&mut World::new(), &file, "mutant", None, limits) {
                 Ok(_) => loaded += 1,
@@ -314,7 +285,7 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
                 }
             }
             slowest = slowest.max(start.elapsed());
-            let peak = PEAK.load(Ordering::Relaxed).saturating_sub(before);
+            let peak = allocation::most_since(before);
             largest = largest.max(peak);
             assert!(peak < BOUND, "{name}, seed {seed}: {peak} bytes at once");
             assert!(slowest < SLOWEST, "{name}, seed {seed}: {slowest:?}");

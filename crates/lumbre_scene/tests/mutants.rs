@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
+#[path = "support/allocation.rs"]
+mod allocation;
 mod support;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
@@ -15,39 +15,6 @@ use lumbre_scene::{
 };
 use serde_json::json;
 use support::{File, png};
-
-/// Counts the bytes in use and the most there were.
-struct Counting;
-
-static USED: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-fn grow(bytes: usize) {
-    let used = USED.fetch_add(bytes, Ordering::Relaxed) + bytes;
-    PEAK.fetch_max(used, Ordering::Relaxed);
-}
-
-#[allow(
-    unsafe_code,
-    reason = "a global allocator is unsafe by its trait; every call goes to the system's with the same arguments"
-)]
-// SAFETY: the system's allocator keeps the contract, and nothing but counting is added.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        grow(layout.size());
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        USED.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// What one load may hold at once. The default limit on decoded data for these files is 64 MiB and 64 times their 3 kB, images of
 /// at most 300 bytes may unpack to 33,000 bytes per byte in 4 bytes a texel, twice while they are converted: 20 MB; the rest is the JSON.
@@ -236,8 +203,7 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
         load_slice(&mut World::new(), &original, "original", None).unwrap_or_else(|error| panic!("{error}"));
         for seed in 0..per_file {
             let mutant = mutant(&original, &mut Random(seed << 8 | number as u64));
-            let before = USED.load(Ordering::Relaxed);
-            PEAK.store(before, Ordering::Relaxed);
+            let before = allocation::begin();
             let start = Instant::now();
             match load_slice(&mut World::new(), &mutant, "mutant", None) {
                 Ok(_) => loaded += 1,
@@ -247,7 +213,7 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
                 }
             }
             slowest = slowest.max(start.elapsed());
-            let peak = PEAK.load(Ordering::Relaxed).saturating_sub(before);
+            let peak = allocation::most_since(before);
             largest = largest.max(peak);
             assert!(peak < BOUND, "file {number}, seed {seed}: {peak} bytes at once");
             assert!(start.elapsed() < SLOWEST, "file {number}, seed {seed}: {:?}", start.elapsed());

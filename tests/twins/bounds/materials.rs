@@ -91,14 +91,7 @@ pub fn smith_attenuation(n_light: Off, n_viewer: Off, alpha_squared: Off) -> f64
 pub fn gltf_reflection(directions: [DVec3; 3], shininess: f64, specular: DVec3) -> Allowed {
     let [normal, light, viewer] = directions;
     let sum = light + viewer;
-    let half = optics::safe_normalize(sum);
-    let of_half = vectors::normalized_sum(sum);
-    let of_cross = (2.0 * U * vectors::cross_size(normal, half) + vectors::cross_size(normal, of_half))
-        .length()
-        + FLUSHED;
-    let sine = normal.cross(half).length();
-    let of_square = of_cross * (2.0 * sine + of_cross) + 3.0 * U * sine * sine + FLUSHED;
-    let sine_squared = Off { value: sine * sine, error: of_square };
+    let sine_squared = microfacets::sine_squared_to_half(normal, sum);
     let alpha = 2.0 / (shininess.max(0.0) + 2.0);
     let alpha_squared = Off { value: alpha, error: 6.0 * U * alpha };
     let cosine = |other: DVec3| Off { value: normal.dot(other), error: vectors::dot(normal, other) };

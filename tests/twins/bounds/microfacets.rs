@@ -119,18 +119,24 @@ fn density(distribution: Distribution, cosine: Off, sine_squared: Off, shininess
     Off { value, error }
 }
 
-/// D G / (n·v) without its gates.
-fn geometry(distribution: Distribution, [normal, light, viewer]: [DVec3; 3], shininess: f64) -> Off {
-    let sum = light + viewer;
+/// |n x h|² with h the direction of a sum.
+pub fn sine_squared_to_half(normal: DVec3, sum: DVec3) -> Off {
     let half = optics::safe_normalize(sum);
     let of_half = vectors::normalized_sum(sum);
     let of_cross = (2.0 * U * vectors::cross_size(normal, half) + vectors::cross_size(normal, of_half))
         .length()
         + FLUSHED;
     let sine = normal.cross(half).length();
-    let of_square = of_cross * (2.0 * sine + of_cross) + 3.0 * U * sine * sine + FLUSHED;
+    Off { value: sine * sine, error: of_cross * (2.0 * sine + of_cross) + 3.0 * U * sine * sine + FLUSHED }
+}
+
+/// D G / (n·v) without its gates.
+fn geometry(distribution: Distribution, [normal, light, viewer]: [DVec3; 3], shininess: f64) -> Off {
+    let sum = light + viewer;
+    let half = optics::safe_normalize(sum);
+    let of_half = vectors::normalized_sum(sum);
     let n_half = Off { value: normal.dot(half), error: vectors::dot_of(normal, DVec3::ZERO, half, of_half) };
-    let sine_squared = Off { value: sine * sine, error: of_square };
+    let sine_squared = sine_squared_to_half(normal, sum);
     let density = density(distribution, n_half, sine_squared, shininess);
     let (n_light, n_viewer) = (normal.dot(light), normal.dot(viewer));
     let v_half = 0.5 * sum.length_squared().max(1e-30).sqrt();
