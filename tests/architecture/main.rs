@@ -14,7 +14,12 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("lumbre_rays", &[], &["wgpu", "bevy_ecs", "gltf", "winit"]),
     ("lumbre_scene", &["lumbre_optics", "lumbre_mesh"], &["wgpu", "winit"]),
     ("lumbre_graph", &[], &["bevy_ecs", "gltf", "winit", "glam"]),
-    ("lumbre_render", &["lumbre_optics", "lumbre_mesh", "lumbre_scene", "lumbre_graph"], &["winit"]),
+    ("lumbre_shaders", &[], &["wgpu", "bevy_ecs", "gltf", "winit", "glam"]),
+    (
+        "lumbre_render",
+        &["lumbre_optics", "lumbre_mesh", "lumbre_scene", "lumbre_graph", "lumbre_shaders"],
+        &["winit"],
+    ),
     ("lumbre_bake", &["lumbre_optics", "lumbre_mesh", "lumbre_rays", "lumbre_scene"], &["wgpu", "winit"]),
     ("lumbre_trace", &["lumbre_optics", "lumbre_mesh", "lumbre_rays", "lumbre_scene"], &["wgpu", "winit"]),
     (

@@ -341,6 +341,9 @@ pub struct Frame {
     /// Leaves the lightmaps out.
     #[arg(long)]
     pub no_lightmaps: bool,
+    /// Leaves out the shadows of lights that ask for them.
+    #[arg(long)]
+    pub no_shadows: bool,
     /// Four samples per pixel.
     #[arg(long)]
     pub msaa: bool,

@@ -120,6 +120,7 @@ pub fn frame_options(
         flat_rule: frame.flat_rule,
         specular_antialiasing: frame.specular_antialiasing,
         lightmaps: !frame.no_lightmaps,
+        shadows: !frame.no_shadows,
         multisample: frame.msaa,
         display,
         exposure: match frame.exposure {

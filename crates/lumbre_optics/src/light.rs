@@ -93,6 +93,12 @@ impl Light {
         Self { spot: Some(cone), ..Self::point(color) }
     }
 
+    /// The same, fading to nothing at this distance in metres, as KHR_lights_punctual's `range` does.
+    #[must_use]
+    pub fn with_range(self, range: f32) -> Self {
+        Self { attenuation: Attenuation { range, ..self.attenuation }, ..self }
+    }
+
     /// An ambient light.
     pub fn ambient(color: Vec3) -> Self {
         Self {

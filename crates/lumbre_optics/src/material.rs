@@ -148,6 +148,13 @@ impl Material {
         Self { front: Surface { ambient: color, diffuse: color, ..Surface::default() }, ..Self::default() }
     }
 
+    /// A black material that emits this radiance.
+    pub fn emissive(radiance: Vec3) -> Self {
+        let mut black = Self::matt(Vec3::ZERO);
+        black.front.emission = radiance;
+        black
+    }
+
     /// The coefficients of the side that is seen: the front's on both, if the back does not differ.
     pub fn surface(&self, front_facing: bool) -> &Surface {
         match &self.back {

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use lumbre_scene::SceneSettings;
 
-use crate::extract::{CameraView, FrameFeatures, LitPass, Object, Objects, Traits};
+use crate::extract::{CameraView, LitPass, Object, Objects, Traits};
+use crate::features::{self, FrameFeatures};
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::MeshKey;
@@ -35,6 +36,8 @@ pub(crate) struct Draws {
     pub instances: Vec<InstanceData>,
     /// Objects outside the view.
     pub outside: usize,
+    /// From the nearest to the farthest point of what is in view, along the line of sight, in metres.
+    pub depths: Option<[f64; 2]>,
     /// From the nearest to the farthest point of what is lit by clusters, along the line of sight, in metres.
     pub clustered_depths: Option<[f64; 2]>,
 }
@@ -76,7 +79,7 @@ impl Draws {
             let pass = traits.pass(frame.lightmaps);
             let variant = match known {
                 Some((of, variant)) if of == *traits => variant,
-                _ => traits.variant(settings, frame),
+                _ => features::variant(traits, settings, frame),
             };
             known = Some((*traits, variant));
             let pipeline = PipelineKey {
@@ -88,11 +91,14 @@ impl Draws {
                 blend: pass == LitPass::Transparent,
                 texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
             };
+            let depth = (view.eye - object.center).dot(view.basis.z_axis);
+            let widened = |depths: Option<[f64; 2]>| {
+                let [near, far] = depths.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+                Some([near.min(depth - object.radius), far.max(depth + object.radius)])
+            };
+            draws.depths = widened(draws.depths);
             if pipeline.variant.has(Feature::Clusters) {
-                let depth = (view.eye - object.center).dot(view.basis.z_axis);
-                let [near, far] = draws.clustered_depths.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
-                draws.clustered_depths =
-                    Some([near.min(depth - object.radius), far.max(depth + object.radius)]);
+                draws.clustered_depths = widened(draws.clustered_depths);
             }
             visible.push(Visible { pass, slot, order: order(object, view.eye, pass), object, pipeline });
         }

@@ -63,6 +63,7 @@ const EFFECTS: &[Removable] = &[
         effect: "spot lights",
         without: |world, _| switch_off(world, |kind, cone| kind != LightKind::Ambient && cone),
     },
+    Removable { effect: "shadows", without: |_, options| options.shadows = false },
     Removable { effect: "polygon lights", without: |world, _| remove::<EmissiveLight>(world) },
     Removable {
         effect: "specular",

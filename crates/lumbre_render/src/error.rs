@@ -1,5 +1,8 @@
 //! What can go wrong between a World and a frame.
 
+/// Any error of an effect, which [`RenderError::Effect`] carries with the effect's name.
+pub type EffectError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Why there is no frame.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
@@ -23,6 +26,18 @@ pub enum RenderError {
     /// The device could not be opened.
     #[error("the graphics device could not be opened: {0}")]
     Device(#[from] wgpu::RequestDeviceError),
+    /// A device that was handed in allows less than a frame binds.
+    #[error(
+        "the device's {limit} is {found}, and a frame needs {least}: ask for `wgpu::Limits::default()` or the adapter's own limits"
+    )]
+    DeviceTooSmall {
+        /// The field of `wgpu::Limits`.
+        limit: &'static str,
+        /// What a frame needs.
+        least: u64,
+        /// What the device allows.
+        found: u64,
+    },
     /// The device is gone (driver reset, unplugged): a new `Gpu` and `Renderer` are needed.
     #[error("the graphics device is lost; create a new Gpu and Renderer")]
     DeviceLost,
@@ -119,12 +134,28 @@ pub enum RenderError {
         /// The compiler's words.
         message: String,
     },
+    /// An effect could not be prepared.
+    #[error("effect `{effect}`: {source}")]
+    Effect {
+        /// Its name.
+        effect: &'static str,
+        /// What it met.
+        source: EffectError,
+    },
     /// The render graph refuses.
     #[error(transparent)]
     Graph(#[from] Box<lumbre_graph::GraphError>),
     /// The render graph fails while it runs.
     #[error(transparent)]
     Run(#[from] lumbre_graph::RunError),
+    /// A picture could not be written.
+    #[error("cannot write the picture {}: {source}", path.display())]
+    Picture {
+        /// The file.
+        path: std::path::PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
     /// Reading back failed.
     #[error("reading the frame back failed: {0}")]
     ReadBack(String),

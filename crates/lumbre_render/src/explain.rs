@@ -11,9 +11,13 @@ use lumbre_scene::{
 };
 
 use crate::effect_costs::FrameCost;
-use crate::extract::{FrameFeatures, LightSet, Traits};
-use crate::frame_graph::{FramePlan, declare};
-use crate::shader::Feature;
+use crate::effects::{self, Effect, Stage};
+use crate::extract::{LightSet, Traits};
+use crate::facts::SceneFacts;
+use crate::features::{self, FrameFeatures};
+use crate::frame_graph::declare;
+use crate::frame_plan::{Ending, FramePlan};
+use crate::shader::{DisplayVariant, Feature};
 use crate::{Display, FrameOptions, RenderError};
 
 /// A scene's frame, explained.
@@ -43,21 +47,26 @@ pub fn explain(
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
+    explain_with(world, &mut effects::own(), options, width, height)
+}
+
+/// As [`explain`], for a frame with these effects.
+pub(crate) fn explain_with(
+    world: &mut World,
+    effects: &mut [Box<dyn Effect>],
+    options: &FrameOptions,
+    width: u32,
+    height: u32,
+) -> Result<SceneExplanation, RenderError> {
+    let target_format = wgpu::TextureFormat::Rgba8Unorm;
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let mut lights = LightSet::of(world)?;
     if !options.lightmaps {
         lights = lights.without_lightmaps();
     }
-    let features = FrameFeatures {
-        shading: options.shading,
-        reflection: options.reflection,
-        specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
-        lightmaps: options.lightmaps,
-        clamp: options.display == Display::Clamp,
-        half: !options.full_precision,
-        lights,
-        clustered: lights.are_clustered(options.light_lists),
-    };
+    if !options.shadows {
+        lights = lights.without_shadows();
+    }
     let mut query = world.query_filtered::<(
         &Mesh,
         &Material,
@@ -71,17 +80,34 @@ pub fn explain(
             Traits::new(material, maps, &mesh.0, lightmap, (shading.copied(), reflection.copied()))
         })
         .collect();
+    let facts = SceneFacts::new(&traits, &lights, &settings, options);
+    let mut radiance = false;
+    for effect in effects.iter_mut() {
+        let called_for = effect.extract(world, &facts, options);
+        radiance |= called_for && effect.stage() == Stage::Radiance;
+    }
+    let plan = FramePlan::new(&facts, options, target_format, radiance);
+    let common = FrameFeatures {
+        shading: options.shading,
+        reflection: options.reflection,
+        specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
+        lightmaps: options.lightmaps,
+        clamp: options.display == Display::Clamp,
+        half: plan.ending == Ending::DisplayPass && !options.full_precision,
+        lights,
+        clustered: lights.are_clustered(options.light_lists),
+        display: (plan.ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target_format)),
+    };
     let mut variants = BTreeMap::new();
     let mut clustered = 0;
     for object in &traits {
-        let variant = object.variant(&settings, &features);
+        let variant = features::variant(object, &settings, &common);
         clustered += usize::from(variant.has(Feature::Clusters));
         *variants.entry(variant.to_string()).or_insert(0) += 1;
     }
     let light_lists = lights.listing(options.light_lists, clustered, traits.len());
-    let plan = FramePlan::new(&traits, options);
-    let target = TextureDescriptor::new_2d(width, height, wgpu::TextureFormat::Rgba8Unorm);
-    let frame = declare(&plan, target, None, None).compile()?.explain();
+    let target = TextureDescriptor::new_2d(width, height, target_format);
+    let frame = declare(effects, &plan, target, None).compile()?.explain();
     let hidden_cones = match options.shading {
         // Whatever the objects ask for.
         Some(Shading::Phong) => Vec::new(),

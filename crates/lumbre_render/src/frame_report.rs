@@ -64,6 +64,8 @@ pub struct CpuStages {
     pub draws_ms: f64,
     /// The lists of clusters.
     pub clusters_ms: f64,
+    /// Views of shadow maps, and which of them changed.
+    pub shadows_ms: f64,
     /// Buffers and pipelines.
     pub upload_ms: f64,
     /// The graph, its passes' commands, and their submission.
@@ -79,8 +81,8 @@ pub struct FrameReport {
     pub statistics: Statistics,
     /// Which passes ran, which did not, and why.
     pub plan: Arc<Plan>,
-    /// Lights and fog made in code whose numbers no file may have, each with a sentence that names it: the frame is drawn without them,
-    /// and a warning is logged when one appears.
+    /// Lights, fog and objects made in code with what no file may have (a number that is none, an index past the end, no Transform, no Material), each with a
+    /// sentence that names it: the frame is drawn without them, and a warning is logged when one appears.
     pub left_out: Vec<String>,
     /// The newest measurements that arrived, often of an earlier frame; `Renderer::wait` has this frame's.
     pub measured: Option<lumbre_graph::FrameReport>,

@@ -3,10 +3,12 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
+use bevy_ecs::resource::Resource;
+
 use crate::RenderError;
 
 /// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
-#[derive(Clone, Debug)]
+#[derive(Resource, Clone, Debug)]
 pub struct Gpu {
     /// The instance.
     pub instance: wgpu::Instance,
@@ -20,15 +22,82 @@ pub struct Gpu {
     fault: Arc<Mutex<Option<String>>>,
 }
 
-/// Features that are used where they exist: queries to measure with, and what full-precision frames need.
-const WANTED: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
-    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
-    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
-    .union(wgpu::Features::PIPELINE_STATISTICS_QUERY)
-    .union(wgpu::Features::FLOAT32_BLENDABLE)
-    .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
+/// What a frame binds at most, and the least that a device has to allow of it.
+const LEAST_LIMITS: [(&str, fn(&wgpu::Limits) -> u64, u64); 4] = [
+    ("max_bind_groups", |limits| u64::from(limits.max_bind_groups), 4),
+    (
+        "max_storage_buffers_per_shader_stage",
+        |limits| u64::from(limits.max_storage_buffers_per_shader_stage),
+        8,
+    ),
+    (
+        "max_sampled_textures_per_shader_stage",
+        |limits| u64::from(limits.max_sampled_textures_per_shader_stage),
+        7,
+    ),
+    ("max_uniform_buffer_binding_size", |limits| limits.max_uniform_buffer_binding_size, 1 << 16),
+];
 
 impl Gpu {
+    /// Features that are used where a device has them, none of which is required: queries to measure with, and blending and multisampling of 32-bit
+    /// floats for frames of full precision.
+    pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
+        .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
+        .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
+        .union(wgpu::Features::PIPELINE_STATISTICS_QUERY)
+        .union(wgpu::Features::FLOAT32_BLENDABLE)
+        .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
+
+    /// A device that a program has made for itself. `wgpu::Limits::default()` is enough, without any feature; storage buffers as large as the adapter
+    /// allows let more objects and lights in.
+    ///
+    /// Its callbacks for a lost device and for uncaptured errors are set, so that [`check`](Self::check) and the renderer know of both. A program that sets
+    /// callbacks of its own afterwards passes on what they are told to [`note_lost`](Self::note_lost) and [`note_error`](Self::note_error).
+    ///
+    /// # Errors
+    /// [`RenderError::DeviceTooSmall`].
+    pub fn from_parts(
+        instance: wgpu::Instance,
+        adapter: wgpu::Adapter,
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+    ) -> Result<Self, RenderError> {
+        let limits = device.limits();
+        for (limit, found, least) in LEAST_LIMITS {
+            let found = found(&limits);
+            if found < least {
+                return Err(RenderError::DeviceTooSmall { limit, least, found });
+            }
+        }
+        let gpu = Self { instance, adapter, device, queue, lost: Arc::default(), fault: Arc::default() };
+        let noted = gpu.notes();
+        gpu.device.set_device_lost_callback(move |reason, message| {
+            tracing::warn!("the GPU device is lost ({reason:?}): {message}");
+            noted.lost.store(true, Ordering::Relaxed);
+        });
+        let noted = gpu.notes();
+        gpu.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            tracing::error!("GPU error: {error}");
+            noted.error(&error);
+        }));
+        Ok(gpu)
+    }
+
+    /// What callbacks may hold: the device itself would keep itself alive.
+    fn notes(&self) -> Notes {
+        Notes { lost: Arc::clone(&self.lost), fault: Arc::clone(&self.fault) }
+    }
+
+    /// Notes that the device is gone, for a program that is told so itself.
+    pub fn note_lost(&self) {
+        self.lost.store(true, Ordering::Relaxed);
+    }
+
+    /// Notes an error of the device, for a program that is told of it itself: the next [`check`](Self::check) answers with the first.
+    pub fn note_error(&self, error: &wgpu::Error) {
+        self.notes().error(error);
+    }
+
     /// A device without a window. The environment variables of wgpu (`WGPU_BACKEND`, `WGPU_ADAPTER_NAME`) choose among several.
     ///
     /// # Errors
@@ -65,27 +134,13 @@ impl Gpu {
         let adapter = find_adapter(&instance, surface)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lumbre"),
-            required_features: adapter.features() & WANTED,
+            required_features: adapter.features() & Self::OPTIONAL_FEATURES,
             // The adapter's own limits: no light or object count is refused that the machine could take.
             required_limits: adapter.limits(),
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;
-        let lost = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&lost);
-        device.set_device_lost_callback(move |reason, message| {
-            tracing::warn!("the GPU device is lost ({reason:?}): {message}");
-            flag.store(true, Ordering::Relaxed);
-        });
-        let fault = Arc::new(Mutex::new(None));
-        let first = Arc::clone(&fault);
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            tracing::error!("GPU error: {error}");
-            if let Ok(mut first) = first.lock() {
-                first.get_or_insert_with(|| error.to_string());
-            }
-        }));
-        Ok(Self { instance, adapter, device, queue, lost, fault })
+        Self::from_parts(instance, adapter, device, queue)
     }
 
     /// Whether the device is gone: make another `Gpu` and another renderer.
@@ -112,6 +167,20 @@ impl Gpu {
     pub fn describe(&self) -> String {
         let info = self.adapter.get_info();
         format!("{} ({:?}, {} {})", info.name, info.backend, info.driver, info.driver_info)
+    }
+}
+
+/// What was noted of a device.
+struct Notes {
+    lost: Arc<AtomicBool>,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Notes {
+    fn error(&self, error: &wgpu::Error) {
+        if let Ok(mut first) = self.fault.lock() {
+            first.get_or_insert_with(|| error.to_string());
+        }
     }
 }
 

@@ -213,7 +213,7 @@ pub(crate) struct LightData {
     ambient: Vec3,
     kind: u32,
     diffuse: Vec3,
-    attenuation_clamp: u32,
+    flags: u32,
     specular: Vec3,
     range: f32,
     position: Vec3,
@@ -225,8 +225,8 @@ pub(crate) struct LightData {
 }
 
 impl LightData {
-    /// A light in frame space.
-    pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
+    /// A light in frame space, with the flags of its shadow.
+    pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3, shadow: u32) -> Self {
         let cone = light.spot.filter(|cone| !cone.is_everywhere());
         let cosines = cone.map(|cone| cone.cosines());
         Self {
@@ -237,7 +237,7 @@ impl LightData {
                 LightKind::Point => 2,
             },
             diffuse: light.diffuse,
-            attenuation_clamp: u32::from(light.attenuation.clamp),
+            flags: u32::from(light.attenuation.clamp) | shadow,
             specular: light.specular,
             range: light.attenuation.shader_range(),
             position: (transform.translation() - origin).as_vec3(),

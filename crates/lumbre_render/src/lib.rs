@@ -1,12 +1,16 @@
 //! The passes that light a bevy_ecs World, their GPU buffers, and headless frames. No window library and no files are known here.
 //!
 //! ```text
-//!   World ──► extract ─────────► draws ──────────────► frame_graph ───────────────► target
-//!             changed components  cull, sort, batch     background ► lightmap ►        Offscreen or
+//!   World ──► extract ─────────► draws ──────────────► effects ───────────────────► target
+//!             changed components  cull, sort, batch     shadows ► lightmap ►           Offscreen or
 //!             to GPU buffers      variants, light lists    forward ► transparent ►        WindowSurface
-//!                 │                    │                display ► overlay
-//!                 └──── traits ────────┴──► explain: what the scene calls for, and what not
+//!                 │                    │                   yours ► display ► yours
+//!                 └──── facts ─────────┴──► explain: what the scene calls for, and what not
 //! ```
+//!
+//! The versions of bevy_ecs, glam and wgpu that a program has to share are re-exported. A program that has a device hands it in by [`Gpu::from_parts`]; one
+//! that has a schedule adds [`render_frame`] to it; passes of its own are an [`Effect`](effects::Effect), which [`Renderer::builder`] takes:
+//! integrations/own_program does all three.
 //!
 //! A World, a renderer, a target:
 //!
@@ -31,14 +35,18 @@
 //! ```
 
 mod cluster_buffers;
-mod display;
 mod draws;
 mod effect_costs;
+pub mod effects;
 mod error;
 mod explain;
 mod extract;
+mod facts;
+mod features;
 mod frame_graph;
+mod frame_plan;
 mod frame_report;
+mod frame_scene;
 mod gpu;
 mod growable_buffer;
 mod layout;
@@ -53,20 +61,29 @@ mod offscreen;
 mod options;
 mod pipelines;
 mod renderer;
+mod schedule;
 mod shader;
+mod shadow_light;
+mod shadows;
 mod target;
 mod texture_sets;
 mod textures;
 mod window_surface;
 
+pub use {bevy_ecs, glam, wgpu};
+
 pub use effect_costs::{EffectCost, FrameCost, Removable, effect_costs, removable_effects};
-pub use error::RenderError;
+pub use error::{EffectError, RenderError};
 pub use explain::{SceneExplanation, explain};
+pub use facts::SceneFacts;
+pub use frame_plan::FrameShape;
 pub use frame_report::{CpuStages, FrameReport, LightListing, Statistics};
+pub use frame_scene::{DrawnObject, FrameScene, FrameView};
 pub use gpu::Gpu;
 pub use metering::{LightMeter, Metering, meter};
-pub use offscreen::{Offscreen, OffscreenFormat};
+pub use offscreen::{Offscreen, OffscreenFormat, read_texture};
 pub use options::{Display, FrameOptions, LightLists, Measure};
-pub use renderer::Renderer;
-pub use target::FrameTarget;
+pub use renderer::{Renderer, RendererBuilder};
+pub use schedule::{CurrentTarget, LastFrame, RenderSet, render_frame};
+pub use target::{DEPTH_FORMAT, FrameTarget};
 pub use window_surface::{Acquired, SurfaceFrame, WindowSurface};

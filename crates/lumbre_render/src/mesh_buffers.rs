@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3, Vec4};
-use lumbre_mesh::{TextureCoordinateSet, TriangleMesh};
+use lumbre_mesh::{MeshError, TextureCoordinateSet, TriangleMesh};
 use lumbre_optics::FlatRule;
 use wgpu::util::DeviceExt;
 
@@ -59,6 +59,8 @@ pub(crate) struct GpuMesh {
     pub center: DVec3,
     /// Half its sides.
     pub half_size: DVec3,
+    /// A triangle with a vertex that is not there; attributes that are not there read as their neutral values instead.
+    pub fault: Option<MeshError>,
 }
 
 /// A draw's worth of buffers.
@@ -80,7 +82,10 @@ impl GpuMesh {
         } else {
             (DVec3::ZERO, DVec3::ZERO)
         };
+        let fault = source.validate().err();
+        let fault = fault.filter(|fault| matches!(fault, MeshError::IndexOutOfRange { .. }));
         Self {
+            fault,
             shared: Arc::clone(&source),
             source,
             tangents,
@@ -135,6 +140,11 @@ impl GpuMesh {
         if !again.is_empty() {
             self.prepare(gpu, &again, None);
         }
+    }
+
+    /// Whether `prepare` made indexed positions.
+    pub fn has_positions(&self) -> bool {
+        self.indexed.attributes[Attribute::Position as usize].is_some()
     }
 
     /// The buffers that `prepare` made, in order.

@@ -5,7 +5,7 @@ use glam::Vec3;
 use lumbre_optics::normal_map_spread;
 use lumbre_scene::Image;
 
-use crate::mip_level::MipLevel;
+use crate::mip_level::{MipLevel, box_filter_2d};
 
 /// The levels of a normal map. The first has its texels as they are, and no spread.
 pub(crate) fn normal_levels(image: &Image) -> Vec<MipLevel> {
@@ -50,12 +50,12 @@ struct Means {
 }
 
 impl Means {
-    /// The means of two by two vectors of a level.
+    /// The means of the vectors of a level that meet in each texel of the next.
     fn halved(width: u32, height: u32, vector: impl Fn(u32, u32) -> Vec3) -> Self {
         let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
         let mean = |x: u32, y: u32| {
-            let corner = |dx: u32, dy: u32| vector((2 * x + dx).min(width - 1), (2 * y + dy).min(height - 1));
-            0.25 * (corner(0, 0) + corner(1, 0) + corner(0, 1) + corner(1, 1))
+            let parts = box_filter_2d([width, height], [x, y]);
+            parts.map(|([column, row], part)| part * vector(column, row)).sum::<Vec3>()
         };
         let vectors = (0..half_height).flat_map(|y| (0..half_width).map(move |x| (x, y)));
         let vectors = vectors.map(|(x, y)| mean(x, y)).collect();

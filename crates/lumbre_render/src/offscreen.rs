@@ -79,6 +79,18 @@ impl Offscreen {
         })
     }
 
+    /// Writes the frame as a PNG file of eight bits; linear floats are clamped and rounded.
+    ///
+    /// # Errors
+    /// [`RenderError::ReadBack`], [`RenderError::Picture`].
+    pub fn save_png(&self, gpu: &Gpu, path: impl AsRef<std::path::Path>) -> Result<(), RenderError> {
+        let (path, (width, height)) = (path.as_ref(), self.size());
+        let bytes = self.read_rgba8(gpu)?;
+        let color = image::ExtendedColorType::Rgba8;
+        image::save_buffer_with_format(path, &bytes, width, height, color, image::ImageFormat::Png)
+            .map_err(|source| RenderError::Picture { path: path.to_owned(), source })
+    }
+
     /// The frame as linear RGBA, top row first.
     ///
     /// # Errors
@@ -97,8 +109,11 @@ fn floats(bytes: &[u8]) -> impl Iterator<Item = f32> + '_ {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
 }
 
-/// All texels of a 2D texture of one layer, rows without padding.
-fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, RenderError> {
+/// All texels of a 2D texture of one layer with COPY_SRC usage, rows without padding.
+///
+/// # Errors
+/// [`RenderError::ReadBack`], [`RenderError::DeviceLost`].
+pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, RenderError> {
     let (width, height) = (texture.width(), texture.height());
     let texel = texture.format().block_copy_size(None).unwrap_or(4);
     let row = width * texel;

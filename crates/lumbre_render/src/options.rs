@@ -1,6 +1,7 @@
 //! What a caller chooses for one frame. What the scene calls for is not chosen here: the census decides it.
 
 use bevy_ecs::entity::Entity;
+use bevy_ecs::resource::Resource;
 use lumbre_optics::{FlatRule, ReflectionModel, Shading};
 
 /// How linear radiance becomes the numbers of the target.
@@ -61,7 +62,7 @@ pub enum LightLists {
 }
 
 /// Choices for one frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Resource, Clone, Debug, PartialEq)]
 pub struct FrameOptions {
     /// The camera; else the one with `ActiveCamera`, else the first.
     pub camera: Option<Entity>,
@@ -77,6 +78,8 @@ pub struct FrameOptions {
     pub light_lists: LightLists,
     /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
     pub lightmaps: bool,
+    /// Draws the shadows of lights that ask for them.
+    pub shadows: bool,
     /// Four samples per pixel instead of one.
     pub multisample: bool,
     /// From radiance to the target's numbers.
@@ -101,6 +104,7 @@ impl Default for FrameOptions {
             specular_antialiasing: None,
             light_lists: LightLists::Auto,
             lightmaps: true,
+            shadows: true,
             multisample: false,
             display: Display::Srgb,
             exposure: None,

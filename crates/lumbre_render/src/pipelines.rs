@@ -6,12 +6,11 @@ use std::collections::hash_map::Entry;
 use lumbre_optics::Shading;
 
 use crate::mesh_buffers::Attribute;
+use crate::target::DEPTH_FORMAT;
 use crate::shader::{self, Feature, Variant};
+use crate::shadows;
 use crate::texture_sets::TextureSets;
 use crate::{Gpu, RenderError};
-
-/// Format of the depth buffer: reversed-Z wants floats.
-pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Everything that a pipeline is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -41,6 +40,7 @@ pub(crate) struct Pipeline {
 pub(crate) struct Pipelines {
     frame_layout: wgpu::BindGroupLayout,
     clustered_layout: wgpu::BindGroupLayout,
+    shadow_layout: wgpu::BindGroupLayout,
     modules: HashMap<Variant, wgpu::ShaderModule>,
     pipelines: HashMap<PipelineKey, Pipeline>,
 }
@@ -48,12 +48,18 @@ pub(crate) struct Pipelines {
 impl Pipelines {
     pub fn new(gpu: &Gpu) -> Self {
         let [frame_layout, clustered_layout] = [false, true].map(|clustered| frame_layout(gpu, clustered));
-        Self { frame_layout, clustered_layout, modules: HashMap::new(), pipelines: HashMap::new() }
+        let shadow_layout = shadows::receiver_layout(gpu);
+        Self { frame_layout, clustered_layout, shadow_layout, modules: HashMap::new(), pipelines: HashMap::new() }
     }
 
     /// The layout of group 0, of variants that read clusters' lists or of those that do not.
     pub fn frame_layout(&self, clustered: bool) -> &wgpu::BindGroupLayout {
         if clustered { &self.clustered_layout } else { &self.frame_layout }
+    }
+
+    /// The layout of group 3, of variants that read shadow maps.
+    pub fn shadow_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.shadow_layout
     }
 
     /// Number of shader variants compiled so far.
@@ -81,7 +87,10 @@ impl Pipelines {
             true => &self.clustered_layout,
             false => &self.frame_layout,
         };
-        let pipeline = make(gpu, module, frame, [textures.as_ref(), lightmap.as_ref()], key)?;
+        let shadows = key.variant.has(Feature::Shadows).then_some(&self.shadow_layout);
+        let groups = [Some(frame), textures.as_ref(), lightmap.as_ref(), shadows];
+        let used = groups.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+        let pipeline = make(gpu, module, &groups[..used], key)?;
         self.pipelines.insert(key, pipeline);
         Ok(())
     }
@@ -142,8 +151,7 @@ fn frame_layout(gpu: &Gpu, clustered: bool) -> wgpu::BindGroupLayout {
 fn make(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
-    frame: &wgpu::BindGroupLayout,
-    [textures, lightmap]: [Option<&wgpu::BindGroupLayout>; 2],
+    groups: &[Option<&wgpu::BindGroupLayout>],
     key: PipelineKey,
 ) -> Result<Pipeline, RenderError> {
     let attributes = attributes(&key.variant);
@@ -164,11 +172,6 @@ fn make(
             })
         })
         .collect();
-    let groups: &[Option<&wgpu::BindGroupLayout>] = match (textures, lightmap) {
-        (None, None) => &[Some(frame)],
-        (Some(_), None) => &[Some(frame), textures],
-        (_, Some(_)) => &[Some(frame), textures, lightmap],
-    };
     let label = key.variant.to_string();
     let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

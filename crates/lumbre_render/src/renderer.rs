@@ -1,6 +1,7 @@
 //! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
 //! these has its own file.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use bevy_ecs::prelude::*;
@@ -8,16 +9,23 @@ use lumbre_graph::Executor;
 use lumbre_scene::{SceneSettings, propagate_transforms};
 
 use crate::cluster_buffers::ClusterBuffers;
-use crate::display::DisplayPass;
 use crate::draws::Draws;
-use crate::extract::{CameraView, Emitters, FrameFeatures, LightSet, Objects, extract_lights, find_camera};
-use crate::frame_graph::{FramePlan, Overlay, Prepared, run_graph};
+use crate::effects::{self, Effect, Stage};
+use crate::explain::{SceneExplanation, explain_with};
+use crate::extract::{CameraView, Emitters, LightSet, Objects, extract_lights, find_camera};
+use crate::facts::SceneFacts;
+use crate::features::FrameFeatures;
+use crate::frame_graph::{Overlay, run_graph};
+use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
+use crate::frame_scene::FrameScene;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, InstanceData, LightData, radiance};
 use crate::light_clusters::ClusteredView;
 use crate::light_lists::ObjectLightLists;
-use crate::mesh_buffers::MeshBuffers;
+use crate::mesh_buffers::{Attribute, MeshBuffers};
 use crate::pipelines::{Pipelines, attributes, is_flat};
+use crate::shader::{DisplayVariant, Variant};
+use crate::shadows::{ShadowMaps, ShadowedView};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::{
@@ -26,6 +34,7 @@ use crate::{
 };
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
+#[derive(Resource)]
 pub struct Renderer {
     gpu: Gpu,
     executor: Executor,
@@ -35,20 +44,52 @@ pub struct Renderer {
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
     clusters: ClusterBuffers,
+    shadows: ShadowMaps,
     meshes: MeshBuffers,
     textures: Textures,
     sets: TextureSets,
     pipelines: Pipelines,
-    display: DisplayPass,
+    effects: Vec<Box<dyn Effect>>,
     frame_uniform: wgpu::Buffer,
     frame_group: Option<wgpu::BindGroup>,
     clustered_group: Option<wgpu::BindGroup>,
     /// Of the last frame.
     left_out: Vec<String>,
+    /// Of the last frame: variants with the objects that each drew, in the order of the draws.
+    drawn: Vec<(Variant, usize)>,
+}
+
+/// What a renderer is made of beside its own effects.
+#[derive(Default)]
+pub struct RendererBuilder {
+    effects: Vec<Box<dyn Effect>>,
+}
+
+impl RendererBuilder {
+    /// Adds an effect. Among those of one [`Stage`] the order is that of these calls, after the renderer's own.
+    #[must_use]
+    pub fn with(mut self, effect: impl Effect + 'static) -> Self {
+        self.effects.push(Box::new(effect));
+        self
+    }
+
+    /// The renderer on a device.
+    #[must_use]
+    pub fn build(self, gpu: &Gpu) -> Renderer {
+        let mut renderer = Renderer::new(gpu);
+        renderer.effects.extend(self.effects);
+        effects::in_order(&mut renderer.effects);
+        renderer
+    }
 }
 
 impl Renderer {
-    /// A renderer on a device.
+    /// Begins a renderer with effects of a program's own.
+    pub fn builder() -> RendererBuilder {
+        RendererBuilder::default()
+    }
+
+    /// A renderer on a device, without effects but its own.
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             gpu: gpu.clone(),
@@ -59,11 +100,12 @@ impl Renderer {
             instances: GrowableBuffer::new("instances"),
             light_list: GrowableBuffer::new("light list"),
             clusters: ClusterBuffers::new(),
+            shadows: ShadowMaps::new(),
             meshes: MeshBuffers::default(),
             textures: Textures::default(),
             sets: TextureSets::default(),
             pipelines: Pipelines::new(gpu),
-            display: DisplayPass::new(gpu),
+            effects: effects::own(),
             frame_uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("frame"),
                 size: size_of::<FrameData>() as u64,
@@ -73,6 +115,7 @@ impl Renderer {
             frame_group: None,
             clustered_group: None,
             left_out: Vec::new(),
+            drawn: Vec::new(),
         }
     }
 
@@ -113,6 +156,29 @@ impl Renderer {
         Ok(measured)
     }
 
+    /// The shader variants of the last frame, by their features, with the number of objects that each drew.
+    pub fn drawn_variants(&self) -> BTreeMap<String, usize> {
+        let mut variants = BTreeMap::new();
+        for (variant, count) in &self.drawn {
+            *variants.entry(variant.to_string()).or_insert(0) += count;
+        }
+        variants
+    }
+
+    /// Explains the frame that these options would draw of `world` in a target of this size, this renderer's effects among its passes. Draws nothing.
+    ///
+    /// # Errors
+    /// As [`explain`](crate::explain).
+    pub fn explain(
+        &mut self,
+        world: &mut World,
+        options: &FrameOptions,
+        width: u32,
+        height: u32,
+    ) -> Result<SceneExplanation, RenderError> {
+        explain_with(world, &mut self.effects, options, width, height)
+    }
+
     fn draw(
         &mut self,
         world: &mut World,
@@ -143,6 +209,7 @@ impl Renderer {
             &mut self.textures,
             &mut self.sets,
             view.eye,
+            &mut left_out,
         )?;
         cpu.objects_ms = clock.lap();
         let mut lights =
@@ -153,28 +220,42 @@ impl Renderer {
             lights.set = lights.set.without_lightmaps();
             lights.reaches.iter_mut().for_each(|reach| reach.baked = false);
         }
+        if !options.shadows {
+            lights.set = lights.set.without_shadows();
+            lights.shadows.clear();
+        }
         let exposure = options.exposure.unwrap_or(view.exposure);
         if !(exposure > 0.0 && exposure.is_finite()) {
             let (field, value, wanted) = ("exposure", f64::from(exposure), "greater than 0 and finite");
             return Err(RenderError::BadCamera { entity: camera, field, value, wanted });
         }
-        let mut plan = FramePlan::new(self.objects.iter().map(|(_, object)| &object.traits), options);
-        plan.choose_formats(&self.gpu, target, options, exposure);
+        let traits = self.objects.iter().map(|(_, object)| &object.traits);
+        let facts = SceneFacts::new(traits, &lights.set, &settings, options);
+        let mut called_for = Vec::with_capacity(self.effects.len());
+        for effect in &mut self.effects {
+            called_for.push(effect.extract(world, &facts, options));
+        }
+        let called = || self.effects.iter().zip(&called_for).filter(|(_, called)| **called);
+        let radiance = called().any(|(effect, _)| effect.stage() == Stage::Radiance);
+        let draws_objects = called().any(|(effect, _)| effect.draws_objects());
+        let plan = FramePlan::for_device(&facts, options, radiance, (&self.gpu, target, exposure));
         let features = FrameFeatures {
             shading: options.shading,
             reflection: options.reflection,
             specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
             lightmaps: options.lightmaps,
             clamp: options.display == Display::Clamp,
-            half: plan.format == wgpu::TextureFormat::Rgba16Float,
+            half: plan.lit_format == wgpu::TextureFormat::Rgba16Float,
             lights: lights.set,
             clustered: lights.set.are_clustered(options.light_lists),
+            display: (plan.ending == Ending::Folded)
+                .then(|| DisplayVariant::new(options.display, target.format)),
         };
         let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
-        let target_kind = (plan.format, plan.samples);
+        let target_kind = (plan.lit_format, plan.samples);
         let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
         lists.check()?;
         cpu.draws_ms = clock.lap();
@@ -186,20 +267,41 @@ impl Renderer {
         }
         let clustered = draws.clustered_depths.is_some();
         cpu.clusters_ms = clock.lap();
-        let uploaded_bytes = self.upload(&view, &settings, &lights.set, exposure, clustered)?;
+        let shadowed = !lights.shadows.is_empty();
+        if shadowed {
+            let depths = draws.depths.unwrap_or([0.0, 1.0]);
+            self.shadows.plan(&lights.shadows, &self.objects, &ShadowedView { view, height: target.height, depths });
+        }
+        cpu.shadows_ms = clock.lap();
+        let uploaded_bytes = self.upload(&view, &settings, &lights.set, exposure, [clustered, shadowed])?;
         let mut triangles = 0;
+        self.drawn.clear();
         for batch in draws.batches() {
+            match self.drawn.last_mut() {
+                Some((variant, count)) if *variant == batch.pipeline.variant => *count += batch.instances.len(),
+                _ => self.drawn.push((batch.pipeline.variant, batch.instances.len())),
+            }
             self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline)?;
             let variant = &batch.pipeline.variant;
             if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
                 mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant).then_some(flat_rule));
+                if draws_objects {
+                    mesh.prepare(&self.gpu, &[Attribute::Position], None);
+                }
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
-        let display_key = match plan.direct {
-            true => None,
-            false => Some(self.display.prepare(&self.gpu, options.display, target.format, exposure)?),
-        };
+        let mut shape = plan.shape(target, options.display, exposure);
+        if let Some(maps) = self.shadows.device().filter(|_| shadowed) {
+            let stale = !self.shadows.stale.is_empty();
+            shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale });
+        }
+        for (effect, _) in self.effects.iter_mut().zip(&called_for).filter(|(_, called)| **called) {
+            let name = effect.name();
+            effect
+                .prepare(&self.gpu, &shape)
+                .map_err(|source| RenderError::Effect { effect: name, source })?;
+        }
         cpu.upload_ms = clock.lap();
         let clusters = &self.clusters.clusters;
         let light_lists = LightListing {
@@ -231,18 +333,22 @@ impl Renderer {
         });
         self.executor.enable_probe(options.probe);
         self.executor.begun_at(begun);
-        let prepared = Prepared {
-            flat_rule,
-            gpu: &self.gpu,
+        let mut scene = FrameScene {
             draws: &draws,
+            objects: &self.objects,
             pipelines: &self.pipelines,
             meshes: &self.meshes,
+            flat_rule,
             frame_groups: [self.frame_group.as_ref(), self.clustered_group.as_ref()],
-            display: &self.display,
-            display_key,
-            background: plan.in_range(radiance(settings.shown_background())),
+            view,
+            shadows: &self.shadows,
         };
-        let frame = run_graph(&mut self.executor, &prepared, &plan, target, overlay)?;
+        let frame = run_graph(&mut self.executor, &self.gpu, (&self.effects, &plan), target, &mut scene, overlay);
+        if frame.is_err() {
+            // What was to be drawn may not have been.
+            self.shadows.forget();
+        }
+        let frame = frame?;
         self.gpu.check()?;
         statistics.cpu.encoding_ms = clock.lap();
         statistics.cpu.total_ms = milliseconds(begun);
@@ -265,7 +371,7 @@ impl Renderer {
         settings: &SceneSettings,
         lights: &LightSet,
         exposure: f32,
-        clustered: bool,
+        [clustered, shadowed]: [bool; 2],
     ) -> Result<u64, RenderError> {
         let origin = self.objects.origin;
         let fog = settings.fog.as_ref();
@@ -304,6 +410,10 @@ impl Renderer {
             self.clustered_group = None;
         }
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
+        if let Some(transforms) = self.objects.transforms.buffer().filter(|_| shadowed) {
+            let layout = self.pipelines.shadow_layout();
+            bytes += self.shadows.upload(&self.gpu, transforms, &mut self.meshes, layout)?;
+        }
         if self.frame_group.is_none() {
             self.frame_group = Some(self.group(false));
         }

@@ -1,5 +1,8 @@
 //! Where a frame goes: any colour texture, a window's or our own. Not how it is shown.
 
+/// Format of the depth buffer: reversed-Z wants floats. 1 is at the near plane, 0 at infinity.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
 /// A colour texture that a frame ends in.
 #[derive(Clone, Debug)]
 pub struct FrameTarget {

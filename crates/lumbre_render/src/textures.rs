@@ -6,7 +6,7 @@ use std::sync::Arc;
 use half::f16;
 use lumbre_scene::{Image, LightmapImage, Mipmap, Sampler, Wrap};
 
-use crate::mip_level::MipLevel;
+use crate::mip_level::{MipLevel, box_filter_2d};
 use crate::normal_map::normal_levels;
 use crate::{Gpu, RenderError};
 
@@ -195,14 +195,12 @@ fn halved(level: &MipLevel, srgb: bool) -> MipLevel {
     for y in 0..half_height {
         for x in 0..half_width {
             for channel in 0..4 {
-                let mut sum = 0.0;
-                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let column = (2 * x + dx).min(width - 1);
-                    let row = (2 * y + dy).min(height - 1);
+                let mut mean = 0.0;
+                for ([column, row], part) in box_filter_2d([*width, *height], [x, y]) {
                     let texel = 4 * (row as usize * *width as usize + column as usize);
-                    sum += decode(texels[texel + channel], channel);
+                    mean += part * decode(texels[texel + channel], channel);
                 }
-                result.push(encode(sum / 4.0, channel));
+                result.push(encode(mean, channel));
             }
         }
     }

@@ -268,6 +268,12 @@ impl Census {
             let count = self.reflection_models.get(model.name()).copied().unwrap_or_default();
             mesh(effect, count, "with a highlight of that model", "no highlight is of that model")
         };
+        // What no frame does, however much calls for it.
+        let elsewhere = |effect, count, none: &str, (singular, plural): (&str, &str), why: &str| {
+            let counted = line(effect, count, singular, plural, none);
+            let reason = if count > 0 { format!("{}, but {why}", counted.reason) } else { counted.reason };
+            CensusLine { called_for: false, reason, ..counted }
+        };
         let textured = [
             self.emissive_textures,
             self.metallic_roughness_textures,
@@ -355,12 +361,19 @@ impl Census {
                 "no visible back has a material of its own",
             ),
             mesh("unlit", self.unlit, "taking no light", "every material takes light"),
-            mesh("mirrors", self.mirrors, "with a mirror coefficient", "every mirror coefficient is 0"),
-            mesh(
+            elsewhere(
+                "mirrors",
+                self.mirrors,
+                "every mirror coefficient is 0",
+                ("mesh with a mirror coefficient", "meshes with a mirror coefficient"),
+                "frames do not reflect",
+            ),
+            elsewhere(
                 "transmission",
                 self.transmission,
-                "that light passes through",
                 "every transmission coefficient is 0",
+                ("mesh that light passes through", "meshes that light passes through"),
+                "frames do not bend light",
             ),
             scene("fog", self.fog, "the scene has fog", "the scene has no fog"),
             mesh("dynamic objects", self.dynamic_objects, "marked as moving", "nothing moves"),

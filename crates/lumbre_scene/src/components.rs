@@ -14,6 +14,12 @@ use crate::{Image, LightmapImage, TextureReference, Transform};
 #[require(Transform, lumbre_optics::Material)]
 pub struct Mesh(pub Arc<TriangleMesh>);
 
+impl From<TriangleMesh> for Mesh {
+    fn from(mesh: TriangleMesh) -> Self {
+        Self(Arc::new(mesh))
+    }
+}
+
 /// Textures that modulate an entity's `Material`. An entity without this component has none, and no texture code runs for it.
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct MaterialTextures {
@@ -177,6 +183,18 @@ pub enum Projection {
         /// Far plane in metres.
         far: f64,
     },
+}
+
+impl Projection {
+    /// A pinhole with a vertical field of view in radians, in (0, π), and a near plane at 1 cm.
+    pub fn perspective(vertical_fov: f64) -> Self {
+        Self::Perspective { vertical_fov, aspect: None, near: 0.01, far: None }
+    }
+
+    /// Parallel rays onto a frame of twice these half sides in metres, from the camera to `far` metres before it.
+    pub fn orthographic(half_width: f64, half_height: f64, far: f64) -> Self {
+        Self::Orthographic { half_width, half_height, near: 0.0, far }
+    }
 }
 
 /// A camera.

@@ -39,6 +39,11 @@ impl Transform {
         Self { rotation, ..Self::IDENTITY }
     }
 
+    /// A scale, the same along all axes.
+    pub fn from_scale(factor: f64) -> Self {
+        Self { scale: DVec3::splat(factor), ..Self::IDENTITY }
+    }
+
     /// The same with another rotation.
     pub fn with_rotation(self, rotation: DQuat) -> Self {
         Self { rotation, ..self }
@@ -142,36 +147,42 @@ impl Default for GlobalTransform {
 
 /// Runs [`propagate_transforms`] once, for code without a schedule.
 pub fn update_transforms(world: &mut World) {
-    let mut state = bevy_ecs::system::SystemState::<(
-        Query<(Entity, &Transform, &mut GlobalTransform), Without<ChildOf>>,
-        Query<(&Transform, &mut GlobalTransform), With<ChildOf>>,
-        Query<&Children>,
-    )>::new(world);
+    let mut state =
+        bevy_ecs::system::SystemState::<(Query<Root<'static>, RootFilter>, Query<Node<'static>, With<ChildOf>>, Query<&Children>)>::new(world);
     // Queries are there in every World; only resources may be missing.
     if let Ok((roots, nodes, children)) = state.get_mut(world) {
         propagate_transforms(roots, nodes, children);
     }
 }
 
-/// Writes every [`GlobalTransform`] from the [`Transform`]s above it. Entities whose value does not change are not marked as
-/// changed, so that only what moved is uploaded.
+/// A place in the world, and what it comes to.
+type Node<'w> = (&'w Transform, &'w mut GlobalTransform);
+/// An entity at the top of a hierarchy, with a place or without.
+type Root<'w> = (Entity, Option<Node<'w>>);
+type RootFilter = (Without<ChildOf>, Or<(With<Transform>, With<Children>)>);
+
+/// Writes every [`GlobalTransform`] from the [`Transform`]s above it. An entity without a `Transform` stands where its parent does, and so its children are
+/// placed as if they were its parent's. Entities whose value does not change are not marked as changed, so that only what moved is uploaded.
 pub fn propagate_transforms(
-    mut roots: Query<(Entity, &Transform, &mut GlobalTransform), Without<ChildOf>>,
-    mut nodes: Query<(&Transform, &mut GlobalTransform), With<ChildOf>>,
+    mut roots: Query<Root<'_>, RootFilter>,
+    mut nodes: Query<Node<'_>, With<ChildOf>>,
     children: Query<&Children>,
 ) {
-    let mut stack = Vec::new();
-    for (entity, transform, mut global) in &mut roots {
+    // Below nothing that has a place, a place is one in the world.
+    let place = |node: Option<(&Transform, Mut<GlobalTransform>)>, parent: Option<DAffine3>| {
+        let Some((transform, mut global)) = node else { return parent };
         let affine = transform.affine();
+        let affine = parent.map_or(affine, |parent| parent * affine);
         global.set_if_neq(GlobalTransform(affine));
-        stack.push((entity, affine));
+        Some(affine)
+    };
+    let mut stack = Vec::new();
+    for (entity, node) in &mut roots {
+        stack.push((entity, place(node, None)));
         while let Some((parent, affine)) = stack.pop() {
             let Ok(list) = children.get(parent) else { continue };
             for &child in list {
-                let Ok((transform, mut global)) = nodes.get_mut(child) else { continue };
-                let affine = affine * transform.affine();
-                global.set_if_neq(GlobalTransform(affine));
-                stack.push((child, affine));
+                stack.push((child, place(nodes.get_mut(child).ok(), affine)));
             }
         }
     }

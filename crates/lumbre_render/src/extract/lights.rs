@@ -8,6 +8,7 @@ use lumbre_scene::{GlobalTransform, Name};
 use super::emitters::{EmissivePolygon, Emitters};
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{InverseSquareLightData, LightData};
+use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight, light_size};
 use crate::{LightLists, RenderError};
 
 /// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
@@ -31,6 +32,18 @@ pub(crate) struct LightCounts {
     pub spot: bool,
     /// Whether faces of emissive objects shine.
     pub polygon: bool,
+    /// What has to be known of shadows.
+    pub shadows: ShadowCounts,
+}
+
+/// Whether lights of a class cast shadows, and of which kinds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ShadowCounts {
+    /// Lights that do.
+    pub lights: u32,
+    pub cubes: bool,
+    pub cascades: bool,
+    pub soft: bool,
 }
 
 /// What the shaders need to know of a frame's lights.
@@ -50,7 +63,7 @@ pub(crate) struct LightSet {
 pub(crate) enum LightClass {
     /// It has no range, or is directional, or a polygon: it is in the lists of objects.
     Unbounded,
-    /// A point light without a cone, of one colour, with the inverse square within a range: what most lights of a game are.
+    /// A point light without a cone or a shadow, of one colour, with the inverse square within a range: what most lights of a game are.
     InverseSquare,
     /// Any other point light with a range: with a cone, an attenuation of its own, or colours that differ.
     Ranged,
@@ -68,7 +81,7 @@ impl LightClass {
         let everywhere = cone(light).is_none();
         // What `attenuate_inverse_square` takes.
         let usual_range = (1e-9..=1e15).contains(&range);
-        match inverse_square && one_color && everywhere && usual_range {
+        match inverse_square && one_color && everywhere && usual_range && !light.shadow {
             true => Self::InverseSquare,
             false => Self::Ranged,
         }
@@ -88,6 +101,12 @@ impl LightCounts {
         self.directional |= light.kind == LightKind::Directional;
         self.point |= light.kind == LightKind::Point;
         self.spot |= cone(light).is_some();
+        if let Some(kind) = ShadowKind::of(light).filter(|_| light.shadow) {
+            self.shadows.lights += 1;
+            self.shadows.cubes |= kind == ShadowKind::Cube;
+            self.shadows.cascades |= kind == ShadowKind::Cascades;
+            self.shadows.soft |= light_size(kind, light) > 0.0;
+        }
     }
 
     fn add_polygon(&mut self, polygon: &EmissivePolygon) {
@@ -105,9 +124,12 @@ impl LightSet {
     pub fn of(world: &mut World) -> Result<Self, RenderError> {
         let mut set = Self::default();
         Emitters::default().polygons(world)?.iter().for_each(|polygon| set.add_polygon(polygon));
-        let mut query = world.query::<(&Light, &GlobalTransform)>();
-        let shining = query.iter(world).filter(|(light, transform)| shines(light, transform));
-        let mut found: Vec<&Light> = shining.map(|(light, _)| light).collect();
+        let mut query = world.query::<(&Light, Option<&GlobalTransform>)>();
+        let mut found: Vec<&Light> = query
+            .iter(world)
+            .filter(|(light, transform)| place(light, *transform).is_some_and(|place| shines(light, &place)))
+            .map(|(light, _)| light)
+            .collect();
         found.sort_by_key(|light| light.bake == BakeMode::Static);
         for light in found {
             set.add(light);
@@ -119,6 +141,14 @@ impl LightSet {
     pub fn without_lightmaps(mut self) -> Self {
         for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
             counts.dynamic = counts.all;
+        }
+        self
+    }
+
+    /// With shadows switched off no light casts any.
+    pub fn without_shadows(mut self) -> Self {
+        for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
+            counts.shadows = ShadowCounts::default();
         }
         self
     }
@@ -258,6 +288,8 @@ pub(crate) struct SceneLights {
     pub reaches: Vec<LightReach>,
     /// Those of the class, in the order of `reaches`.
     pub inverse_square: Vec<InverseSquareLightData>,
+    /// Those that cast shadows.
+    pub shadows: Vec<ShadowLight>,
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
@@ -275,12 +307,13 @@ pub(crate) fn extract_lights(
     let mut scene = SceneLights::default();
     let polygons = emitters.polygons(world)?;
     polygons.iter().for_each(|polygon| scene.set.add_polygon(polygon));
-    let mut query = world.query::<(Entity, &Light, &GlobalTransform)>();
+    let mut query = world.query::<(Entity, &Light, Option<&GlobalTransform>)>();
     let mut found: Vec<_> = query
         .iter(world)
-        .filter(|(entity, light, transform)| {
-            left_out.extend(fault(world, *entity, light, transform));
-            shines(light, transform)
+        .filter_map(|(entity, light, transform)| {
+            let place = place(light, transform);
+            left_out.extend(fault(world, entity, light, place.as_ref()));
+            place.filter(|place| shines(light, place)).map(|place| (entity, light, place))
         })
         .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
@@ -289,14 +322,24 @@ pub(crate) fn extract_lights(
     let baked = found.iter().position(|(_, light, _)| light.bake == BakeMode::Static).unwrap_or(found.len());
     let (dynamic, baked) = found.split_at(baked);
     let mut data = Vec::with_capacity(found.len() + polygons.len());
+    let mut views = 0;
     for (lights, of_baked) in [(dynamic, false), (baked, true)] {
-        for (_, light, transform) in lights {
+        for (entity, light, place) in lights {
             let Some(class) = scene.set.add(light) else { continue };
             if class == LightClass::InverseSquare {
-                scene.inverse_square.push(InverseSquareLightData::new(light, transform, origin));
+                scene.inverse_square.push(InverseSquareLightData::new(light, place, origin));
             }
-            scene.reaches.push(LightReach::new(light, transform, class));
-            data.push(LightData::new(light, transform, origin));
+            scene.reaches.push(LightReach::new(light, place, class));
+            let shadow = ShadowLight::new(*entity, light, place, views);
+            if shadow.is_none() && light.shadow {
+                let name = world.get::<Name>(*entity).map_or_else(|| entity.to_string(), ToString::to_string);
+                left_out.push(format!(
+                    "the shadow of light \"{name}\": shadows have room for {MOST_VIEWS} views, and a point light needs six"
+                ));
+            }
+            data.push(LightData::new(light, place, origin, shadow.as_ref().map_or(0, ShadowLight::flags)));
+            views += shadow.as_ref().map_or(0, ShadowLight::views);
+            scene.shadows.extend(shadow);
         }
         for polygon in polygons.iter().filter(|polygon| polygon.baked == of_baked) {
             scene.reaches.push(LightReach::of_polygon(polygon));
@@ -308,15 +351,21 @@ pub(crate) fn extract_lights(
 }
 
 /// What is wrong with a light that is on, by name; nothing as a rule.
-fn fault(world: &World, entity: Entity, light: &Light, transform: &GlobalTransform) -> Option<String> {
-    if !light.enabled || transform.0.is_finite() && light.validate("").is_ok() {
+fn fault(world: &World, entity: Entity, light: &Light, place: Option<&GlobalTransform>) -> Option<String> {
+    if !light.enabled || place.is_some_and(|place| place.0.is_finite()) && light.validate("").is_ok() {
         return None;
     }
     let name = world.get::<Name>(entity).map_or_else(|| entity.to_string(), ToString::to_string);
-    Some(match light.validate(&name) {
-        Err(error) => error.to_string(),
-        Ok(()) => format!("light \"{name}\": its transform is not finite"),
+    Some(match (light.validate(&name), place) {
+        (Err(error), _) => error.to_string(),
+        (Ok(()), None) => format!("light \"{name}\": it has no Transform, so that it stands nowhere; spawn it with one"),
+        (Ok(()), Some(_)) => format!("light \"{name}\": its transform is not finite"),
     })
+}
+
+/// Where a light stands; an ambient one needs no place.
+fn place(light: &Light, transform: Option<&GlobalTransform>) -> Option<GlobalTransform> {
+    transform.copied().or_else(|| (light.kind == LightKind::Ambient).then(GlobalTransform::default))
 }
 
 /// Whether a light adds anything; one whose numbers are out of range is left out rather than let into a frame.

@@ -11,6 +11,8 @@ pub(crate) use camera::{CameraView, ViewVolume, find_camera};
 pub(crate) use emitters::Emitters;
 #[cfg(test)]
 pub(crate) use lights::PolygonReach;
-pub(crate) use lights::{LightClass, LightReach, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights};
+pub(crate) use lights::{
+    LightClass, LightCounts, LightReach, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
+};
 pub(crate) use objects::{Object, Objects};
-pub(crate) use traits::{FrameFeatures, LitPass, Traits};
+pub(crate) use traits::{LitPass, Traits};

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use lumbre_mesh::TextureCoordinateSet;
 use lumbre_optics::{Material, ReflectionModel, Shading};
-use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh};
+use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh, Name};
 
 use super::Traits;
 use crate::growable_buffer::GrowableBuffer;
@@ -28,7 +28,10 @@ pub(crate) struct Object {
     pub texture_set: Option<Arc<TextureSet>>,
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
     pub traits: Traits,
+    /// Why it cannot be drawn, by name.
+    fault: Option<String>,
     pub mirrored: bool,
+    pub world_from_mesh: DAffine3,
     /// Middle of the bounding box in the world.
     pub center: DVec3,
     /// Half the sides of that box, along the world's axes.
@@ -53,9 +56,14 @@ type ObjectQuery<'w, 's> = Query<
     Without<Hidden>,
 >;
 
+/// Meshes that nothing says the look of.
+type Unfinished<'w, 's> = Query<'w, 's, Entity, (With<Mesh>, Without<Material>, Without<Hidden>)>;
+type Names<'w, 's> = Query<'w, 's, &'static Name>;
+type Extraction = SystemState<(ObjectQuery<'static, 'static>, Unfinished<'static, 'static>, Names<'static, 'static>)>;
+
 /// All objects, and their GPU buffers.
 pub(crate) struct Objects {
-    state: Option<(WorldId, SystemState<ObjectQuery<'static, 'static>>)>,
+    state: Option<(WorldId, Extraction)>,
     slots: HashMap<Entity, usize>,
     /// By slot; `None` is free.
     pub objects: Vec<Option<Object>>,
@@ -87,7 +95,7 @@ impl Objects {
         }
     }
 
-    /// Brings the slots up to date for a frame seen from `eye`.
+    /// Brings the slots up to date for a frame seen from `eye`. What cannot be drawn is `left_out`, each with a sentence.
     pub fn extract(
         &mut self,
         world: &mut World,
@@ -96,6 +104,7 @@ impl Objects {
         textures: &mut Textures,
         sets: &mut TextureSets,
         eye: DVec3,
+        left_out: &mut Vec<String>,
     ) -> Result<(), RenderError> {
         self.frame += 1;
         if self.state.as_ref().is_none_or(|(id, _)| *id != world.id()) {
@@ -108,9 +117,18 @@ impl Objects {
             self.origin = eye;
         }
         let Some((id, mut state)) = self.state.take() else { return Ok(()) };
-        if let Ok(query) = state.get(world) {
-            let found = query.iter().filter(|found| found.3.0.is_finite());
-            for (entity, mesh, material, transform, maps, lightmap, (shading, reflection)) in found {
+        if let Ok((query, unfinished, names)) = state.get(world) {
+            let named = |entity: Entity, fault: &str| {
+                let name = names.get(entity).map_or_else(|_| entity.to_string(), ToString::to_string);
+                format!("object \"{name}\": {fault}")
+            };
+            let unfinished = unfinished.iter().map(|entity| named(entity, "it has a Mesh and no Material"));
+            left_out.extend(unfinished);
+            for (entity, mesh, material, transform, maps, lightmap, (shading, reflection)) in query.iter() {
+                if !transform.0.is_finite() {
+                    left_out.push(named(entity, "its transform is not finite"));
+                    continue;
+                }
                 let choices = (shading.copied(), reflection.copied());
                 let (slot, new) = self.slot(entity);
                 let remeshed = new || mesh.is_changed();
@@ -141,6 +159,11 @@ impl Objects {
                 if transformed {
                     self.transforms.set(slot, ObjectData::new(&transform, self.origin));
                 }
+                if remeshed {
+                    let fault = meshes.get(object.mesh).and_then(|mesh| mesh.fault.as_ref());
+                    object.fault = fault.map(|fault| named(entity, &fault.to_string()));
+                }
+                left_out.extend(object.fault.clone());
                 if transformed || remeshed {
                     object.bound(meshes, &transform);
                 }
@@ -198,9 +221,13 @@ impl Objects {
         }
     }
 
-    /// Objects with their slots.
+    /// Objects that can be drawn, with their slots.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Object)> {
-        self.objects.iter().enumerate().filter_map(|(slot, object)| Some((slot, object.as_ref()?)))
+        let drawn = |object: &&Object| object.fault.is_none();
+        self.objects
+            .iter()
+            .enumerate()
+            .filter_map(move |(slot, object)| Some((slot, object.as_ref().filter(drawn)?)))
     }
 }
 
@@ -212,7 +239,9 @@ impl Object {
             texture_set: None,
             lightmap: None,
             traits,
+            fault: None,
             mirrored: false,
+            world_from_mesh: DAffine3::IDENTITY,
             center: DVec3::ZERO,
             half_size: DVec3::ZERO,
             radius: 0.0,
@@ -222,6 +251,7 @@ impl Object {
 
     fn bound(&mut self, meshes: &MeshBuffers, transform: &GlobalTransform) {
         self.mirrored = transform.mirrors();
+        self.world_from_mesh = transform.0;
         let matrix = transform.0.matrix3;
         if let Some(mesh) = meshes.get(self.mesh) {
             let half = mesh.half_size;

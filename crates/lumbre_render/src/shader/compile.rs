@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::sources::MODULES;
+use lumbre_shaders::MODULES;
 use crate::RenderError;
 
 /// Resolves imports and conditions of `root` with exactly these flags.
@@ -98,6 +98,10 @@ mod tests {
             Feature::Fog => vec![Feature::FogLinear],
             Feature::ClampVertices => vec![Feature::Clamp],
             Feature::UniformLights => vec![Feature::InverseSquareClusters],
+            Feature::ShadowCubes | Feature::ShadowCascades | Feature::SoftShadows => vec![Feature::Shadows],
+            Feature::DisplaySrgb | Feature::DisplayClamp | Feature::EncodeSrgb | Feature::DecodeSrgb => {
+                vec![Feature::Display]
+            }
             _ => vec![],
         };
         for shading in Shading::ALL {
@@ -135,6 +139,8 @@ mod tests {
             "contour",
             "cluster",
             "inverse_square",
+            "shadow",
+            "tone_curve",
         ] {
             assert!(!plain.contains(word), "{word} is left in:\n{plain}");
         }
@@ -161,6 +167,12 @@ mod tests {
         let all = valid(&variant(Shading::Phong, &[clusters.as_slice(), &lightmapped].concat()));
         assert!(all.contains("spot_factor"), "{all}");
         assert!(all.contains("first_baked"), "baked lights are told apart:\n{all}");
+        // Shadows of one kind of light know nothing of the others'.
+        let spots = valid(&variant(Shading::Phong, &[LIT.as_slice(), &[Feature::SpotLights, Feature::Shadows]].concat()));
+        assert!(spots.contains("texture_depth_2d"), "{spots}");
+        for word in ["cube_face", "cascade", "penumbra"] {
+            assert!(!spots.contains(word), "{word} is left in:\n{spots}");
+        }
         let dark = valid(&variant(Shading::Phong, &[Feature::Lit]));
         assert!(!dark.contains("for ("), "a scene without lights loops:\n{dark}");
         let lit = valid(&variant(Shading::Phong, &[LIT.as_slice(), &[Feature::SpotLights]].concat()));

@@ -1,7 +1,6 @@
 //! Shaders: the embedded sources, the variants that a frame calls for, and their compilation. Not pipelines: those are `pipelines`.
 
 mod compile;
-mod sources;
 mod variant;
 
 pub(crate) use compile::compile;

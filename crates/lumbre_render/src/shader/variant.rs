@@ -110,6 +110,24 @@ features! {
     OcclusionTexture = 40 => "OCCLUSION_TEXTURE",
     /// Its highlight keeps its energy, as glTF's do.
     EnergyKeeping = 41 => "ENERGY_KEEPING",
+    /// Writes the numbers of the target itself: the frame has no display pass.
+    Display = 42 => "DISPLAY",
+    /// Shows people what they would see: a tone curve.
+    DisplaySrgb = 43 => "DISPLAY_SRGB",
+    /// Shows OpenGL's clamp.
+    DisplayClamp = 44 => "DISPLAY_CLAMP",
+    /// Encodes sRGB, as the target's format does not.
+    EncodeSrgb = 45 => "ENCODE_SRGB",
+    /// Decodes sRGB, as the target's format encodes what is to be stored as it is.
+    DecodeSrgb = 46 => "DECODE_SRGB",
+    /// Reads shadow maps.
+    Shadows = 47 => "SHADOWS",
+    /// Knows the six views of a point light.
+    ShadowCubes = 48 => "SHADOW_CUBES",
+    /// Knows the cascades of a directional light.
+    ShadowCascades = 49 => "SHADOW_CASCADES",
+    /// Filters shadows by the size of a light.
+    SoftShadows = 50 => "SOFT_SHADOWS",
 }
 
 /// A variant of the forward shader.
@@ -178,6 +196,12 @@ impl Variant {
                 | Feature::SpotLights as u64
                 | Feature::PolygonLights as u64);
         }
+        if !self.has(Feature::Shadows) || !listed && !self.has(Feature::RangedClusters) {
+            self.bits &= !(Feature::Shadows as u64
+                | Feature::ShadowCubes as u64
+                | Feature::ShadowCascades as u64
+                | Feature::SoftShadows as u64);
+        }
         if !listed && !clusters {
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
@@ -242,21 +266,35 @@ impl std::fmt::Display for Variant {
     }
 }
 
-/// A variant of the display shader.
+/// How colours become the numbers of a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DisplayVariant {
     /// What is shown.
     pub display: Display,
     /// The shader encodes sRGB (the target's format does not).
     pub encode: bool,
+    /// The shader decodes sRGB: the target's format encodes, and is to hold the numbers as they are.
+    pub decode: bool,
 }
 
 impl DisplayVariant {
-    pub(crate) fn flags(self) -> Vec<(&'static str, bool)> {
-        vec![
-            ("DISPLAY_SRGB", self.display == Display::Srgb),
-            ("DISPLAY_CLAMP", self.display == Display::Clamp),
-            ("ENCODE_SRGB", self.encode),
+    /// For a target of this format.
+    pub fn new(display: Display, target: wgpu::TextureFormat) -> Self {
+        let shown = display == Display::Srgb;
+        Self { display, encode: shown && !target.is_srgb(), decode: !shown && target.is_srgb() }
+    }
+
+    /// What it calls for.
+    pub(crate) fn features(self) -> [(Feature, bool); 4] {
+        [
+            (Feature::DisplaySrgb, self.display == Display::Srgb),
+            (Feature::DisplayClamp, self.display == Display::Clamp),
+            (Feature::EncodeSrgb, self.encode),
+            (Feature::DecodeSrgb, self.decode),
         ]
+    }
+
+    pub(crate) fn flags(self) -> Vec<(&'static str, bool)> {
+        self.features().map(|(feature, on)| (feature.name(), on)).to_vec()
     }
 }

@@ -1,15 +1,28 @@
-//! The WESL modules of `shaders/`, embedded so that a program carries them.
+//! The shaders of Lumbre: WESL modules, embedded so that a program carries them. Whoever compiles them chooses their features; no device is
+//! known here.
+//!
+//! ```text
+//!   forward ──► lighting, light_clusters, lightmap, textures …   the passes of lumbre_render
+//!      │           └──► optics/…                                 the equations, each with its f64 twin in lumbre_optics
+//!      ▼
+//!   display ──► display_color ──► tone_curve
+//! ```
+//!
+//! ```
+//! let (_, source) = lumbre_shaders::MODULES.iter().find(|(path, _)| *path == "optics/lambert").unwrap();
+//! assert!(source.contains("fn lambert(normal: vec3<f32>, light: vec3<f32>) -> f32"));
+//! ```
 
 macro_rules! modules {
     ($($path:literal),+ $(,)?) => {
-        /// Module path and source of every file under `shaders/`.
-        pub(crate) const MODULES: &[(&str, &str)] =
-            &[$(($path, include_str!(concat!("../../../../shaders/", $path, ".wesl")))),+];
+        /// The path of each module, without `package::` and with slashes, and its source.
+        pub const MODULES: &[(&str, &str)] = &[$(($path, include_str!(concat!($path, ".wesl")))),+];
     };
 }
 
 modules!(
     "display",
+    "display_color",
     "forward",
     "frame",
     "light_clusters",
@@ -18,6 +31,8 @@ modules!(
     "material_textures",
     "normal_map",
     "occlusion_map",
+    "shadow_caster",
+    "shadows",
     "surface_maps",
     "tone_curve",
     "optics/angle",
@@ -55,7 +70,7 @@ mod tests {
 
     #[test]
     fn every_shader_file_is_embedded() {
-        let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders"));
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut found = Vec::new();
         let mut folders = vec![root.to_path_buf()];
         while let Some(folder) = folders.pop() {
@@ -63,7 +78,7 @@ mod tests {
                 let path = entry.unwrap().path();
                 if path.is_dir() {
                     folders.push(path);
-                } else {
+                } else if path.extension().is_some_and(|extension| extension == "wesl") {
                     let relative = path.strip_prefix(root).unwrap().with_extension("");
                     found.push(relative.to_string_lossy().replace('\\', "/"));
                 }

@@ -1,0 +1,232 @@
+//! From radiance to the numbers of the target: exposure, tone curve, encoding. A pass of its own where something needs the linear frame (several
+//! samples per pixel, blending, an effect at [`Stage::Radiance`], the probe); else the lit shaders do it where the colour is made.
+
+use std::collections::HashMap;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_graph::LoadOp;
+use wgpu::util::DeviceExt;
+
+use super::{Board, Effect, FrameGraph, Stage};
+use crate::error::EffectError;
+use crate::facts::SceneFacts;
+use crate::frame_plan::FrameShape;
+use crate::shader::{self, DisplayVariant};
+use crate::{Display, FrameOptions, Gpu, RenderError};
+
+/// The pass and its pipelines.
+#[derive(Debug, Default)]
+pub(super) struct DisplayPass {
+    device: Option<OnDevice>,
+    /// Of this frame.
+    key: Option<Key>,
+}
+
+type Key = (DisplayVariant, wgpu::TextureFormat);
+
+#[derive(Debug)]
+struct OnDevice {
+    layout: wgpu::BindGroupLayout,
+    pipelines: HashMap<Key, wgpu::RenderPipeline>,
+    uniform: wgpu::Buffer,
+    exposure: f32,
+}
+
+impl Effect for DisplayPass {
+    fn name(&self) -> &'static str {
+        "display"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Display
+    }
+
+    fn extract(&mut self, _: &mut World, _: &SceneFacts, _: &FrameOptions) -> bool {
+        true
+    }
+
+    fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
+        self.key = None;
+        if frame.display_pass {
+            let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
+            let variant = DisplayVariant::new(frame.display, frame.target_format);
+            self.key = Some(device.prepare(gpu, (variant, frame.target_format), frame.exposure)?);
+        }
+        Ok(())
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        let linear = board.linear;
+        graph
+            .raster_pass(self.name())
+            .calls_for(board.has_display_pass(), "use for a linear frame")
+            .samples(&linear)
+            .color(&mut board.target, LoadOp::Clear(wgpu::Color::BLACK))
+            .run(move |context| {
+                let view = context.resources.view(&linear)?;
+                if let (Some(device), Some(key)) = (&self.device, &self.key) {
+                    device.draw(context.resources.device, context.pass, key, view);
+                }
+                Ok(())
+            });
+    }
+}
+
+impl OnDevice {
+    fn new(gpu: &Gpu) -> Self {
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        };
+        let texture = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let uniform = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("display"),
+            entries: &[entry(0, texture), entry(1, uniform)],
+        });
+        let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("exposure"),
+            contents: bytemuck::bytes_of(&[1.0_f32; 4]),
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        });
+        Self { layout, pipelines: HashMap::new(), uniform, exposure: 1.0 }
+    }
+
+    /// Makes the pipeline for a target and writes the exposure if it changed; answers with the key for `draw`.
+    fn prepare(&mut self, gpu: &Gpu, key: Key, exposure: f32) -> Result<Key, RenderError> {
+        if !self.pipelines.contains_key(&key) {
+            let pipeline = self.make(gpu, key)?;
+            self.pipelines.insert(key, pipeline);
+        }
+        if exposure != self.exposure {
+            self.exposure = exposure;
+            gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&exposure));
+        }
+        Ok(key)
+    }
+
+    fn make(&self, gpu: &Gpu, (variant, format): Key) -> Result<wgpu::RenderPipeline, RenderError> {
+        let module = shader::compile(&gpu.device, "display", &variant.flags())?;
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("display"),
+            bind_group_layouts: &[Some(&self.layout)],
+            immediate_size: 0,
+        });
+        Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("display"),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: Default::default(),
+                targets: &[Some(format.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        }))
+    }
+
+    /// Draws `frame` through the pipeline that `prepare` made.
+    fn draw(
+        &self,
+        device: &wgpu::Device,
+        pass: &mut wgpu::RenderPass<'static>,
+        key: &Key,
+        frame: &wgpu::TextureView,
+    ) {
+        let Some(pipeline) = self.pipelines.get(key) else { return };
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("display"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(frame) },
+                wgpu::BindGroupEntry { binding: 1, resource: self.uniform.as_entire_binding() },
+            ],
+        });
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// What the display makes of a colour for a target of this format: the numbers that the shaders write, in f64. Twin: shaders/display_color.wesl.
+pub fn display_color(display: Display, target: wgpu::TextureFormat, exposure: f32, radiance: Vec3) -> Vec3 {
+    let exposed = radiance.as_dvec3() * f64::from(exposure);
+    let shown = match display {
+        Display::Linear => exposed,
+        Display::Clamp => exposed.clamp(DVec3::ZERO, DVec3::ONE),
+        Display::Srgb => tone_curve(exposed),
+    };
+    let variant = DisplayVariant::new(display, target);
+    let within = shown.clamp(DVec3::ZERO, DVec3::ONE);
+    match (variant.encode, variant.decode) {
+        (true, _) => within.map(encode_srgb).as_vec3(),
+        (false, true) => within.map(decode_srgb).as_vec3(),
+        (false, false) => shown.as_vec3(),
+    }
+}
+
+/// Khronos PBR Neutral tone mapper (Khronos 3D Commerce, 2024). Twin: shaders/tone_curve.wesl.
+fn tone_curve(radiance: DVec3) -> DVec3 {
+    let (compression_start, desaturation) = (0.8 - 0.04, 0.15);
+    let mut color = radiance.max(DVec3::ZERO);
+    let darkest = color.min_element();
+    color -= if darkest < 0.08 { darkest - 6.25 * darkest * darkest } else { 0.04 };
+    let peak = color.max_element();
+    if peak < compression_start {
+        return color;
+    }
+    let span = 1.0 - compression_start;
+    let compressed = 1.0 - span * span / (peak + span - compression_start);
+    let white = 1.0 - 1.0 / (desaturation * (peak - compressed) + 1.0);
+    (color * (compressed / peak)).lerp(DVec3::splat(compressed), white)
+}
+
+/// IEC 61966-2-1, of a value in [0, 1].
+fn encode_srgb(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The inverse.
+fn decode_srgb(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_colour_is_shown_as_its_display_says() {
+        let (eight_bits, encoded) = (wgpu::TextureFormat::Rgba8Unorm, wgpu::TextureFormat::Rgba8UnormSrgb);
+        let shown = |display, format, color| display_color(display, format, 2.0, color);
+        assert_eq!(shown(Display::Linear, eight_bits, Vec3::splat(3.0)), Vec3::splat(6.0));
+        assert_eq!(shown(Display::Clamp, eight_bits, Vec3::new(-1.0, 0.25, 9.0)), Vec3::new(0.0, 0.5, 1.0));
+        // Neutral below its compression: .3 loses the toe of .04, and .26 is .547 encoded.
+        let grey = shown(Display::Srgb, eight_bits, Vec3::splat(0.15)).x;
+        assert!((grey - 0.5472).abs() < 1e-4, "{grey}");
+        assert!((shown(Display::Srgb, encoded, Vec3::splat(0.15)).x - 0.26).abs() < 1e-6);
+        let white = shown(Display::Srgb, eight_bits, Vec3::splat(1e30));
+        assert!((white - Vec3::ONE).abs().max_element() < 1e-6, "{white}");
+    }
+}

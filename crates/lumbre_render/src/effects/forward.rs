@@ -1,0 +1,39 @@
+//! Opaque surfaces without a lightmap: flat, Gouraud and Phong shading in one pass over all lights.
+
+use bevy_ecs::world::World;
+use lumbre_graph::LoadOp;
+
+use super::{Board, Effect, FrameGraph, Stage};
+use crate::FrameOptions;
+use crate::facts::SceneFacts;
+
+#[derive(Debug, Default)]
+pub(super) struct Forward {
+    opaque: bool,
+}
+
+impl Effect for Forward {
+    fn name(&self) -> &'static str {
+        "forward"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Opaque
+    }
+
+    fn extract(&mut self, _: &mut World, facts: &SceneFacts, _: &FrameOptions) -> bool {
+        self.opaque = facts.opaque > 0;
+        self.opaque
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        board
+            .lit_pass(graph, self.name(), LoadOp::Load)
+            .calls_for(self.opaque, "opaque mesh without a lightmap")
+            .depth(&mut board.depth, LoadOp::Load)
+            .run(|context| {
+                context.user.draw(context.pass, &context.user.draws.opaque);
+                Ok(())
+            });
+    }
+}

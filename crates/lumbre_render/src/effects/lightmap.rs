@@ -1,0 +1,41 @@
+//! Opaque surfaces whose light is baked: the lightmap's diffuse light, and what dynamic lights add to it.
+
+use bevy_ecs::world::World;
+use lumbre_graph::LoadOp;
+
+use super::{Board, Effect, FrameGraph, Stage};
+use crate::FrameOptions;
+use crate::facts::SceneFacts;
+
+#[derive(Debug, Default)]
+pub(super) struct Lightmap {
+    lightmapped: bool,
+    switched_on: bool,
+}
+
+impl Effect for Lightmap {
+    fn name(&self) -> &'static str {
+        "lightmap"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Opaque
+    }
+
+    fn extract(&mut self, _: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool {
+        (self.lightmapped, self.switched_on) = (facts.lightmapped > 0, options.lightmaps);
+        self.lightmapped && self.switched_on
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        board
+            .lit_pass(graph, self.name(), LoadOp::Load)
+            .calls_for(self.lightmapped, "lightmapped mesh")
+            .calls_for(self.switched_on, "lightmaps switched on")
+            .depth(&mut board.depth, LoadOp::Load)
+            .run(|context| {
+                context.user.draw(context.pass, &context.user.draws.lightmapped);
+                Ok(())
+            });
+    }
+}

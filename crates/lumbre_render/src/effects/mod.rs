@@ -1,0 +1,110 @@
+//! Effects: the parts of a frame that a scene may or may not call for, those of this crate and those of a program that uses it. Each decides from the
+//! World whether it is called for, keeps its own things on the GPU, and declares its own passes; the renderer knows none of them by name.
+//!
+//! ```text
+//!   extract ──► called for? ──► prepare ──► declare
+//!   World       with a reason   pipelines,   passes between the handles
+//!                               buffers      of the Board
+//! ```
+//!
+//! What a material or a light calls for within a shader is no effect of this kind: that is a feature of a shader's variant (`shader::variant`).
+
+mod background;
+mod board;
+mod display;
+mod forward;
+mod lightmap;
+mod shadows;
+mod transparent;
+
+use bevy_ecs::world::World;
+use lumbre_graph::{Graph, Imports};
+
+pub use board::Board;
+pub use display::display_color;
+
+use crate::error::EffectError;
+use crate::facts::SceneFacts;
+use crate::frame_plan::FrameShape;
+use crate::frame_scene::FrameScene;
+use crate::{FrameOptions, Gpu};
+
+/// The graph of a frame. Its passes are lent the frame's scene as `context.user`.
+pub type FrameGraph<'a> = Graph<'a, FrameScene<'a>>;
+
+/// Where among the stages of a frame an effect declares its passes. Effects of one stage stand in the order in which the renderer was given them,
+/// after its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Stage {
+    /// What surfaces are lit with: shadow maps. Nothing is drawn yet.
+    Light,
+    /// What lies behind everything.
+    Background,
+    /// Opaque surfaces. Afterwards [`Board::depth`] holds the nearest of them.
+    Opaque,
+    /// What is blended over them.
+    Transparent,
+    /// Between light and display: [`Board::linear`] holds the lit frame, as radiance, one sample per pixel. A frame in which such an effect is
+    /// called for keeps its radiance until the display; any other is encoded where its colours are made.
+    Radiance,
+    /// From radiance to the numbers of the target.
+    Display,
+    /// Over the finished picture: [`Board::target`] holds it.
+    Picture,
+}
+
+/// A part of the frame that a scene may or may not call for. [`Renderer::builder`](crate::Renderer::builder) takes those of a program.
+///
+/// Once a frame, in this order: `extract`; `prepare`, if it is called for; `declare`. An explanation without a device leaves out `prepare` and runs no
+/// pass.
+pub trait Effect: Send + Sync {
+    /// Its name, in plain words, for plans and errors.
+    fn name(&self) -> &'static str;
+
+    /// Where its passes stand.
+    fn stage(&self) -> Stage;
+
+    /// Takes from the World what it needs this frame; whether the scene calls for it. [`PassBuilder::calls_for`](lumbre_graph::PassBuilder::calls_for)
+    /// of its passes gives the reason.
+    fn extract(&mut self, world: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool;
+
+    /// Makes what it needs on the GPU: pipelines, textures that outlive the frame, uniforms. Nothing that it is not called for.
+    ///
+    /// # Errors
+    /// Whatever keeps the effect from being drawn: the frame is not drawn then.
+    fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
+        let _ = (gpu, frame);
+        Ok(())
+    }
+
+    /// Binds what it imports into the graph: textures and buffers that outlive the frame, under the names that `declare` imports.
+    fn imports(&self, imports: Imports) -> Imports {
+        imports
+    }
+
+    /// Whether its passes draw the shapes of objects, through [`FrameScene::objects`].
+    fn draws_objects(&self) -> bool {
+        false
+    }
+
+    /// Declares its passes, those that are not called for too, so that the plan can say why.
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board);
+}
+
+/// The effects of this crate, each in its stage.
+pub(crate) fn own() -> Vec<Box<dyn Effect>> {
+    vec![
+        Box::new(shadows::Shadows::default()),
+        Box::new(background::Background::default()),
+        Box::new(lightmap::Lightmap::default()),
+        Box::new(forward::Forward::default()),
+        Box::new(transparent::Transparent::default()),
+        Box::new(display::DisplayPass::default()),
+    ]
+}
+
+/// In the order of their stages.
+pub(crate) fn in_order(effects: &mut [Box<dyn Effect>]) {
+    // Stable.
+    effects.sort_by_key(|effect| effect.stage());
+}

@@ -1,0 +1,72 @@
+//! The shadows of lights that ask for them: draws the maps that changed into the atlas, from which the lit surfaces read. Which maps there are is decided in `shadows`.
+
+use bevy_ecs::world::World;
+use lumbre_graph::{Imports, LoadOp, TextureDescriptor};
+
+use super::{Board, Effect, FrameGraph, Stage};
+use crate::error::EffectError;
+use crate::facts::SceneFacts;
+use crate::frame_plan::{FrameShape, ShadowAtlas};
+use crate::target::DEPTH_FORMAT;
+use crate::{FrameOptions, Gpu};
+
+#[derive(Debug, Default)]
+pub(super) struct Shadows {
+    /// Whether a light asks for one, and whether they are switched on.
+    called_for: [bool; 2],
+    atlas: Option<ShadowAtlas>,
+}
+
+impl Effect for Shadows {
+    fn name(&self) -> &'static str {
+        "shadow maps"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Light
+    }
+
+    fn extract(&mut self, _: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool {
+        self.called_for = [facts.shadow_lights > 0, options.shadows];
+        self.atlas = None;
+        self.called_for == [true, true]
+    }
+
+    fn prepare(&mut self, _: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
+        self.atlas.clone_from(&frame.shadow_atlas);
+        Ok(())
+    }
+
+    fn imports(&self, imports: Imports) -> Imports {
+        match &self.atlas {
+            Some(atlas) => imports.texture("shadow atlas", &atlas.view),
+            None => imports,
+        }
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        let [asked, switched_on] = self.called_for;
+        // Of an explanation without a device the size is not known.
+        let side = self.atlas.as_ref().map_or(1, |atlas| atlas.view.texture().width());
+        let described = TextureDescriptor::new_2d(side, side, DEPTH_FORMAT);
+        let (mut atlas, load) = match &self.atlas {
+            // What did not change is there from an earlier frame.
+            Some(_) => (graph.import_texture("shadow atlas", described), LoadOp::Load),
+            None => (graph.texture("shadow atlas", described), LoadOp::Clear(0.0)),
+        };
+        let mut pass = graph
+            .raster_pass(self.name())
+            .calls_for(asked, "light that asks for a shadow")
+            .calls_for(switched_on, "shadows switched on");
+        if let Some(atlas) = &self.atlas {
+            pass = pass.calls_for(atlas.stale, "shadow map that changed");
+        }
+        pass.depth(&mut atlas, load).run(|context| {
+            context.user.draw_shadow_maps(context.pass);
+            Ok(())
+        });
+        if asked && switched_on {
+            board.lit_by(atlas);
+        }
+    }
+}

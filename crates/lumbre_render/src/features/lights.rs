@@ -1,0 +1,33 @@
+//! Lights: the kinds that a loop has to know, and by which lists it finds them.
+
+use lumbre_optics::Shading;
+
+use super::Subject;
+use crate::extract::{LightCounts, LightSet, UNIFORM_LIGHTS};
+use crate::shader::{Feature, Variant};
+
+pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
+    let (object, frame) = (subject.object, subject.frame);
+    let clustered = frame.clustered && subject.lit && subject.shading == Shading::Phong;
+    let LightSet { every, unbounded, inverse_square, ranged, .. } = &frame.lights;
+    let listed = if clustered { unbounded } else { every };
+    // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
+    let lightmapped = object.uses_lightmap(frame.lightmaps);
+    let left = |of: &LightCounts| of.all > of.dynamic && (!lightmapped || object.specular || of.static_ambient);
+    variant.set(Feature::DynamicLights, listed.dynamic > 0);
+    variant.set(Feature::StaticLights, left(listed));
+    let reads = |of: &LightCounts| clustered && (of.dynamic > 0 || left(of));
+    variant.set(Feature::InverseSquareClusters, reads(inverse_square));
+    variant.set(Feature::UniformLights, reads(inverse_square) && inverse_square.all <= UNIFORM_LIGHTS);
+    variant.set(Feature::RangedClusters, reads(ranged));
+    for kinds in [Some(listed), clustered.then_some(ranged)].into_iter().flatten() {
+        variant.set(Feature::DirectionalLights, kinds.directional);
+        variant.set(Feature::PointLights, kinds.point);
+        variant.set(Feature::SpotLights, kinds.spot);
+        variant.set(Feature::PolygonLights, kinds.polygon);
+        variant.set(Feature::Shadows, kinds.shadows.lights > 0);
+        variant.set(Feature::ShadowCubes, kinds.shadows.cubes);
+        variant.set(Feature::ShadowCascades, kinds.shadows.cascades);
+        variant.set(Feature::SoftShadows, kinds.shadows.soft);
+    }
+}

@@ -1,0 +1,77 @@
+//! Features: what an object, its material, the lights and the frame call for within the shaders, one file for each subject with the reason for each of its features. A
+//! shader variant holds these and nothing else; what excludes what is `Variant::reduced`. Passes are not chosen here: those are `effects`.
+
+mod alpha;
+mod display;
+mod fog;
+mod lightmap;
+mod lights;
+mod specular;
+mod specular_antialiasing;
+mod textures;
+mod two_sided;
+
+use lumbre_optics::{ReflectionModel, Shading};
+use lumbre_scene::SceneSettings;
+
+use crate::extract::{LightSet, Traits};
+use crate::shader::{DisplayVariant, Feature, Variant};
+
+/// What all variants of a frame have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FrameFeatures {
+    pub shading: Option<Shading>,
+    pub reflection: Option<ReflectionModel>,
+    pub lightmaps: bool,
+    pub specular_antialiasing: bool,
+    pub clamp: bool,
+    /// The frame is kept in half floats.
+    pub half: bool,
+    pub lights: LightSet,
+    /// Fragments find lights with a range by clusters.
+    pub clustered: bool,
+    /// Colours are made as the target holds them.
+    pub display: Option<DisplayVariant>,
+}
+
+/// An object in a frame, as the subjects are asked about it.
+struct Subject<'a> {
+    object: &'a Traits,
+    settings: &'a SceneSettings,
+    frame: &'a FrameFeatures,
+    shading: Shading,
+    /// Takes light at all.
+    lit: bool,
+}
+
+impl Subject<'_> {
+    /// Whether light is evaluated at vertices.
+    fn is_lit_per_vertex(&self) -> bool {
+        self.lit && self.shading != Shading::Phong
+    }
+}
+
+/// The variant that draws an object in such a frame.
+pub(crate) fn variant(object: &Traits, settings: &SceneSettings, frame: &FrameFeatures) -> Variant {
+    let shading = frame.shading.or(object.shading).unwrap_or(settings.shading);
+    let reflection = frame.reflection.or(object.reflection).unwrap_or(settings.reflection);
+    let subject = Subject { object, settings, frame, shading, lit: !object.unlit };
+    let mut variant = Variant::new(shading, reflection);
+    variant.set(Feature::Lit, subject.lit);
+    variant.set(Feature::VertexColor, object.vertex_color);
+    variant.set(Feature::LocalViewer, settings.local_viewer);
+    for call in [
+        textures::call,
+        alpha::call,
+        two_sided::call,
+        lightmap::call,
+        lights::call,
+        specular::call,
+        specular_antialiasing::call,
+        fog::call,
+        display::call,
+    ] {
+        call(&subject, &mut variant);
+    }
+    textures::coordinates(object, variant.reduced())
+}

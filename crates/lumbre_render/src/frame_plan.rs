@@ -1,0 +1,122 @@
+//! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
+
+use crate::facts::SceneFacts;
+use crate::{Display, FrameOptions, FrameTarget, Gpu};
+
+/// How radiance reaches the target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ending {
+    /// The target takes radiance as it is.
+    Direct,
+    /// The lit shaders write the target's numbers: there is no display pass.
+    Folded,
+    /// By a pass of its own, from the linear frame.
+    DisplayPass,
+}
+
+/// Decisions about a frame: formats, samples, and its end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FramePlan {
+    /// Of the linear frame.
+    pub linear_format: wgpu::TextureFormat,
+    /// Of what lit colours are drawn into.
+    pub lit_format: wgpu::TextureFormat,
+    pub samples: u32,
+    pub ending: Ending,
+}
+
+impl FramePlan {
+    /// The plan for a target of eight bits. With `radiance`, something needs the linear frame.
+    pub fn new(facts: &SceneFacts, options: &FrameOptions, target: wgpu::TextureFormat, radiance: bool) -> Self {
+        let samples = if options.multisample { 4 } else { 1 };
+        let linear_format = wgpu::TextureFormat::Rgba16Float;
+        // Of what is encoded neither a blend nor the mean of several samples would be right, and bytes hide what the probe looks for.
+        let folded = !radiance && facts.transparent == 0 && samples == 1 && !options.probe;
+        match folded {
+            true => Self { linear_format, lit_format: target, samples, ending: Ending::Folded },
+            false => {
+                Self { linear_format, lit_format: linear_format, samples, ending: Ending::DisplayPass }
+            }
+        }
+    }
+
+    /// As [`new`](Self::new), with what the device can do.
+    pub fn for_device(
+        facts: &SceneFacts,
+        options: &FrameOptions,
+        radiance: bool,
+        (gpu, target, exposure): (&Gpu, &FrameTarget, f32),
+    ) -> Self {
+        let mut plan = Self::new(facts, options, target.format, radiance);
+        let wide = wgpu::TextureFormat::Rgba32Float;
+        let features = gpu.device.features();
+        // Without these features WebGPU promises neither blending nor multisampling of 32-bit floats.
+        let flags = gpu.adapter.get_texture_format_features(wide).flags;
+        let resolves = features.contains(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
+            && flags.sample_count_supported(plan.samples)
+            && flags.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
+        let blends = features.contains(wgpu::Features::FLOAT32_BLENDABLE);
+        let wide_works = (facts.transparent == 0 || blends) && (plan.samples == 1 || resolves);
+        if wide_works && (options.full_precision || target.format == wide) {
+            plan.linear_format = wide;
+        }
+        let linear = options.display == Display::Linear && exposure == 1.0;
+        if wide_works && target.format == wide && linear && !radiance {
+            plan.ending = Ending::Direct;
+            plan.lit_format = wide;
+        } else if plan.ending == Ending::DisplayPass {
+            plan.lit_format = plan.linear_format;
+        }
+        plan
+    }
+
+    /// What effects are told of it.
+    pub fn shape(&self, target: &FrameTarget, display: Display, exposure: f32) -> FrameShape {
+        let (display, exposure) = match self.ending {
+            Ending::Direct => (Display::Linear, 1.0),
+            Ending::Folded | Ending::DisplayPass => (display, exposure),
+        };
+        FrameShape {
+            size: [target.width, target.height],
+            linear_format: self.linear_format,
+            lit_format: self.lit_format,
+            target_format: target.format,
+            samples: self.samples,
+            display,
+            exposure,
+            display_pass: self.ending == Ending::DisplayPass,
+            shadow_atlas: None,
+        }
+    }
+}
+
+/// What a frame is drawn into, and how, for [`Effect::prepare`](crate::effects::Effect::prepare).
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct FrameShape {
+    /// Width and height of the target, and of the textures of the [`Board`](crate::effects::Board), in texels.
+    pub size: [u32; 2],
+    /// Format of [`Board::linear`](crate::effects::Board::linear).
+    pub linear_format: wgpu::TextureFormat,
+    /// Format of what [`Board::lit_pass`](crate::effects::Board::lit_pass) draws into.
+    pub lit_format: wgpu::TextureFormat,
+    /// Format of [`Board::target`](crate::effects::Board::target).
+    pub target_format: wgpu::TextureFormat,
+    /// Samples per pixel of [`Board::depth`](crate::effects::Board::depth) and of what [`Board::lit_pass`](crate::effects::Board::lit_pass) draws into.
+    pub samples: u32,
+    /// From radiance to the target's numbers.
+    pub display: Display,
+    /// Factor on radiance before the display.
+    pub exposure: f32,
+    /// Whether the display is a pass of its own.
+    pub display_pass: bool,
+    /// The atlas of shadow maps, where the frame has any.
+    pub(crate) shadow_atlas: Option<ShadowAtlas>,
+}
+
+/// The atlas of shadow maps, and whether any of them has to be drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ShadowAtlas {
+    pub view: wgpu::TextureView,
+    pub stale: bool,
+}

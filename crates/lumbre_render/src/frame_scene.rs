@@ -1,0 +1,151 @@
+//! What the passes of a frame draw with: its draws, their pipelines and buffers, and the view. Every pass is lent it; what is drawn was decided before.
+
+use bevy_ecs::entity::Entity;
+use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
+use lumbre_optics::FlatRule;
+
+use crate::draws::{Batch, Draws};
+use crate::extract::{CameraView, Objects};
+use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
+use crate::pipelines::Pipelines;
+use crate::shader::Feature;
+use crate::shadows::ShadowMaps;
+
+/// A frame's scene, as its passes find it in `context.user`.
+pub struct FrameScene<'a> {
+    pub(crate) draws: &'a Draws,
+    pub(crate) objects: &'a Objects,
+    pub(crate) pipelines: &'a Pipelines,
+    pub(crate) meshes: &'a MeshBuffers,
+    pub(crate) flat_rule: FlatRule,
+    /// Of group 0, for variants without clusters and with them.
+    pub(crate) frame_groups: [Option<&'a wgpu::BindGroup>; 2],
+    pub(crate) view: CameraView,
+    pub(crate) shadows: &'a ShadowMaps,
+}
+
+/// The camera of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct FrameView {
+    /// Where the camera stands in the world, in metres.
+    pub eye: DVec3,
+    /// The camera's axes in the world, unit: right, up, backward.
+    pub basis: DMat3,
+    /// From the world to clip space, reversed-Z: depth 1 at the near plane. Multiply by an object's matrix in f64 before rounding to f32.
+    pub clip_from_world: DMat4,
+}
+
+/// An object in view, for effects that draw its shape.
+#[derive(Clone, Copy)]
+pub struct DrawnObject<'a> {
+    /// Whose it is.
+    pub entity: Entity,
+    /// From the mesh to the world.
+    pub world_from_mesh: DAffine3,
+    /// From the mesh to clip space.
+    pub clip_from_mesh: Mat4,
+    mesh: &'a GpuMesh,
+}
+
+impl<'a> FrameScene<'a> {
+    /// The camera.
+    pub fn view(&self) -> FrameView {
+        let clip_from_world = self.view.clip_from_frame(DVec3::ZERO);
+        FrameView { eye: self.view.eye, basis: self.view.basis, clip_from_world }
+    }
+
+    /// The objects in view, once each, in an order that stays the same while the scene does. Empty unless an effect that is called for
+    /// [draws objects](crate::effects::Effect::draws_objects).
+    pub fn objects(&self) -> impl Iterator<Item = DrawnObject<'a>> {
+        let clip_from_world = self.view.clip_from_frame(DVec3::ZERO);
+        let (objects, meshes) = (self.objects, self.meshes);
+        self.draws.instances.iter().filter_map(move |instance| {
+            let object = objects.objects.get(instance.object as usize)?.as_ref()?;
+            let mesh = meshes.get(object.mesh).filter(|mesh| mesh.has_positions())?;
+            let world_from_mesh = object.world_from_mesh;
+            let clip_from_mesh = (clip_from_world * DMat4::from(world_from_mesh)).as_mat4();
+            Some(DrawnObject { entity: object.entity, world_from_mesh, clip_from_mesh, mesh })
+        })
+    }
+
+    /// Draws the shadow maps that changed, each into its part of the atlas.
+    pub(crate) fn draw_shadow_maps(&self, pass: &mut wgpu::RenderPass<'static>) {
+        let Some(maps) = self.shadows.device() else { return };
+        let Some(group) = &maps.caster_group else { return };
+        for map in &self.shadows.stale {
+            let [x, y, side] = map.place;
+            pass.set_viewport(x as f32, y as f32, side as f32, side as f32, 0.0, 1.0);
+            pass.set_scissor_rect(x, y, side, side);
+            pass.set_bind_group(0, group, &[map.matrix_offset]);
+            pass.set_pipeline(&maps.clear_pipeline);
+            pass.draw(0..3, 0..1);
+            pass.set_pipeline(&maps.caster_pipeline);
+            for run in map.casters.chunk_by(|a, b| a.mesh == b.mesh && a.slot + 1 == b.slot) {
+                let Some(mesh) = self.meshes.get(run[0].mesh) else { continue };
+                let slices = mesh.slices(&[Attribute::Position], None);
+                let (Some(positions), Some(indices)) = (slices.attributes.first(), slices.indices) else { continue };
+                let first = run[0].slot;
+                pass.set_vertex_buffer(0, positions.slice(..));
+                pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+                // A few thousand casters at most fill a run.
+                pass.draw_indexed(0..slices.count, 0, first..first + run.len() as u32);
+            }
+        }
+    }
+
+    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, batches: &[Batch]) {
+        let mut bound = None;
+        for batch in batches {
+            let (Some(pipeline), Some(mesh)) =
+                (self.pipelines.get(&batch.pipeline), self.meshes.get(batch.mesh))
+            else {
+                continue;
+            };
+            let slices = mesh.slices(&pipeline.attributes, pipeline.flat.then_some(self.flat_rule));
+            if slices.count == 0 {
+                continue;
+            }
+            pass.set_pipeline(&pipeline.pipeline);
+            let clustered = batch.pipeline.variant.has(Feature::Clusters);
+            if bound != Some(clustered) {
+                let Some(group) = self.frame_groups[usize::from(clustered)] else { continue };
+                pass.set_bind_group(0, group, &[]);
+                bound = Some(clustered);
+            }
+            if let Some(set) = &batch.texture_set {
+                pass.set_bind_group(1, &set.bind_group, &[]);
+            }
+            if let Some(lightmap) = &batch.lightmap {
+                pass.set_bind_group(2, &**lightmap, &[]);
+            }
+            if batch.pipeline.variant.has(Feature::Shadows) {
+                let Some(group) = self.shadows.device().and_then(|maps| maps.receiver_group.as_ref()) else {
+                    continue;
+                };
+                pass.set_bind_group(3, group, &[]);
+            }
+            for (slot, buffer) in (0..).zip(&slices.attributes) {
+                pass.set_vertex_buffer(slot, buffer.slice(..));
+            }
+            match slices.indices {
+                Some(indices) => {
+                    pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+                    pass.draw_indexed(0..slices.count, 0, batch.instances.clone());
+                }
+                None => pass.draw(0..slices.count, batch.instances.clone()),
+            }
+        }
+    }
+}
+
+impl DrawnObject<'_> {
+    /// Draws its triangles once with the pipeline and the bind groups that are set: vertex buffer 0 has positions in the mesh's space, three f32 a vertex.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        let slices = self.mesh.slices(&[Attribute::Position], None);
+        let (Some(positions), Some(indices)) = (slices.attributes.first(), slices.indices) else { return };
+        pass.set_vertex_buffer(0, positions.slice(..));
+        pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..slices.count, 0, 0..1);
+    }
+}

@@ -1,0 +1,104 @@
+//! Lights that cast shadows, as their records and their maps both know them: how many views each kind has. What the views show is `shadows`.
+
+use bevy_ecs::entity::Entity;
+use glam::DVec3;
+use lumbre_optics::{Light, LightKind};
+use lumbre_scene::GlobalTransform;
+
+/// Most views of all lights of a frame.
+pub(crate) const MOST_VIEWS: usize = 128;
+/// Cascades of a directional light.
+pub(crate) const CASCADES: usize = 3;
+/// A cone with a wider half angle than this, in radians, has the six views of a point light.
+pub(crate) const WIDEST_CONE: f64 = 1.2;
+
+/// How a light's views are chosen among.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ShadowKind {
+    /// One view.
+    Cone,
+    /// The face that the direction from the light points through: +X, -X, +Y, -Y, +Z, -Z.
+    Cube,
+    /// The first cascade that holds the depth.
+    Cascades,
+}
+
+impl ShadowKind {
+    /// Of a light; an ambient one casts none.
+    pub fn of(light: &Light) -> Option<Self> {
+        match (light.kind, light.spot.filter(|cone| !cone.is_everywhere())) {
+            (LightKind::Ambient, _) => None,
+            (LightKind::Directional, _) => Some(Self::Cascades),
+            (LightKind::Point, Some(cone)) if cone.cosines().outer.acos() <= WIDEST_CONE => Some(Self::Cone),
+            (LightKind::Point, _) => Some(Self::Cube),
+        }
+    }
+
+    pub fn views(self) -> usize {
+        match self {
+            Self::Cone => 1,
+            Self::Cube => 6,
+            Self::Cascades => CASCADES,
+        }
+    }
+}
+
+/// A light that casts shadows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadowLight {
+    /// Its number among the views, and how it chooses among its own.
+    pub first_view: u32,
+    pub kind: ShadowKind,
+    pub entity: Entity,
+    pub position: DVec3,
+    pub axis: DVec3,
+    pub cone: f64,
+    pub range: f64,
+    /// Radius in metres; of a directional light the tangent of half its angle.
+    pub size: f64,
+}
+
+impl ShadowLight {
+    /// A light that asks for a shadow, if there is room for its views.
+    pub fn new(entity: Entity, light: &Light, transform: &GlobalTransform, first_view: usize) -> Option<Self> {
+        let kind = ShadowKind::of(light).filter(|_| light.shadow)?;
+        if first_view + kind.views() > MOST_VIEWS {
+            return None;
+        }
+        let cone = light.spot.filter(|cone| !cone.is_everywhere()).map_or(0.0, |cone| cone.cosines().outer.acos());
+        let size = light_size(kind, light);
+        Some(Self {
+            // Fewer than MOST_VIEWS.
+            first_view: first_view as u32,
+            kind,
+            entity,
+            position: transform.translation(),
+            axis: transform.forward(),
+            cone,
+            range: f64::from(light.attenuation.range),
+            size,
+        })
+    }
+
+    pub fn views(&self) -> usize {
+        self.kind.views()
+    }
+
+    /// What the shaders find in a light's record: how its views are chosen among, and the first of them.
+    pub fn flags(&self) -> u32 {
+        let kind = match self.kind {
+            ShadowKind::Cone => 1,
+            ShadowKind::Cube => 2,
+            ShadowKind::Cascades => 3,
+        };
+        kind << 1 | self.first_view << 8
+    }
+}
+
+/// The radius of a light in metres, or the tangent of half the angle of a directional one: shadows of a light that has a size have a penumbra.
+pub(crate) fn light_size(kind: ShadowKind, light: &Light) -> f64 {
+    match kind {
+        ShadowKind::Cascades => (0.5 * f64::from(light.angle)).tan(),
+        ShadowKind::Cone | ShadowKind::Cube => f64::from(light.radius),
+    }
+}

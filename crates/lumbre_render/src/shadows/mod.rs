@@ -1,0 +1,396 @@
+//! Shadow maps of the lights that ask for them: their views, their places in one atlas, who casts into which, and what of it has to be drawn again. How a surface reads
+//! them is shaders/shadows.wesl; the pass that draws them is `effects::shadows`.
+
+mod atlas;
+mod views;
+
+use bevy_ecs::entity::Entity;
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat4, DVec3, DVec4, Mat4};
+
+use crate::extract::{CameraView, Object, Objects};
+use crate::growable_buffer::GrowableBuffer;
+use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
+use crate::shadow_light::{MOST_VIEWS, ShadowLight};
+use crate::{Gpu, RenderError};
+
+/// Largest side of the atlas, in texels.
+const MOST_TEXELS: u32 = 4096;
+/// The stride of records that are bound with an offset: what WebGPU promises.
+const STRIDE: usize = 256;
+
+/// `ShadowView` of shaders/shadows.wesl.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct ViewData {
+    map_from_frame: [[f32; 4]; 4],
+    /// Corner and side in the atlas, and a texel, as parts of it.
+    tile: [f32; 4],
+    /// Metres a texel shows, near plane or negative depth, size of the light, end of a cascade.
+    parameters: [f32; 4],
+}
+
+/// A caster's draw in a view.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Caster {
+    pub mesh: MeshKey,
+    /// Its number in the table of objects.
+    pub slot: u32,
+}
+
+/// A map that has to be drawn again.
+#[derive(Debug)]
+pub(crate) struct StaleMap {
+    /// Corner and side in texels.
+    pub place: [u32; 3],
+    /// Where its matrix begins in the buffer of matrices.
+    pub matrix_offset: u32,
+    pub casters: Vec<Caster>,
+}
+
+/// What the views of a frame need to know of its camera.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadowedView {
+    pub view: CameraView,
+    /// Rows of the frame.
+    pub height: u32,
+    /// Nearest and farthest depth of what is in view, in metres.
+    pub depths: [f64; 2],
+}
+
+/// The shadow maps of a renderer.
+#[derive(Debug)]
+pub(crate) struct ShadowMaps {
+    /// By view: what its map shows, and 0 where it has to be drawn.
+    drawn: Vec<u64>,
+    pub stale: Vec<StaleMap>,
+    views: GrowableBuffer<ViewData>,
+    matrices: Vec<u8>,
+    device: Option<OnDevice>,
+    /// Of the next atlas, in texels.
+    side: u32,
+}
+
+/// The maps themselves, and how they are drawn and bound.
+#[derive(Debug)]
+pub(crate) struct OnDevice {
+    pub atlas: wgpu::Texture,
+    pub atlas_view: wgpu::TextureView,
+    caster_layout: wgpu::BindGroupLayout,
+    pub caster_pipeline: wgpu::RenderPipeline,
+    pub clear_pipeline: wgpu::RenderPipeline,
+    matrices: wgpu::Buffer,
+    pub caster_group: Option<wgpu::BindGroup>,
+    pub receiver_group: Option<wgpu::BindGroup>,
+}
+
+impl ShadowMaps {
+    pub fn new() -> Self {
+        Self {
+            drawn: Vec::new(),
+            stale: Vec::new(),
+            views: GrowableBuffer::new("shadow views"),
+            matrices: Vec::new(),
+            device: None,
+            side: 0,
+        }
+    }
+
+    /// Chooses views and places for the lights of a frame, and finds out which maps are as they have to be.
+    pub fn plan(&mut self, lights: &[ShadowLight], objects: &Objects, seen: &ShadowedView) {
+        let casters = objects.iter().filter(|(_, object)| object.casts_shadow());
+        let (low, high) = casters.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (_, object)| {
+            let center = object.center - objects.origin;
+            (low.min(center - object.half_size), high.max(center + object.half_size))
+        });
+        let around = match low.cmple(high).all() {
+            true => (0.5 * (low + high), 0.5 * (high - low).length()),
+            false => (DVec3::ZERO, 1.0),
+        };
+        let seen = views::Seen {
+            view: seen.view,
+            origin: objects.origin,
+            depths: seen.depths,
+            height: seen.height,
+            casters: around,
+        };
+        let mut found = Vec::new();
+        for light in lights {
+            let lamp = views::Lamp {
+                kind: light.kind,
+                position: light.position - objects.origin,
+                axis: light.axis,
+                cone: light.cone,
+                range: light.range,
+            };
+            found.extend(views::views(&lamp, &seen).into_iter().map(|view| (light, view)));
+        }
+        let wanted: Vec<f64> = found.iter().map(|(_, view)| view.wanted).collect();
+        let (side, tiles) = atlas::pack(&wanted, MOST_TEXELS);
+        if side != self.side {
+            self.side = side;
+            self.drawn.clear();
+        }
+        self.drawn.resize(found.len(), 0);
+        self.stale.clear();
+        self.matrices.clear();
+        let mut data = Vec::with_capacity(found.len());
+        for (((light, view), tile), drawn) in found.iter().zip(&tiles).zip(&mut self.drawn) {
+            let Some(tile) = tile else {
+                // It shows nothing, and nothing is hidden from it.
+                data.push(ViewData::default());
+                continue;
+            };
+            let part = 1.0 / f64::from(side);
+            let place = [f64::from(tile.x) * part, f64::from(tile.y) * part, f64::from(tile.side) * part, part];
+            let parameters = [view.width / f64::from(tile.side), view.near_or_depth, light.size, view.end];
+            // From clip space to the map's own coordinates, [0, 1] and downwards.
+            let map_from_clip = DMat4::from_cols(
+                DVec4::new(0.5, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, -0.5, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, 1.0, 0.0),
+                DVec4::new(0.5, 0.5, 0.0, 1.0),
+            );
+            let clip_from_frame = view.clip_from_frame.as_mat4();
+            data.push(ViewData {
+                map_from_frame: (map_from_clip * view.clip_from_frame).as_mat4().to_cols_array_2d(),
+                tile: place.map(|number| number as f32),
+                parameters: parameters.map(|number| number as f32),
+            });
+            let (casters, shows) = casters_of(objects, light.entity, view, clip_from_frame, [tile.x, tile.y, tile.side]);
+            if *drawn != shows {
+                *drawn = shows;
+                // Less than MOST_VIEWS strides.
+                let matrix_offset = self.matrices.len() as u32;
+                self.matrices.extend_from_slice(bytemuck::bytes_of(&clip_from_frame.to_cols_array_2d()));
+                self.matrices.resize(matrix_offset as usize + STRIDE, 0);
+                self.stale.push(StaleMap { place: [tile.x, tile.y, tile.side], matrix_offset, casters });
+            }
+        }
+        self.views.replace(data);
+    }
+
+    /// Makes and uploads what the stale maps are drawn with, and what surfaces read. `objects` is the table of transforms.
+    ///
+    /// # Errors
+    /// [`RenderError::Shader`], a fault of ours; [`RenderError::BufferTooLarge`].
+    pub fn upload(&mut self, gpu: &Gpu, objects: &wgpu::Buffer, meshes: &mut MeshBuffers, layout: &wgpu::BindGroupLayout) -> Result<u64, RenderError> {
+        if self.device.as_ref().is_none_or(|device| device.atlas.width() != self.side) {
+            let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
+            self.device = Some(OnDevice::new(gpu, side)?);
+        }
+        let bytes = self.views.pending_bytes() + self.matrices.len() as u64;
+        let renewed = self.views.upload(gpu)?;
+        let Some(device) = &mut self.device else { return Ok(0) };
+        if !self.matrices.is_empty() {
+            gpu.queue.write_buffer(&device.matrices, 0, &self.matrices);
+        }
+        if renewed || device.receiver_group.is_none() {
+            device.receiver_group = self.views.buffer().map(|views| device.receivers(gpu, views, layout));
+        }
+        device.caster_group = Some(device.casters(gpu, objects));
+        for caster in self.stale.iter().flat_map(|map| &map.casters) {
+            if let Some(mesh) = meshes.get_mut(caster.mesh) {
+                mesh.prepare(gpu, &[Attribute::Position], None);
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// The maps, once `upload` has made them.
+    pub fn device(&self) -> Option<&OnDevice> {
+        self.device.as_ref()
+    }
+
+    /// What is drawn into the maps may be gone.
+    pub fn forget(&mut self) {
+        self.drawn.clear();
+    }
+}
+
+impl Object {
+    /// Whether light stops at it: it is opaque, and takes light at all.
+    fn casts_shadow(&self) -> bool {
+        !self.traits.unlit && self.traits.alpha_mode != lumbre_optics::AlphaMode::Blend
+    }
+}
+
+/// Who casts into a view, and a number for all that its map shows. A lamp casts no shadow of its own light.
+fn casters_of(objects: &Objects, lamp: Entity, view: &views::View, clip: Mat4, place: [u32; 3]) -> (Vec<Caster>, u64) {
+    let rows = view.clip_from_frame.transpose();
+    // Casters between the light and its near plane are kept out, those before an orthographic view's are none.
+    let planes = [
+        rows.w_axis + rows.x_axis,
+        rows.w_axis - rows.x_axis,
+        rows.w_axis + rows.y_axis,
+        rows.w_axis - rows.y_axis,
+        rows.z_axis,
+    ]
+    .map(|plane| plane / plane.truncate().length().max(f64::MIN_POSITIVE));
+    let mut hash = Hash::new();
+    clip.to_cols_array().iter().for_each(|number| hash.add(u64::from(number.to_bits())));
+    place.iter().for_each(|number| hash.add(u64::from(*number)));
+    let mut casters = Vec::new();
+    for (slot, object) in objects.iter() {
+        if !object.casts_shadow() || object.entity == lamp {
+            continue;
+        }
+        let center = (object.center - objects.origin).extend(1.0);
+        // The last plane of an infinite view is no plane: its distance is a constant that is not negative.
+        if !planes.iter().all(|plane| plane.dot(center) >= -object.radius) {
+            continue;
+        }
+        hash.add(object.mesh.0 as u64);
+        object.world_from_mesh.to_cols_array().iter().for_each(|number| hash.add(number.to_bits()));
+        // As many objects as a storage buffer holds.
+        casters.push(Caster { mesh: object.mesh, slot: slot as u32 });
+    }
+    // One mesh after the other, so that its buffers are bound once.
+    casters.sort_unstable_by_key(|caster| (caster.mesh.0, caster.slot));
+    (casters, hash.finish())
+}
+
+/// FNV-1a over words: changes are to be told apart here, not attacks.
+struct Hash(u64);
+
+impl Hash {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn add(&mut self, word: u64) {
+        self.0 = (self.0 ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
+    }
+
+    /// Never 0, which stands for a map that was not drawn.
+    fn finish(&self) -> u64 {
+        self.0 | 1
+    }
+}
+
+/// The layout of the group that surfaces read shadows from.
+pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty,
+        count: None,
+    };
+    let atlas = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Depth,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    let views = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("shadows"),
+        entries: &[entry(0, atlas), entry(1, views)],
+    })
+}
+
+impl OnDevice {
+    fn new(gpu: &Gpu, side: u32) -> Result<Self, RenderError> {
+        let device = &gpu.device;
+        let atlas = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("shadow atlas"),
+            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: crate::target::DEPTH_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let entry = |binding, ty, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::VERTEX,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
+            count: None,
+        };
+        let storage = wgpu::BufferBindingType::Storage { read_only: true };
+        let caster_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("shadow casters"),
+            entries: &[entry(0, storage, false), entry(1, wgpu::BufferBindingType::Uniform, true)],
+        });
+        let module = crate::shader::compile(device, "shadow_caster", &[])?;
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("shadow casters"),
+            bind_group_layouts: &[Some(&caster_layout)],
+            immediate_size: 0,
+        });
+        let positions = [Some(wgpu::VertexBufferLayout {
+            array_stride: 12,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+        })];
+        let make = |entry_point: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>], compare| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(entry_point),
+                layout: Some(&layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    buffers,
+                },
+                // Both sides cast: a sheet has a shadow from behind too.
+                primitive: Default::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: crate::target::DEPTH_FORMAT,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(compare),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                multisample: Default::default(),
+                fragment: None,
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let matrices = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("shadow matrices"),
+            size: (MOST_VIEWS * STRIDE) as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Ok(Self {
+            atlas_view: atlas.create_view(&Default::default()),
+            caster_pipeline: make("caster", &positions, wgpu::CompareFunction::Greater),
+            clear_pipeline: make("clear", &[], wgpu::CompareFunction::Always),
+            atlas,
+            caster_layout,
+            matrices,
+            caster_group: None,
+            receiver_group: None,
+        })
+    }
+
+    fn casters(&self, gpu: &Gpu, objects: &wgpu::Buffer) -> wgpu::BindGroup {
+        let matrix = wgpu::BufferBinding { buffer: &self.matrices, offset: 0, size: wgpu::BufferSize::new(64) };
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow casters"),
+            layout: &self.caster_layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: objects.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(matrix) },
+            ],
+        })
+    }
+
+    fn receivers(&self, gpu: &Gpu, views: &wgpu::Buffer, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadows"),
+            layout,
+            entries: &[
+                entry(0, wgpu::BindingResource::TextureView(&self.atlas_view)),
+                entry(1, views.as_entire_binding()),
+            ],
+        })
+    }
+}
