@@ -21,7 +21,10 @@ fn scene(shading: Shading) -> World {
     for (index, brightness) in [0.01, 0.1, 0.5, 1.0, 4.0, 100.0].into_iter().enumerate() {
         let (x, y) = ((index % 3) as f64 - 1.0, (index / 3) as f64 - 0.5);
         let color = Vec3::new(0.9, 0.6, 0.3) * brightness;
-        let material = Material { front: lumbre_optics::Surface { emission: 0.1 * color, ..Material::matt(color).front }, ..Material::matt(color) };
+        let material = Material {
+            front: lumbre_optics::Surface { emission: 0.1 * color, ..Material::matt(color).front },
+            ..Material::matt(color)
+        };
         world.spawn((mesh.clone(), material, Transform::from_xyz(x, y, 0.0)));
     }
     world.spawn((Light::point(Vec3::splat(12.0)), Transform::from_xyz(2.0, 2.0, 4.0)));
@@ -41,7 +44,8 @@ fn frame(world: &mut World, options: &FrameOptions) -> (Vec<u8>, bool) {
 
 #[test]
 fn without_a_display_pass_the_picture_is_the_same() {
-    for (display, shading) in Display::ALL.iter().zip(Shading::ALL).chain([(&Display::Srgb, &Shading::Phong)]) {
+    for (display, shading) in Display::ALL.iter().zip(Shading::ALL).chain([(&Display::Srgb, &Shading::Phong)])
+    {
         let mut world = scene(*shading);
         let options = FrameOptions { display: *display, exposure: Some(0.7), ..FrameOptions::default() };
         let (folded, passed) = frame(&mut world, &options);
@@ -68,7 +72,8 @@ fn a_frame_without_a_display_pass_has_the_numbers_of_the_f64_twin() {
         let (shown, _) = frame(&mut world, &options);
         for (pixel, radiance) in shown.chunks_exact(4).zip(&radiance) {
             let format = wgpu::TextureFormat::Rgba8Unorm;
-            let expected = display_color(display, format, 0.7, radiance.truncate()).clamp(Vec3::ZERO, Vec3::ONE);
+            let expected =
+                display_color(display, format, 0.7, radiance.truncate()).clamp(Vec3::ZERO, Vec3::ONE);
             for (byte, expected) in pixel.iter().zip(expected.to_array()) {
                 // Half a step of rounding, and f32's powers.
                 assert!((f32::from(*byte) - 255.0 * expected).abs() < 0.52, "{pixel:?} {expected}");
@@ -82,7 +87,8 @@ fn what_needs_radiance_keeps_the_display_pass() {
     let mut world = scene(Shading::Phong);
     assert!(!frame(&mut world, &FrameOptions::default()).1);
     assert!(frame(&mut world, &FrameOptions { multisample: true, ..FrameOptions::default() }).1);
-    let glass = Material { alpha: 0.5, alpha_mode: lumbre_optics::AlphaMode::Blend, ..Material::matt(Vec3::ONE) };
+    let glass =
+        Material { alpha: 0.5, alpha_mode: lumbre_optics::AlphaMode::Blend, ..Material::matt(Vec3::ONE) };
     world.spawn((Mesh(Arc::new(shapes::uv_sphere(0.2, 8, 4))), glass, Transform::from_xyz(0.0, 0.0, 1.0)));
     assert!(frame(&mut world, &FrameOptions::default()).1);
 }
@@ -108,7 +114,8 @@ fn a_target_that_encodes_holds_the_same_bytes() {
     let mut world = scene(Shading::Gouraud);
     for display in Display::ALL {
         for probe in [false, true] {
-            let options = FrameOptions { display: *display, exposure: Some(0.5), probe, ..FrameOptions::default() };
+            let options =
+                FrameOptions { display: *display, exposure: Some(0.5), probe, ..FrameOptions::default() };
             let target = Offscreen::new(gpu(), 64, 64, OffscreenFormat::Rgba8).unwrap();
             Renderer::new(gpu()).render(&mut world, &target.target(), &options).unwrap();
             let plain = target.read_rgba8(gpu()).unwrap();

@@ -7,13 +7,13 @@ use bevy_ecs::prelude::*;
 use glam::{Vec2, Vec3, Vec4};
 use lumbre_mesh::shapes;
 use lumbre_optics::{
-    AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Light, Material, ReflectionModel, Shading, SpotCone,
-    Surface,
+    AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Light, Material, ReflectionModel, Shading,
+    SpotCone, Surface,
 };
 use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer, explain};
 use lumbre_scene::{
-    Camera, EmissiveLight, Hidden, Lightmap, LightmapEncoding, LightmapImage, MaterialTextures, Mesh, NormalTexture,
-    OcclusionTexture, SceneSettings, Transform,
+    Camera, EmissiveLight, Hidden, Lightmap, LightmapEncoding, LightmapImage, MaterialTextures, Mesh,
+    NormalTexture, OcclusionTexture, SceneSettings, Transform,
 };
 use lumbre_tests::panes::{image, sharp};
 
@@ -42,7 +42,11 @@ fn random_light(random: &mut Random) -> Light {
     let light = match random.below(4) {
         0 => Light::directional(color),
         1 => Light::spot(color, SpotCone::Smooth { inner: 0.2, outer: 0.6 }),
-        2 => Light { kind: lumbre_optics::LightKind::Ambient, ambient: Vec3::splat(0.1), ..Light::point(Vec3::ZERO) },
+        2 => Light {
+            kind: lumbre_optics::LightKind::Ambient,
+            ambient: Vec3::splat(0.1),
+            ..Light::point(Vec3::ZERO)
+        },
         _ => Light::point(color),
     };
     let range = if random.once_in(2) { 20.0 } else { f32::INFINITY };
@@ -59,11 +63,22 @@ fn random_light(random: &mut Random) -> Light {
 fn random_material(random: &mut Random) -> Material {
     let specular = if random.once_in(2) { Vec3::splat(0.3) } else { Vec3::ZERO };
     let emission = if random.once_in(4) { Vec3::splat(2.0) } else { Vec3::ZERO };
-    let front = Surface { specular, emission, shininess: random.one_of(&[8.0, 90.0, 5000.0]), ..Material::matt(Vec3::ONE).front };
+    let front = Surface {
+        specular,
+        emission,
+        shininess: random.one_of(&[8.0, 90.0, 5000.0]),
+        ..Material::matt(Vec3::ONE).front
+    };
     Material {
         front,
         alpha: 0.7,
-        alpha_mode: random.one_of(&[AlphaMode::Opaque, AlphaMode::Opaque, AlphaMode::Opaque, AlphaMode::Mask { cutoff: 0.5 }, AlphaMode::Blend]),
+        alpha_mode: random.one_of(&[
+            AlphaMode::Opaque,
+            AlphaMode::Opaque,
+            AlphaMode::Opaque,
+            AlphaMode::Mask { cutoff: 0.5 },
+            AlphaMode::Blend,
+        ]),
         double_sided: random.once_in(3),
         unlit: random.once_in(6),
         distribution: random.one_of(&[Distribution::default(), Distribution::Gaussian]),
@@ -141,7 +156,8 @@ fn what_is_explained_is_what_is_drawn() {
     let mut random = Random(11);
     let mut renderer = Renderer::new(gpu());
     let target = Offscreen::new(gpu(), 48, 32, OffscreenFormat::Rgba8).unwrap();
-    let (mut passes_seen, mut variants_seen) = (std::collections::BTreeSet::new(), std::collections::BTreeSet::new());
+    let (mut passes_seen, mut variants_seen) =
+        (std::collections::BTreeSet::new(), std::collections::BTreeSet::new());
     let mut called_for = std::collections::BTreeMap::new();
     for number in 0..40 {
         let mut world = random_world(&mut random);
@@ -157,13 +173,20 @@ fn what_is_explained_is_what_is_drawn() {
         let report = renderer.render(&mut world, &target.target(), &options).unwrap();
         assert_eq!(report.statistics.objects_outside, 0, "all is in view");
         let explained = explain(&mut world, &options, 48, 32).unwrap();
-        let named: Vec<&str> =
-            explained.frame.passes.iter().filter(|pass| pass.group.is_some()).map(|pass| pass.name.as_str()).collect();
+        let named: Vec<&str> = explained
+            .frame
+            .passes
+            .iter()
+            .filter(|pass| pass.group.is_some())
+            .map(|pass| pass.name.as_str())
+            .collect();
         let drawn: Vec<&str> = report.plan.running().collect();
         assert_eq!(named, drawn, "passes of World {number}");
         assert_eq!(explained.variants, renderer.drawn_variants(), "variants of World {number}");
 
-        let has = |feature: &str| explained.variants.keys().any(|variant| variant.split(' ').any(|word| word == feature));
+        let has = |feature: &str| {
+            explained.variants.keys().any(|variant| variant.split(' ').any(|word| word == feature))
+        };
         for line in explained.census.lines() {
             // Of an effect whose feature every object of it has, and of those that lights or options may leave without use.
             let (feature, always) = match line.effect {
@@ -183,7 +206,11 @@ fn what_is_explained_is_what_is_drawn() {
             };
             *called_for.entry(line.effect).or_insert(0) += usize::from(has(feature));
             let shown = line.called_for && explained.census.meshes > 0;
-            assert!(!has(feature) || line.called_for, "World {number} draws {feature} without {}", line.effect);
+            assert!(
+                !has(feature) || line.called_for,
+                "World {number} draws {feature} without {}",
+                line.effect
+            );
             assert!(!always || has(feature) || !shown, "World {number} has {} and draws none", line.effect);
         }
         passes_seen.extend(drawn.into_iter().map(str::to_owned));

@@ -74,7 +74,10 @@ fn an_effect_that_is_not_called_for_leaves_every_bit_and_says_why() {
     }
     // The explanation says the same without drawing.
     let explained = renderer.explain(&mut world, &FrameOptions::default(), SIZE, SIZE).unwrap().to_text();
-    assert!(explained.contains("no camera with bloom") && explained.contains("no outlined object"), "{explained}");
+    assert!(
+        explained.contains("no camera with bloom") && explained.contains("no outlined object"),
+        "{explained}"
+    );
 }
 
 #[test]
@@ -124,7 +127,8 @@ fn an_outline_is_a_rim_of_its_width_around_its_object_and_nothing_else() {
         let outlined = bytes(&mut renderer, &mut world, &options);
         let (mut rim, mut expected) = (0, 0);
         for (index, (before, after)) in plain.chunks_exact(4).zip(outlined.chunks_exact(4)).enumerate() {
-            let pixel = DVec3::new((index % SIZE as usize) as f64 + 0.5, (index / SIZE as usize) as f64 + 0.5, 0.0);
+            let pixel =
+                DVec3::new((index % SIZE as usize) as f64 + 0.5, (index / SIZE as usize) as f64 + 0.5, 0.0);
             let distance = pixel.distance(DVec3::new(64.0, 64.0, 0.0)) - 32.0;
             expected += usize::from((0.0..4.0).contains(&distance));
             if after == [255, 0, 255, 255] {
@@ -142,8 +146,7 @@ fn an_outline_is_a_rim_of_its_width_around_its_object_and_nothing_else() {
 #[test]
 fn the_core_has_no_line_about_them() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut folders: Vec<_> =
-        ["crates/lumbre_render", "shaders"].map(|folder| root.join(folder)).to_vec();
+    let mut folders: Vec<_> = ["crates/lumbre_render", "shaders"].map(|folder| root.join(folder)).to_vec();
     let (mut files, mut lines) = (0, Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).unwrap() {

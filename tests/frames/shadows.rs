@@ -49,7 +49,8 @@ struct Drawn {
 
 fn draw(renderer: &mut Renderer, world: &mut World, shading: Shading) -> Drawn {
     let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::LinearFloat).unwrap();
-    let options = FrameOptions { display: Display::Linear, shading: Some(shading), ..FrameOptions::default() };
+    let options =
+        FrameOptions { display: Display::Linear, shading: Some(shading), ..FrameOptions::default() };
     let report = renderer.render(world, &target.target(), &options).unwrap();
     let with = target.read_linear(gpu()).unwrap();
     renderer.render(world, &target.target(), &FrameOptions { shadows: false, ..options }).unwrap();
@@ -106,10 +107,16 @@ fn shadows_fall_where_rays_say() {
                 assert!((0.0..=1.0 + 1e-6).contains(lit), "{name}: {lit} at {point}");
             } else if passed < RADIUS {
                 dark += 1;
-                assert!(*lit < 1e-6, "{name}: {lit} of the light at {point}, {passed} from the middle of the ball");
+                assert!(
+                    *lit < 1e-6,
+                    "{name}: {lit} of the light at {point}, {passed} from the middle of the ball"
+                );
             } else {
                 bright += 1;
-                assert!((lit - 1.0).abs() < 1e-6, "{name}: {lit} of the light at {point}, {passed} from the middle");
+                assert!(
+                    (lit - 1.0).abs() < 1e-6,
+                    "{name}: {lit} of the light at {point}, {passed} from the middle"
+                );
             }
         }
         assert!(dark > 300 && bright > 20_000, "{name}: {dark} dark, {near} near the edge, {bright} bright");
@@ -125,7 +132,11 @@ fn a_flat_floor_never_shadows_itself_and_a_box_has_its_shadow_at_its_feet() {
         for (name, lamp, place) in [
             ("directional", Light::directional(Vec3::splat(2.0)), toward * 30.0),
             ("point", Light::point(Vec3::splat(90.0)), toward * 6.0),
-            ("spot", Light::spot(Vec3::splat(90.0), SpotCone::Smooth { inner: 0.6, outer: 0.9 }), toward * 6.0),
+            (
+                "spot",
+                Light::spot(Vec3::splat(90.0), SpotCone::Smooth { inner: 0.6, outer: 0.9 }),
+                toward * 6.0,
+            ),
         ] {
             let distant = lamp.kind == LightKind::Directional;
             let mut world = floor();
@@ -145,17 +156,24 @@ fn a_flat_floor_never_shadows_itself_and_a_box_has_its_shadow_at_its_feet() {
             let shadow = |distance: f64| {
                 let direction = DVec3::new(-toward.x, 0.0, -toward.z).normalize_or_zero();
                 // From the box's side, in the middle of its shadow.
-                let place = direction * (0.25 / direction.x.abs().max(direction.z.abs()).max(1e-9) + distance);
+                let place =
+                    direction * (0.25 / direction.x.abs().max(direction.z.abs()).max(1e-9) + distance);
                 let pixel = |along: f64| ((along / HALF + 1.0) * 0.5 * f64::from(SIZE)) as usize;
                 lit[pixel(place.z) * SIZE as usize + pixel(place.x)]
             };
             if elevation < 71.0 {
                 let length = 0.5 * cosine / sine;
                 let touching = shadow(0.06);
-                assert!(touching < 0.02, "{name} at {elevation} degrees: {touching} of the light at the box's feet");
+                assert!(
+                    touching < 0.02,
+                    "{name} at {elevation} degrees: {touching} of the light at the box's feet"
+                );
                 if distant && length < 1.5 {
                     let beyond = shadow(length + 0.15);
-                    assert!(beyond > 0.99, "{name} at {elevation} degrees: {beyond} of the light beyond the shadow");
+                    assert!(
+                        beyond > 0.99,
+                        "{name} at {elevation} degrees: {beyond} of the light beyond the shadow"
+                    );
                 }
             }
         }
@@ -168,8 +186,15 @@ fn a_large_light_has_a_penumbra_that_grows_with_distance() {
         let mut world = floor();
         // Half of the floor is under a sheet.
         let sheet = Mesh::from(shapes::plane(8.0, 8.0, 1, 1));
-        world.spawn((sheet, Material { double_sided: true, ..Material::matt(Vec3::ONE) }, Transform::from_xyz(-4.0, height, 0.0)));
-        let lamp = Light { radius: 0.25, ..Light::spot(Vec3::splat(30.0), SpotCone::Smooth { inner: 0.6, outer: 0.8 }) };
+        world.spawn((
+            sheet,
+            Material { double_sided: true, ..Material::matt(Vec3::ONE) },
+            Transform::from_xyz(-4.0, height, 0.0),
+        ));
+        let lamp = Light {
+            radius: 0.25,
+            ..Light::spot(Vec3::splat(30.0), SpotCone::Smooth { inner: 0.6, outer: 0.8 })
+        };
         light(&mut world, lamp, DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO);
         // From below the sheet: the floor is seen through where the camera is under it.
         let mut cameras = world.query::<(&mut Transform, &Camera)>();
@@ -184,7 +209,10 @@ fn a_large_light_has_a_penumbra_that_grows_with_distance() {
     // Width of the penumbra of a ball of light: 2 r h / (H - h), of which the filter shows some nine tenths; a texel more or less.
     for (width, height) in widths.iter().zip([0.3, 1.5]) {
         let expected = 2.0 * 0.25 * height / (4.0 - height);
-        assert!((0.5 * expected - 0.03..1.6 * expected + 0.06).contains(width), "{width} m under {height} m, {expected} expected");
+        assert!(
+            (0.5 * expected - 0.03..1.6 * expected + 0.06).contains(width),
+            "{width} m under {height} m, {expected} expected"
+        );
     }
     assert!(widths[1] > 2.0 * widths[0], "{widths:?}");
 }
@@ -228,7 +256,12 @@ fn what_did_not_change_is_not_drawn_again() {
 fn lights_without_room_are_named() {
     let mut world = floor();
     for number in 0..30 {
-        light(&mut world, Light::point(Vec3::ONE), DVec3::new(f64::from(number) * 0.1, 2.0, 0.0), DVec3::ZERO);
+        light(
+            &mut world,
+            Light::point(Vec3::ONE),
+            DVec3::new(f64::from(number) * 0.1, 2.0, 0.0),
+            DVec3::ZERO,
+        );
     }
     let Drawn { lit, report } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
     // 128 views: 21 point lights of six.

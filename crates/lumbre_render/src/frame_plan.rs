@@ -27,16 +27,19 @@ pub(crate) struct FramePlan {
 
 impl FramePlan {
     /// The plan for a target of eight bits. With `radiance`, something needs the linear frame.
-    pub fn new(facts: &SceneFacts, options: &FrameOptions, target: wgpu::TextureFormat, radiance: bool) -> Self {
+    pub fn new(
+        facts: &SceneFacts,
+        options: &FrameOptions,
+        target: wgpu::TextureFormat,
+        radiance: bool,
+    ) -> Self {
         let samples = if options.multisample { 4 } else { 1 };
         let linear_format = wgpu::TextureFormat::Rgba16Float;
         // Of what is encoded neither a blend nor the mean of several samples would be right, and bytes hide what the probe looks for.
         let folded = !radiance && facts.transparent == 0 && samples == 1 && !options.probe;
         match folded {
             true => Self { linear_format, lit_format: target, samples, ending: Ending::Folded },
-            false => {
-                Self { linear_format, lit_format: linear_format, samples, ending: Ending::DisplayPass }
-            }
+            false => Self { linear_format, lit_format: linear_format, samples, ending: Ending::DisplayPass },
         }
     }
 

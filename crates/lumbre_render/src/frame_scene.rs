@@ -84,7 +84,9 @@ impl<'a> FrameScene<'a> {
             for run in map.casters.chunk_by(|a, b| a.mesh == b.mesh && a.slot + 1 == b.slot) {
                 let Some(mesh) = self.meshes.get(run[0].mesh) else { continue };
                 let slices = mesh.slices(&[Attribute::Position], None);
-                let (Some(positions), Some(indices)) = (slices.attributes.first(), slices.indices) else { continue };
+                let (Some(positions), Some(indices)) = (slices.attributes.first(), slices.indices) else {
+                    continue;
+                };
                 let first = run[0].slot;
                 pass.set_vertex_buffer(0, positions.slice(..));
                 pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);

@@ -22,8 +22,11 @@ pub struct Gpu {
     fault: Arc<Mutex<Option<String>>>,
 }
 
+/// A field of `wgpu::Limits` by name, how it is read, and the least that will do.
+type LeastLimit = (&'static str, fn(&wgpu::Limits) -> u64, u64);
+
 /// What a frame binds at most, and the least that a device has to allow of it.
-const LEAST_LIMITS: [(&str, fn(&wgpu::Limits) -> u64, u64); 4] = [
+const LEAST_LIMITS: [LeastLimit; 4] = [
     ("max_bind_groups", |limits| u64::from(limits.max_bind_groups), 4),
     (
         "max_storage_buffers_per_shader_stage",

@@ -6,9 +6,9 @@ use std::collections::hash_map::Entry;
 use lumbre_optics::Shading;
 
 use crate::mesh_buffers::Attribute;
-use crate::target::DEPTH_FORMAT;
 use crate::shader::{self, Feature, Variant};
 use crate::shadows;
+use crate::target::DEPTH_FORMAT;
 use crate::texture_sets::TextureSets;
 use crate::{Gpu, RenderError};
 
@@ -49,7 +49,13 @@ impl Pipelines {
     pub fn new(gpu: &Gpu) -> Self {
         let [frame_layout, clustered_layout] = [false, true].map(|clustered| frame_layout(gpu, clustered));
         let shadow_layout = shadows::receiver_layout(gpu);
-        Self { frame_layout, clustered_layout, shadow_layout, modules: HashMap::new(), pipelines: HashMap::new() }
+        Self {
+            frame_layout,
+            clustered_layout,
+            shadow_layout,
+            modules: HashMap::new(),
+            pipelines: HashMap::new(),
+        }
     }
 
     /// The layout of group 0, of variants that read clusters' lists or of those that do not.

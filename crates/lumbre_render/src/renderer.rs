@@ -205,9 +205,7 @@ impl Renderer {
         self.objects.extract(
             world,
             &self.gpu,
-            &mut self.meshes,
-            &mut self.textures,
-            &mut self.sets,
+            (&mut self.meshes, &mut self.textures, &mut self.sets),
             view.eye,
             &mut left_out,
         )?;
@@ -270,7 +268,11 @@ impl Renderer {
         let shadowed = !lights.shadows.is_empty();
         if shadowed {
             let depths = draws.depths.unwrap_or([0.0, 1.0]);
-            self.shadows.plan(&lights.shadows, &self.objects, &ShadowedView { view, height: target.height, depths });
+            self.shadows.plan(
+                &lights.shadows,
+                &self.objects,
+                &ShadowedView { view, height: target.height, depths },
+            );
         }
         cpu.shadows_ms = clock.lap();
         let uploaded_bytes = self.upload(&view, &settings, &lights.set, exposure, [clustered, shadowed])?;
@@ -278,7 +280,9 @@ impl Renderer {
         self.drawn.clear();
         for batch in draws.batches() {
             match self.drawn.last_mut() {
-                Some((variant, count)) if *variant == batch.pipeline.variant => *count += batch.instances.len(),
+                Some((variant, count)) if *variant == batch.pipeline.variant => {
+                    *count += batch.instances.len()
+                }
                 _ => self.drawn.push((batch.pipeline.variant, batch.instances.len())),
             }
             self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline)?;
@@ -343,7 +347,8 @@ impl Renderer {
             view,
             shadows: &self.shadows,
         };
-        let frame = run_graph(&mut self.executor, &self.gpu, (&self.effects, &plan), target, &mut scene, overlay);
+        let frame =
+            run_graph(&mut self.executor, &self.gpu, (&self.effects, &plan), target, &mut scene, overlay);
         if frame.is_err() {
             // What was to be drawn may not have been.
             self.shadows.forget();

@@ -60,12 +60,18 @@ pub(crate) struct ShadowLight {
 
 impl ShadowLight {
     /// A light that asks for a shadow, if there is room for its views.
-    pub fn new(entity: Entity, light: &Light, transform: &GlobalTransform, first_view: usize) -> Option<Self> {
+    pub fn new(
+        entity: Entity,
+        light: &Light,
+        transform: &GlobalTransform,
+        first_view: usize,
+    ) -> Option<Self> {
         let kind = ShadowKind::of(light).filter(|_| light.shadow)?;
         if first_view + kind.views() > MOST_VIEWS {
             return None;
         }
-        let cone = light.spot.filter(|cone| !cone.is_everywhere()).map_or(0.0, |cone| cone.cosines().outer.acos());
+        let cone =
+            light.spot.filter(|cone| !cone.is_everywhere()).map_or(0.0, |cone| cone.cosines().outer.acos());
         let size = light_size(kind, light);
         Some(Self {
             // Fewer than MOST_VIEWS.

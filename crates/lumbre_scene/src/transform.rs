@@ -147,8 +147,11 @@ impl Default for GlobalTransform {
 
 /// Runs [`propagate_transforms`] once, for code without a schedule.
 pub fn update_transforms(world: &mut World) {
-    let mut state =
-        bevy_ecs::system::SystemState::<(Query<Root<'static>, RootFilter>, Query<Node<'static>, With<ChildOf>>, Query<&Children>)>::new(world);
+    let mut state = bevy_ecs::system::SystemState::<(
+        Query<Root<'static>, RootFilter>,
+        Query<Node<'static>, With<ChildOf>>,
+        Query<&Children>,
+    )>::new(world);
     // Queries are there in every World; only resources may be missing.
     if let Ok((roots, nodes, children)) = state.get_mut(world) {
         propagate_transforms(roots, nodes, children);

@@ -103,7 +103,8 @@ impl BloomEffect {
         into: &mut TextureHandle,
         pipeline: impl Fn(&OnDevice) -> &wgpu::RenderPipeline + 'a,
     ) {
-        let mut pass = graph.raster_pass(name).calls_for(self.bloom.is_some(), "camera with bloom").samples(&fine);
+        let mut pass =
+            graph.raster_pass(name).calls_for(self.bloom.is_some(), "camera with bloom").samples(&fine);
         if coarse != fine {
             pass = pass.samples(&coarse);
         }
@@ -180,11 +181,7 @@ impl OnDevice {
         Self { format, layout, downsample, upsample, compose, strength }
     }
 
-    fn group(
-        &self,
-        device: &wgpu::Device,
-        [fine, coarse]: [&wgpu::TextureView; 2],
-    ) -> wgpu::BindGroup {
+    fn group(&self, device: &wgpu::Device, [fine, coarse]: [&wgpu::TextureView; 2]) -> wgpu::BindGroup {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("bloom"),

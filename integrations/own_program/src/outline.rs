@@ -144,7 +144,10 @@ impl OnDevice {
             count: None,
         };
         let layout = |entries: &[wgpu::BindGroupLayoutEntry]| {
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("outline"), entries })
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("outline"),
+                entries,
+            })
         };
         let shape_layout = layout(&[uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true)]);
         let rim_layout = layout(&[texture, uniform(1, wgpu::ShaderStages::FRAGMENT, false)]);
@@ -201,7 +204,8 @@ impl OnDevice {
     }
 
     fn shape_group(&self, device: &wgpu::Device) -> wgpu::BindGroup {
-        let record = wgpu::BufferBinding { buffer: &self.records, offset: 0, size: wgpu::BufferSize::new(RECORD) };
+        let record =
+            wgpu::BufferBinding { buffer: &self.records, offset: 0, size: wgpu::BufferSize::new(RECORD) };
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("outlined shapes"),
             layout: &self.shape_layout,

@@ -358,7 +358,9 @@ fn fault(world: &World, entity: Entity, light: &Light, place: Option<&GlobalTran
     let name = world.get::<Name>(entity).map_or_else(|| entity.to_string(), ToString::to_string);
     Some(match (light.validate(&name), place) {
         (Err(error), _) => error.to_string(),
-        (Ok(()), None) => format!("light \"{name}\": it has no Transform, so that it stands nowhere; spawn it with one"),
+        (Ok(()), None) => {
+            format!("light \"{name}\": it has no Transform, so that it stands nowhere; spawn it with one")
+        }
         (Ok(()), Some(_)) => format!("light \"{name}\": its transform is not finite"),
     })
 }

@@ -59,7 +59,8 @@ type ObjectQuery<'w, 's> = Query<
 /// Meshes that nothing says the look of.
 type Unfinished<'w, 's> = Query<'w, 's, Entity, (With<Mesh>, Without<Material>, Without<Hidden>)>;
 type Names<'w, 's> = Query<'w, 's, &'static Name>;
-type Extraction = SystemState<(ObjectQuery<'static, 'static>, Unfinished<'static, 'static>, Names<'static, 'static>)>;
+type Extraction =
+    SystemState<(ObjectQuery<'static, 'static>, Unfinished<'static, 'static>, Names<'static, 'static>)>;
 
 /// All objects, and their GPU buffers.
 pub(crate) struct Objects {
@@ -100,9 +101,7 @@ impl Objects {
         &mut self,
         world: &mut World,
         gpu: &Gpu,
-        meshes: &mut MeshBuffers,
-        textures: &mut Textures,
-        sets: &mut TextureSets,
+        (meshes, textures, sets): (&mut MeshBuffers, &mut Textures, &mut TextureSets),
         eye: DVec3,
         left_out: &mut Vec<String>,
     ) -> Result<(), RenderError> {

@@ -13,7 +13,8 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     let listed = if clustered { unbounded } else { every };
     // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
     let lightmapped = object.uses_lightmap(frame.lightmaps);
-    let left = |of: &LightCounts| of.all > of.dynamic && (!lightmapped || object.specular || of.static_ambient);
+    let left =
+        |of: &LightCounts| of.all > of.dynamic && (!lightmapped || object.specular || of.static_ambient);
     variant.set(Feature::DynamicLights, listed.dynamic > 0);
     variant.set(Feature::StaticLights, left(listed));
     let reads = |of: &LightCounts| clustered && (of.dynamic > 0 || left(of));

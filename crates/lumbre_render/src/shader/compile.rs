@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use lumbre_shaders::MODULES;
 use crate::RenderError;
+use lumbre_shaders::MODULES;
 
 /// Resolves imports and conditions of `root` with exactly these flags.
 pub(crate) fn to_wgsl(root: &str, flags: &[(&str, bool)]) -> Result<String, String> {
@@ -168,7 +168,10 @@ mod tests {
         assert!(all.contains("spot_factor"), "{all}");
         assert!(all.contains("first_baked"), "baked lights are told apart:\n{all}");
         // Shadows of one kind of light know nothing of the others'.
-        let spots = valid(&variant(Shading::Phong, &[LIT.as_slice(), &[Feature::SpotLights, Feature::Shadows]].concat()));
+        let spots = valid(&variant(
+            Shading::Phong,
+            &[LIT.as_slice(), &[Feature::SpotLights, Feature::Shadows]].concat(),
+        ));
         assert!(spots.contains("texture_depth_2d"), "{spots}");
         for word in ["cube_face", "cascade", "penumbra"] {
             assert!(!spots.contains(word), "{word} is left in:\n{spots}");

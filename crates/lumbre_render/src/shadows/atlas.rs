@@ -70,7 +70,10 @@ mod tests {
             for (index, a) in placed.iter().enumerate() {
                 assert!(a.x + a.side <= side && a.y + a.side <= side, "{a:?} in {side}");
                 for b in &placed[..index] {
-                    let apart = a.x >= b.x + b.side || b.x >= a.x + a.side || a.y >= b.y + b.side || b.y >= a.y + a.side;
+                    let apart = a.x >= b.x + b.side
+                        || b.x >= a.x + a.side
+                        || a.y >= b.y + b.side
+                        || b.y >= a.y + a.side;
                     assert!(apart, "{a:?} {b:?}");
                 }
             }

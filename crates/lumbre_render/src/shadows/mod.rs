@@ -142,7 +142,8 @@ impl ShadowMaps {
                 continue;
             };
             let part = 1.0 / f64::from(side);
-            let place = [f64::from(tile.x) * part, f64::from(tile.y) * part, f64::from(tile.side) * part, part];
+            let place =
+                [f64::from(tile.x) * part, f64::from(tile.y) * part, f64::from(tile.side) * part, part];
             let parameters = [view.width / f64::from(tile.side), view.near_or_depth, light.size, view.end];
             // From clip space to the map's own coordinates, [0, 1] and downwards.
             let map_from_clip = DMat4::from_cols(
@@ -157,7 +158,8 @@ impl ShadowMaps {
                 tile: place.map(|number| number as f32),
                 parameters: parameters.map(|number| number as f32),
             });
-            let (casters, shows) = casters_of(objects, light.entity, view, clip_from_frame, [tile.x, tile.y, tile.side]);
+            let (casters, shows) =
+                casters_of(objects, light.entity, view, clip_from_frame, [tile.x, tile.y, tile.side]);
             if *drawn != shows {
                 *drawn = shows;
                 // Less than MOST_VIEWS strides.
@@ -174,7 +176,13 @@ impl ShadowMaps {
     ///
     /// # Errors
     /// [`RenderError::Shader`], a fault of ours; [`RenderError::BufferTooLarge`].
-    pub fn upload(&mut self, gpu: &Gpu, objects: &wgpu::Buffer, meshes: &mut MeshBuffers, layout: &wgpu::BindGroupLayout) -> Result<u64, RenderError> {
+    pub fn upload(
+        &mut self,
+        gpu: &Gpu,
+        objects: &wgpu::Buffer,
+        meshes: &mut MeshBuffers,
+        layout: &wgpu::BindGroupLayout,
+    ) -> Result<u64, RenderError> {
         if self.device.as_ref().is_none_or(|device| device.atlas.width() != self.side) {
             let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
             self.device = Some(OnDevice::new(gpu, side)?);
@@ -216,7 +224,13 @@ impl Object {
 }
 
 /// Who casts into a view, and a number for all that its map shows. A lamp casts no shadow of its own light.
-fn casters_of(objects: &Objects, lamp: Entity, view: &views::View, clip: Mat4, place: [u32; 3]) -> (Vec<Caster>, u64) {
+fn casters_of(
+    objects: &Objects,
+    lamp: Entity,
+    view: &views::View,
+    clip: Mat4,
+    place: [u32; 3],
+) -> (Vec<Caster>, u64) {
     let rows = view.clip_from_frame.transpose();
     // Casters between the light and its near plane are kept out, those before an orthographic view's are none.
     let planes = [
@@ -371,7 +385,8 @@ impl OnDevice {
     }
 
     fn casters(&self, gpu: &Gpu, objects: &wgpu::Buffer) -> wgpu::BindGroup {
-        let matrix = wgpu::BufferBinding { buffer: &self.matrices, offset: 0, size: wgpu::BufferSize::new(64) };
+        let matrix =
+            wgpu::BufferBinding { buffer: &self.matrices, offset: 0, size: wgpu::BufferSize::new(64) };
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("shadow casters"),
             layout: &self.caster_layout,

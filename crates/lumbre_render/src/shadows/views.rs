@@ -99,7 +99,13 @@ fn wanted(lamp: &Lamp, seen: &Seen) -> f64 {
 fn cone(lamp: &Lamp, seen: &Seen) -> View {
     let tangent = lamp.cone.clamp(1e-3, WIDEST_CONE).tan() * (1.0 + BORDER);
     let clip_from_frame = perspective(tangent, NEAR) * view_from_frame(basis(lamp.axis), lamp.position);
-    View { clip_from_frame, width: 2.0 * tangent, near_or_depth: NEAR, end: f64::INFINITY, wanted: wanted(lamp, seen) }
+    View {
+        clip_from_frame,
+        width: 2.0 * tangent,
+        near_or_depth: NEAR,
+        end: f64::INFINITY,
+        wanted: wanted(lamp, seen),
+    }
 }
 
 fn cube(lamp: &Lamp, seen: &Seen) -> [View; 6] {
@@ -251,7 +257,9 @@ mod tests {
             begin = cascade.end;
         }
         // A point of the world falls on the same part of a texel wherever the camera stands.
-        let moved = views(&sun, &Seen { view: CameraView { eye: seen.view.eye + DVec3::new(0.123, 0.01, -0.2), ..seen.view }, ..seen });
+        let mut elsewhere = seen;
+        elsewhere.view.eye += DVec3::new(0.123, 0.01, -0.2);
+        let moved = views(&sun, &elsewhere);
         for (a, b) in cascades.iter().zip(&moved) {
             let texels = |view: &View| {
                 let clip = view.clip_from_frame.project_point3(DVec3::new(0.3, 0.7, 0.1));
