@@ -54,6 +54,8 @@ pub struct LumbrePlugin {
 
 impl Plugin for LumbrePlugin {
     fn build(&self, app: &mut App) {
+        // A scene is copied into the World by what is registered; without Bevy's feature `reflect_auto_register` nobody else does it.
+        app.register_type::<Lightmap>().register_type::<IrradianceVolume>().register_type::<LightProbe>();
         let handler = Box::new(Handler { plugin: *self, lights: Vec::new(), mapped: Vec::new() });
         let Some(handlers) = app.world().get_resource::<GltfExtensionHandlers>() else {
             error!("LumbrePlugin found no glTF loader: add it after DefaultPlugins (with Bevy's feature bevy_gltf)");
@@ -191,9 +193,9 @@ impl GltfExtensionHandler for Handler {
     ) {
         for (node, image) in std::mem::take(&mut self.mapped) {
             // A primitive is a child with a mesh; nodes below have none themselves.
-            let below: Vec<Entity> =
-                world.get::<Children>(node).map_or_else(Vec::new, |all| all.iter().collect());
-            for child in below.into_iter().filter(|child| world.get::<Mesh3d>(*child).is_some()) {
+            let below = world.get::<Children>(node).into_iter().flat_map(|all| all.iter());
+            let meshes: Vec<Entity> = below.filter(|child| world.get::<Mesh3d>(*child).is_some()).collect();
+            for child in meshes {
                 let lightmap = Lightmap {
                     image: image.clone(),
                     uv_rect: Rect::new(0.0, 0.0, 1.0, 1.0),
