@@ -11,13 +11,14 @@ use bevy::app::{AppExit, ScheduleRunnerPlugin};
 use bevy::asset::{AssetPlugin, LoadState, RecursiveDependencyLoadState, UnapprovedPathMode};
 use bevy::camera::primitives::{Aabb, CascadesFrusta, CubemapFrusta, Frustum};
 use bevy::camera::visibility::{
-    CascadesVisibleEntities, CubemapVisibleEntities, DynamicSkinnedMeshBounds, NoFrustumCulling, VisibilityClass,
-    VisibleEntities, VisibleMeshEntities,
+    CascadesVisibleEntities, CubemapVisibleEntities, DynamicSkinnedMeshBounds, NoFrustumCulling,
+    VisibilityClass, VisibleEntities, VisibleMeshEntities,
 };
 use bevy::camera::{CameraMainTextureUsages, Hdr, RenderTarget};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::gltf::{
-    GltfExtras, GltfMaterialExtras, GltfMaterialName, GltfMeshExtras, GltfMeshName, GltfSceneExtras, GltfSceneName,
+    GltfExtras, GltfMaterialExtras, GltfMaterialName, GltfMeshExtras, GltfMeshName, GltfSceneExtras,
+    GltfSceneName,
 };
 use bevy::light::{CascadeShadowConfig, Cascades, GlobalAmbientLight};
 use bevy::mesh::morph::MorphWeights;
@@ -26,9 +27,9 @@ use bevy::pbr::Lightmap;
 use bevy::prelude::*;
 use bevy::render::render_resource::TextureFormat;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy::transform::components::TransformTreeChanged;
 use bevy::window::ExitCondition;
 use half::f16;
-use bevy::transform::components::TransformTreeChanged;
 use lumbre_bevy::LumbrePlugin;
 
 /// Frames after everything is loaded and before the picture: pipelines are compiled and textures uploaded meanwhile.
@@ -71,11 +72,8 @@ fn main() -> AppExit {
     let name = level.file_name().unwrap_or_default().to_string_lossy().into_owned();
 
     let mut app = App::new();
-    let files = AssetPlugin {
-        file_path: folder,
-        unapproved_path_mode: UnapprovedPathMode::Forbid,
-        ..default()
-    };
+    let files =
+        AssetPlugin { file_path: folder, unapproved_path_mode: UnapprovedPathMode::Forbid, ..default() };
     let no_window =
         WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
     app.add_plugins((
@@ -101,10 +99,34 @@ fn register(app: &mut App) {
     macro_rules! types {
         ($($kind:ty),* $(,)?) => { $(app.register_type::<$kind>();)* };
     }
-    types!(ChildOf, Children, Name, Transform, GlobalTransform, TransformTreeChanged, Visibility, InheritedVisibility, ViewVisibility);
+    types!(
+        ChildOf,
+        Children,
+        Name,
+        Transform,
+        GlobalTransform,
+        TransformTreeChanged,
+        Visibility,
+        InheritedVisibility,
+        ViewVisibility
+    );
     types!(Mesh3d, Aabb, GltfExtras, GltfSceneExtras, GltfMeshExtras, GltfMeshName, GltfMaterialExtras);
-    types!(GltfMaterialName, GltfSceneName, SkinnedMesh, DynamicSkinnedMeshBounds, NoFrustumCulling, MorphWeights);
-    types!(PointLight, SpotLight, DirectionalLight, CubemapFrusta, CubemapVisibleEntities, VisibleMeshEntities);
+    types!(
+        GltfMaterialName,
+        GltfSceneName,
+        SkinnedMesh,
+        DynamicSkinnedMeshBounds,
+        NoFrustumCulling,
+        MorphWeights
+    );
+    types!(
+        PointLight,
+        SpotLight,
+        DirectionalLight,
+        CubemapFrusta,
+        CubemapVisibleEntities,
+        VisibleMeshEntities
+    );
     types!(Cascades, CascadesFrusta, CascadeShadowConfig, CascadesVisibleEntities, Frustum, VisibleEntities);
     types!(Camera, Camera3d, Projection, CameraMainTextureUsages, RenderTarget, VisibilityClass);
 }
@@ -128,7 +150,9 @@ fn advance(
             } else if let RecursiveDependencyLoadState::Failed(error) =
                 assets.recursive_dependency_load_state(&asked.scene)
             {
-                error!("{error}; are the .ktx2 images beside the file? `lumbre bake … --ktx2 rgb9e5` writes them");
+                error!(
+                    "{error}; are the .ktx2 images beside the file? `lumbre bake … --ktx2 rgb9e5` writes them"
+                );
                 exit.write(AppExit::error());
             } else if assets.is_loaded_with_dependencies(&asked.scene) && !cameras.is_empty() {
                 *step = Step::Settling(0);

@@ -58,13 +58,17 @@ impl Plugin for LumbrePlugin {
         app.register_type::<Lightmap>().register_type::<IrradianceVolume>().register_type::<LightProbe>();
         let handler = Box::new(Handler { plugin: *self, lights: Vec::new(), mapped: Vec::new() });
         let Some(handlers) = app.world().get_resource::<GltfExtensionHandlers>() else {
-            error!("LumbrePlugin found no glTF loader: add it after DefaultPlugins (with Bevy's feature bevy_gltf)");
+            error!(
+                "LumbrePlugin found no glTF loader: add it after DefaultPlugins (with Bevy's feature bevy_gltf)"
+            );
             return;
         };
         // On the web nothing else runs that could hold the lock.
         match handlers.0.try_write() {
             Some(mut list) => list.push(handler),
-            None => error!("LumbrePlugin: a glTF file is being loaded already; add the plugin before the app runs"),
+            None => error!(
+                "LumbrePlugin: a glTF file is being loaded already; add the plugin before the app runs"
+            ),
         }
     }
 
