@@ -6,7 +6,7 @@
 // A texel of a lightmap is E/π: irradiance over π, in the units of radiance that KHR_lights_punctual gives a frame. three.js wants irradiance
 // in `material.lightMap`, so its intensity is π.
 
-import { LinearFilter, LoaderUtils, NoColorSpace } from 'three';
+import { LinearFilter, LoaderUtils, NoColorSpace, ShaderChunk } from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 
 const NAME = 'LUMBRE_lightmap';
@@ -16,9 +16,9 @@ export class LumbreLightmapPlugin {
 
 	// ktx2Loader: a KTX2Loader on which detectSupport() was called; then the .ktx2 images beside the OpenEXR ones are taken
 	//   (`lumbre bake --ktx2 rgb9e5`): four bytes a texel instead of eight.
-	// staticLights: 'off' switches lights off whose light is in the lightmaps, 'on' leaves them shining, and counts their light twice on
-	//   lightmapped meshes.
-	constructor( parser, { ktx2Loader = null, staticLights = 'off' } = {} ) {
+	// staticLights: lights whose light is in the lightmaps shine on what has none, such as characters, and leave their highlights on what has one; 'off'
+	//   switches them off, which is quicker.
+	constructor( parser, { ktx2Loader = null, staticLights = 'on' } = {} ) {
 
 		this.name = NAME;
 		this.parser = parser;
@@ -26,6 +26,7 @@ export class LumbreLightmapPlugin {
 		this.staticLights = staticLights;
 		this.textures = new Map();
 		this.materials = new Map();
+		this.bakedLights = new BakedLights();
 
 	}
 
@@ -50,7 +51,7 @@ export class LumbreLightmapPlugin {
 		}
 
 		await Promise.all( pending );
-		if ( lightmapped && this.staticLights === 'off' ) this.switchStaticLightsOff( gltf );
+		if ( lightmapped ) this.markLights( gltf );
 
 	}
 
@@ -84,6 +85,7 @@ export class LumbreLightmapPlugin {
 		// Nodes share materials and not lightmaps.
 		const materials = [].concat( mesh.material ).map( ( material ) => this.lit( material, lightMap ) );
 		mesh.material = Array.isArray( mesh.material ) ? materials : materials[ 0 ];
+		this.bakedLights.watch( mesh );
 
 	}
 
@@ -95,6 +97,7 @@ export class LumbreLightmapPlugin {
 			const lit = material.clone();
 			lit.lightMap = lightMap;
 			lit.lightMapIntensity = Math.PI;
+			this.bakedLights.leaveOut( lit );
 			this.materials.set( key, lit );
 
 		}
@@ -139,8 +142,8 @@ export class LumbreLightmapPlugin {
 
 	}
 
-	// What a light that was baked would add again. three.js cannot keep its highlight without its diffuse light.
-	switchStaticLightsOff( gltf ) {
+	// Which lights are in the maps, and which are off.
+	markLights( gltf ) {
 
 		const lights = this.parser.json.extensions?.KHR_lights_punctual?.lights ?? [];
 
@@ -154,7 +157,9 @@ export class LumbreLightmapPlugin {
 				const index = node?.extensions?.KHR_lights_punctual?.light;
 				const light = index === undefined ? null : lights[ index ];
 				const phong = light?.extensions?.[ LIGHTS ];
-				if ( phong?.enabled === false || ( light && ( phong?.bake ?? 'static' ) === 'static' ) ) object.visible = false;
+				const baked = light && ( phong?.bake ?? 'static' ) === 'static';
+				if ( phong?.enabled === false || ( baked && this.staticLights === 'off' ) ) object.visible = false;
+				else if ( baked ) this.bakedLights.lights.add( object );
 
 			} );
 
@@ -163,3 +168,79 @@ export class LumbreLightmapPlugin {
 	}
 
 }
+
+const KINDS = [ 'Point', 'Spot', 'Dir' ];
+
+// Takes the diffuse light of baked lights off lightmapped materials, and leaves their highlights. three.js numbers lights of a kind anew in each
+// frame; a bit of a mask says of each number whether that light is baked.
+class BakedLights {
+
+	constructor() {
+
+		this.lights = new Set();
+		this.materials = new Set();
+		this.masks = { value: [ 0, 0, 0 ] };
+		this.seen = { frame: - 1, camera: null };
+
+	}
+
+	leaveOut( material ) {
+
+		const before = material.onBeforeCompile, key = material.customProgramCacheKey();
+		material.onBeforeCompile = ( shader, renderer ) => {
+
+			before.call( material, shader, renderer );
+			shader.uniforms.bakedLights = this.masks;
+			shader.fragmentShader = `uniform ivec3 bakedLights;\n${ shader.fragmentShader }`
+				.replace( '#include <lights_fragment_begin>', WITHOUT_BAKED_LIGHTS );
+
+		};
+
+		material.customProgramCacheKey = () => `${ key } without the diffuse light of baked lights`;
+		this.materials.add( material );
+
+	}
+
+	// Keeps the masks up to date while a mesh is drawn.
+	watch( mesh ) {
+
+		const before = mesh.onBeforeRender;
+		mesh.onBeforeRender = ( renderer, scene, camera, ...more ) => {
+
+			before.call( mesh, renderer, scene, camera, ...more );
+			const { frame } = renderer.info.render;
+			if ( this.seen.frame === frame && this.seen.camera === camera ) return;
+			this.seen = { frame, camera };
+			const masks = this.masksOf( scene, camera );
+			if ( masks.every( ( mask, kind ) => mask === this.masks.value[ kind ] ) ) return;
+			this.masks.value = masks;
+			for ( const material of this.materials ) material.needsUpdate = true;
+
+		};
+
+	}
+
+	masksOf( scene, camera ) {
+
+		const lights = [];
+		scene.traverseVisible( ( object ) => { if ( object.isLight && object.layers.test( camera.layers ) ) lights.push( object ); } );
+		// The order that WebGLLights brings them into.
+		const rank = ( light ) => ( light.castShadow ? 2 : 0 ) + ( light.map ? 1 : 0 );
+		lights.sort( ( a, b ) => rank( b ) - rank( a ) );
+		return [ 'isPointLight', 'isSpotLight', 'isDirectionalLight' ].map( ( kind ) =>
+			lights.filter( ( light ) => light[ kind ] ).reduce( ( mask, light, number ) => number < 32 && this.lights.has( light ) ? mask | 1 << number : mask, 0 ) );
+
+	}
+
+}
+
+// Each loop over lights of a kind, with what it adds to the diffuse light taken back where the light is baked.
+const WITHOUT_BAKED_LIGHTS = KINDS.reduce( ( chunk, kind, place ) => {
+
+	const [ before, ...loop ] = chunk.split( `i < NUM_${ kind.toUpperCase() }_LIGHTS; i ++` );
+	return before + loop.map( ( text ) => `i < NUM_${ kind.toUpperCase() }_LIGHTS; i ++` + text.replace( /RE_Direct\( .*\);/, ( call ) =>
+		`vec3 before${ kind }_UNROLLED_LOOP_INDEX = reflectedLight.directDiffuse;
+		${ call }
+		if ( ( bakedLights[ ${ place } ] >> UNROLLED_LOOP_INDEX & 1 ) == 1 ) reflectedLight.directDiffuse = before${ kind }_UNROLLED_LOOP_INDEX;` ) ).join( '' );
+
+}, ShaderChunk.lights_fragment_begin );

@@ -3,6 +3,7 @@
 
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { KTX2Loader } from 'three/addons/loaders/KTX2Loader.js';
 import { LumbreLightmapPlugin } from './lumbre-lightmap.js';
@@ -17,6 +18,8 @@ renderer.toneMappingExposure = Number( asked.get( 'exposure' ) ?? 1 );
 document.body.append( renderer.domElement );
 
 const loader = new GLTFLoader();
+// Meshes without lightmaps, such as characters, stay compressed in a baked file if they were.
+loader.setDRACOLoader( new DRACOLoader().setDecoderPath( './node_modules/three/examples/jsm/libs/draco/gltf/' ) );
 const ktx2Loader = asked.get( 'lightmaps' ) === 'ktx2' ? new KTX2Loader().detectSupport( renderer ) : null;
 loader.register( ( parser ) => new LumbreLightmapPlugin( parser, { ktx2Loader } ) );
 

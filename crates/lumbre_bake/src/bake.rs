@@ -25,7 +25,7 @@ use crate::texels::gather::{REPLICATES, RadianceCache};
 use crate::texels::hidden::remove_hidden;
 use crate::texels::resolution_error::{DensePoint, Light, compare};
 use crate::texels::rounds::{Bounced, Receivers};
-use crate::texels::seams::{Maps, close_seams};
+use crate::texels::seams::{Maps, Patience, close_seams};
 use crate::texels::straddling::{crossed, straddling};
 use crate::texels::worst_places::worst_places;
 use crate::texels::{lighting, rounds};
@@ -191,24 +191,23 @@ fn run(
     watch.stage(Stage::DirectLight, &mut report)?;
     let (mut texels, charts, crossed) =
         watch.during(0.0, || (footprints(&scene, &layout), charts(&scene), crossed(&scene, &layout)))?;
-    let touched: Vec<usize> = straddling(&layout, &texels, &crossed)
-        .iter()
-        .map(|straddling| texels[straddling.texel as usize].index as usize)
-        .collect();
-    let (hidden, rays) = watch.during(0.0, || {
-        remove_hidden(&scene, &layout, &mut texels, crossed.iter().map(|(place, _)| *place), &touched)
+    let touched: Vec<usize> = watch.during(0.0, || {
+        let divided = straddling(&layout, &texels, &crossed);
+        divided.iter().map(|straddling| texels[straddling.texel as usize].index as usize).collect()
     })?;
-    (report.hidden_texels, report.rays) = (hidden, rays);
+    let crossed_places = crossed.iter().map(|(place, _)| *place);
+    (report.hidden_texels, report.rays) =
+        remove_hidden(&scene, &layout, &mut texels, crossed_places, &touched, &mut watch)?;
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
     let side = texel_side(&scene, &texels);
-    let resolution = watch.during(0.0, || {
+    let resolution = watch.during(1.0, || {
         memory::resolution(&scene, &layout, &texels, side, for_samples, options, &mut report)
     })??;
     let find = |u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels);
-    let changes = watch.during(0.0, || usable.map(find))?;
+    let changes = watch.during(1.0, || usable.map(find))?;
     let known = |changes: &Changes<'_>| changes.known_direct(&sources, &texels, &charts);
-    let known = watch.during(0.0, || changes.as_ref().map_or_else(Vec::new, known))?;
+    let known = watch.during(1.0, || changes.as_ref().map_or_else(Vec::new, known))?;
     let (direct, local) =
         lighting::direct_light(&sources, &layout, &texels, &charts, &known, options, &mut watch)?;
     let relit = |index: usize| known.get(index).is_none_or(Option::is_none);
@@ -236,7 +235,7 @@ fn run(
         }
         Some(exchange) => {
             watch.stage(Stage::FinalGather, &mut report)?;
-            let straddling = straddling(&layout, &texels, &crossed);
+            let straddling = watch.during(0.0, || straddling(&layout, &texels, &crossed))?;
             let [_, samples, _] = options.effort().direct;
             let (divided, rays) = watch
                 .during(0.0, || DividedLight::new(&sources, &texels, &straddling, (samples, options.seed)))?;
@@ -374,7 +373,8 @@ fn note_seams(
         report.skipped.push("seams: switched off".into());
         return Ok(());
     }
-    let closed = watch.during(0.0, || close_seams(maps, filled))?;
+    let patience = if watch.clock().late() { Patience::LATE } else { Patience::WHOLE };
+    let closed = watch.during(0.0, || close_seams(maps, filled, patience))?;
     report.rays += closed.rays;
     report.warnings.extend(closed.warning);
     match closed.report {

@@ -99,6 +99,11 @@ impl Clock {
         self.before + self.begun.elapsed().as_secs_f64()
     }
 
+    /// The same clock with a share of the limit.
+    pub fn until(&self, share: f64) -> Self {
+        Self { limit: self.limit.map(|limit| limit.mul_f64(share)), ..*self }
+    }
+
     /// Whether the time is up.
     pub fn late(&self) -> bool {
         self.limit.is_some_and(|limit| self.seconds() >= limit.as_secs_f64())
@@ -147,8 +152,7 @@ impl<'a> Watch<'a> {
 
     /// The time as it is, to be asked from other threads: the running stage's share of it.
     pub fn clock(&self) -> Clock {
-        let share = self.running().share().of_limit;
-        Clock { limit: self.clock.limit.map(|limit| limit.mul_f64(share)), ..self.clock }
+        self.clock.until(self.running().share().of_limit)
     }
 
     /// Seconds since the bake began.

@@ -85,6 +85,39 @@ fn wherever_the_time_runs_out_the_map_is_complete() {
     }
 }
 
+/// A box that is sunk into a floor hides a quarter of it: many more texels than are looked at closely whatever the time.
+#[test]
+fn what_a_large_map_hides_is_told_without_any_time() {
+    let shown = |time| {
+        let mut world = World::new();
+        let mut add = |size: Vec3, height: f64, name: &str| {
+            let mesh = Mesh(Arc::new(lumbre_mesh::shapes::cuboid(size, 1)));
+            let place = Transform::from_xyz(0.0, height, 0.0);
+            world.spawn((Name::new(name.to_owned()), mesh, Material::default(), StaticObject, place));
+        };
+        add(Vec3::new(4.0, 0.2, 4.0), -0.1, "floor");
+        add(Vec3::new(2.0, 1.0, 2.0), 0.0, "box");
+        let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
+        world.spawn((light, Transform::from_xyz(1.5, 2.0, 1.0)));
+        let options = BakeOptions {
+            density: Density::TexelsPerMeter(50.0),
+            quality: Quality::Draft,
+            error: 0.2,
+            time,
+            ..options()
+        };
+        let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+        (texels(&mut world).len(), report)
+    };
+    let (closely, report) = shown(None);
+    assert!(report.hidden_texels > 9_000, "{}", report.hidden_texels);
+    let (roughly, report) = shown(Some(Duration::from_nanos(1)));
+    assert_eq!(report.ended, Ended::Time);
+    // What may differ is the box's outline on the floor.
+    let apart = closely.abs_diff(roughly);
+    assert!(apart < 800, "{closely} texels show something, or {roughly}");
+}
+
 #[test]
 fn the_end_is_named() {
     let end = |options: BakeOptions| baked(&options, &mut |_| ControlFlow::Continue(())).1;

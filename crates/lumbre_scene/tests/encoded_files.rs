@@ -257,17 +257,30 @@ const SLOWEST: Duration = Duration::from_secs(5);
 
 #[test]
 fn no_mutant_panics_hangs_or_fills_the_memory() {
+    load_mutants(0..3_500);
+}
+
+/// Of each file as many as are asked of a decoder: most have a path through it of their own.
+#[test]
+#[ignore = "slow: scripts/test --all runs it"]
+fn none_of_ten_thousand_mutants_of_each_file_does() {
+    load_mutants(0..10_000);
+}
+
+/// Loads mutants of every file, of these seeds.
+fn load_mutants(seeds: std::ops::Range<u64>) {
+    let [plain, plain_zstandard] = [false, true].map(|zstandard| plain_ktx2(37, 4, zstandard).0);
     let instances = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3)).glb();
     let meshes = MESHES.map(|(name, bytes, expected)| (name, bytes, Some(expected)));
     let pictures = PICTURES.map(|(name, bytes, _)| (name, bytes, None));
     let _alone = MEASURING.lock();
     let limits = LoadLimits { image_side: 256, ..LoadLimits::default() };
     let whole = [("instances", &instances[..], None)];
-    for (name, original, expected) in meshes.into_iter().chain(pictures).chain(whole) {
+    let plain = [("plain.ktx2", &plain[..], None), ("plain_zstandard.ktx2", &plain_zstandard[..], None)];
+    for (name, original, expected) in meshes.into_iter().chain(pictures).chain(plain).chain(whole) {
         let expected: Option<Value> = expected.map(|expected| serde_json::from_slice(expected).unwrap());
         let (mut loaded, mut refused, mut largest, mut slowest) = (0, 0, 0, Duration::ZERO);
-        // Ten thousand and more for each of the three decoders.
-        for seed in 0..3_500u64 {
+        for seed in seeds.clone() {
             let bytes = mutant(original, seed);
             let file = match &expected {
                 Some(expected) => compressed_mesh(&bytes, expected).glb(),

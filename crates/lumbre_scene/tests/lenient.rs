@@ -124,6 +124,64 @@ fn textures_that_cannot_be_decoded_are_white() {
 }
 
 #[test]
+fn a_compressed_picture_that_cannot_be_decoded_makes_way_for_the_plain_one() {
+    let basis =
+        |source: usize| json!({"source": 0, "extensions": {"KHR_texture_basisu": {"source": source}}});
+    let ktx2 = |bytes: &'static [u8], texture: fn(&mut File)| {
+        textured(move |file| {
+            let view = file.view(bytes);
+            file.push("images", json!({"name": "packed", "bufferView": view, "mimeType": "image/ktx2"}));
+            file.root["extensionsUsed"] = json!(["KHR_texture_basisu"]);
+            file.root["textures"][0] = basis(1);
+            texture(file);
+        })
+    };
+    let sizes = |world: &mut World| -> Vec<(u32, u32)> {
+        let mut textures = world.query::<&MaterialTextures>();
+        let image = |textures: &MaterialTextures| textures.base_color.as_ref().unwrap().image.clone();
+        textures.iter(world).map(|own| (image(own).width, image(own).height)).collect()
+    };
+    // The identifier of KTX2, and nothing that follows it.
+    let damaged: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n0000";
+    let said = "images[1] (packed): cannot be decoded as KTX2";
+    let (mut world, report) = repaired(&ktx2(damaged, |_| {}), said);
+    assert_eq!(sizes(&mut world), [(4, 4)]);
+    let notes: Vec<String> = report.notes.iter().map(ToString::to_string).collect();
+    assert!(
+        notes.iter().any(|note| note.contains("images[0], the texture's own source, stands in")),
+        "{notes:?}"
+    );
+
+    // A second texture has no other: white.
+    let (mut world, _) = repaired(
+        &ktx2(damaged, |file| {
+            file.push("textures", json!({"extensions": {"KHR_texture_basisu": {"source": 1}}}));
+            file.push("materials", json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}));
+            let mut second = file.root["meshes"][0]["primitives"][0].clone();
+            second["material"] = 1.into();
+            file.root["meshes"][0]["primitives"].as_array_mut().unwrap().push(second);
+        }),
+        said,
+    );
+    assert_eq!(sizes(&mut world), [(4, 4), (1, 1)]);
+
+    // An index of none.
+    let none = textured(|file| file.root["textures"][0] = basis(7));
+    assert_eq!(sizes(&mut repaired(&none, "images[7]").0), [(4, 4)]);
+
+    // Both are damaged.
+    let both = ktx2(damaged, |file| file.binary[8..16].fill(0));
+    assert_eq!(sizes(&mut repaired(&both, "images[0] (wall): ").0), [(1, 1)]);
+
+    // One that is whole is taken, and the other is not looked at.
+    let whole: &[u8] = include_bytes!("encoded/uastc.ktx2");
+    let bytes = ktx2(whole, |file| file.binary[8..16].fill(0));
+    let (mut world, report) = support::load_bytes(&bytes).unwrap();
+    assert_eq!(sizes(&mut world), [(22, 17)]);
+    assert!(report.notes.is_empty(), "{:?}", report.notes);
+}
+
+#[test]
 fn versions_and_padding_that_are_missing() {
     let mut file = File::new();
     file.square(|_, _| {});

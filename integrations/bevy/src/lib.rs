@@ -54,15 +54,21 @@ pub struct LumbrePlugin {
 
 impl Plugin for LumbrePlugin {
     fn build(&self, app: &mut App) {
+        // A scene is copied into the World by what is registered; without Bevy's feature `reflect_auto_register` nobody else does it.
+        app.register_type::<Lightmap>().register_type::<IrradianceVolume>().register_type::<LightProbe>();
         let handler = Box::new(Handler { plugin: *self, lights: Vec::new(), mapped: Vec::new() });
         let Some(handlers) = app.world().get_resource::<GltfExtensionHandlers>() else {
-            error!("LumbrePlugin found no glTF loader: add it after DefaultPlugins (with Bevy's feature bevy_gltf)");
+            error!(
+                "LumbrePlugin found no glTF loader: add it after DefaultPlugins (with Bevy's feature bevy_gltf)"
+            );
             return;
         };
         // On the web nothing else runs that could hold the lock.
         match handlers.0.try_write() {
             Some(mut list) => list.push(handler),
-            None => error!("LumbrePlugin: a glTF file is being loaded already; add the plugin before the app runs"),
+            None => error!(
+                "LumbrePlugin: a glTF file is being loaded already; add the plugin before the app runs"
+            ),
         }
     }
 
@@ -191,9 +197,9 @@ impl GltfExtensionHandler for Handler {
     ) {
         for (node, image) in std::mem::take(&mut self.mapped) {
             // A primitive is a child with a mesh; nodes below have none themselves.
-            let below: Vec<Entity> =
-                world.get::<Children>(node).map_or_else(Vec::new, |all| all.iter().collect());
-            for child in below.into_iter().filter(|child| world.get::<Mesh3d>(*child).is_some()) {
+            let below = world.get::<Children>(node).into_iter().flat_map(|all| all.iter());
+            let meshes: Vec<Entity> = below.filter(|child| world.get::<Mesh3d>(*child).is_some()).collect();
+            for child in meshes {
                 let lightmap = Lightmap {
                     image: image.clone(),
                     uv_rect: Rect::new(0.0, 0.0, 1.0, 1.0),

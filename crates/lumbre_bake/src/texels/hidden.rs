@@ -1,12 +1,16 @@
 //! Texels that lie, wholly or in part, inside other geometry or pressed against it: told by rays that meet the insides of things, or
 //! meet something at once. The hidden part is taken out of the footprint, so that a texel half under a box has the light of its open half.
-//! What a texel shows belongs to the map and not to the light: it is the same for every seed.
+//! What a texel shows belongs to the map and not to the light: it is the same for every seed, as long as there is time to look closely.
 
 use glam::Vec2;
 use rayon::prelude::*;
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::tiles::{Tiles, area, positions_of};
+use crate::BakeError;
+use crate::checkpoint::record::fields;
+use crate::chunks::in_chunks;
+use crate::progress::{Clock, Watch};
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::transport::box_tree::BoxTree;
@@ -21,20 +25,34 @@ const PRESSED: f32 = 1.0 / 64.0;
 /// Rays that look for something odd in every texel, and in a tile that nothing crosses, and those that judge a point of an odd one.
 const PROBES: u32 = 6;
 const TILE_PROBES: u32 = 16;
+/// Those of a texel when it has to go fast.
+const LATE_PROBES: u32 = 2;
 const JUDGES: u32 = 8;
 /// So many of those that judge have to see something: where faces touch, one may slip out along them.
 const CLEAR: u32 = 2;
 
+/// Of the time until the running stage takes no more samples, what may pass before texels are judged roughly: light wants some of it, too.
+const CLOSELY: f64 = 0.5;
+/// So many texels are looked at as closely as ever, whatever time it takes: no small map loses anything.
+const ALWAYS_CLOSELY: usize = 4096;
+/// Of the running stage's time, what it usually takes to find texels that look odd, and of the rest, to judge them.
+const PASSES: [f32; 2] = [0.1, 0.2];
+
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. Contact lines cross the
 /// texels that are `crossed`, and divide those that are `touched`: places in the row of all maps.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
 pub(crate) fn remove_hidden(
     scene: &BakeScene,
     layout: &LightmapLayout,
     texels: &mut [Texel],
     crossed: impl Iterator<Item = usize>,
     touched: &[usize],
-) -> (usize, u64) {
-    let (odd, mut rays) = odd(scene, texels);
+    watch: &mut Watch<'_>,
+) -> Result<(usize, u64), BakeError> {
+    let clock = watch.clock().until(CLOSELY);
+    let (odd, mut rays) = odd(scene, texels, clock, watch)?;
     // Six rays may miss a corner of a texel; its neighbours' rays did not.
     let mut near = vec![false; layout.texels];
     touched.iter().for_each(|&index| near[index] = true);
@@ -48,13 +66,23 @@ pub(crate) fn remove_hidden(
             }
         }
     }
-    let (hidden, judged) = texels
-        .par_iter_mut()
-        .filter(|texel| near[texel.index as usize] && !scene.stop.is_set())
-        .map(|texel| judge(scene, texel, mixed[texel.index as usize]))
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    rays += judged;
-    (hidden, rays)
+    let mut suspects: Vec<&mut Texel> =
+        texels.iter_mut().filter(|texel| near[texel.index as usize]).collect();
+    watch.pass(PASSES[1]);
+    let judged = in_chunks(suspects.len(), watch, |place| {
+        let texel = &*suspects[place];
+        if place >= ALWAYS_CLOSELY && clock.late() {
+            judge_roughly(scene, texel)
+        } else {
+            judge(scene, texel, mixed[texel.index as usize])
+        }
+    })?;
+    rays += judged.iter().map(|judged| u64::from(judged.rays)).sum::<u64>();
+    let hidden = watch.during(1.0, || {
+        let pairs = suspects.par_iter_mut().zip(&judged);
+        pairs.map(|(texel, judged)| usize::from(keep_open(scene, texel, judged))).sum()
+    })?;
+    Ok((hidden, rays))
 }
 
 /// Rays that end before this go nowhere, canonical units.
@@ -66,10 +94,29 @@ fn pressed(scene: &BakeScene, texel: &Texel) -> f32 {
 
 /// Texels that look odd, and the rays cast. Where nothing crosses the space before a tile, all of it is inside of something or none of it:
 /// some rays of the whole tile tell.
-fn odd(scene: &BakeScene, texels: &[Texel]) -> (Vec<bool>, u64) {
+fn odd(
+    scene: &BakeScene,
+    texels: &[Texel],
+    clock: Clock,
+    watch: &mut Watch<'_>,
+) -> Result<(Vec<bool>, u64), BakeError> {
     let tiles = Tiles::new(texels);
+    let suspect = watch.during(0.0, || suspect(scene, texels, &tiles))?;
+    let suspects = |place: usize| suspect[tiles.tile_of[place] as usize];
+    watch.pass(PASSES[0]);
+    let odd = in_chunks(texels.len(), watch, |place| {
+        let probes = if place >= ALWAYS_CLOSELY && clock.late() { LATE_PROBES } else { PROBES };
+        suspects(place) && looks_odd(scene, &texels[place], probes)
+    })?;
+    let asked = (0..texels.len()).filter(|&place| suspects(place)).count();
+    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + asked as u64 * u64::from(PROBES);
+    Ok((odd, rays))
+}
+
+/// Of each tile, whether its texels have to be looked at one by one.
+fn suspect(scene: &BakeScene, texels: &[Texel], tiles: &Tiles) -> Vec<bool> {
     let tree = BoxTree::new(&scene.triangles, &scene.stop);
-    let suspect: Vec<bool> = tiles
+    tiles
         .members
         .par_iter()
         .map(|members| {
@@ -86,16 +133,7 @@ fn odd(scene: &BakeScene, texels: &[Texel]) -> (Vec<bool>, u64) {
             let fine = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;
             !(free && of_tile.enumerate().all(fine))
         })
-        .collect();
-    let suspects = |place: usize| suspect[tiles.tile_of[place] as usize];
-    let odd: Vec<bool> = texels
-        .par_iter()
-        .enumerate()
-        .map(|(place, texel)| suspects(place) && !scene.stop.is_set() && looks_odd(scene, texel))
-        .collect();
-    let asked = (0..texels.len()).filter(|&place| suspects(place)).count();
-    let rays = tiles.members.len() as u64 * u64::from(TILE_PROBES) + asked as u64 * u64::from(PROBES);
-    (odd, rays)
+        .collect()
 }
 
 /// What a ray of a texel meets.
@@ -120,9 +158,9 @@ fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
     }
 }
 
-fn looks_odd(scene: &BakeScene, texel: &Texel) -> bool {
+fn looks_odd(scene: &BakeScene, texel: &Texel, probes: u32) -> bool {
     let mut ended = 0;
-    (0..PROBES).any(|ray| match probe(scene, texel, ray) {
+    (0..probes).any(|ray| match probe(scene, texel, ray) {
         Probe::Hidden => true,
         // One may end so in any corner.
         Probe::Pressed => {
@@ -133,45 +171,85 @@ fn looks_odd(scene: &BakeScene, texel: &Texel) -> bool {
     })
 }
 
-/// Keeps the points of a texel that are in the open. Returns 1 if some are not, and the rays cast. Between contact lines a surface is hidden or
-/// is not: in a texel that is not `mixed`, having none, the corners and the middle tell for all, if they agree.
-fn judge(scene: &BakeScene, texel: &mut Texel, mixed: bool) -> (usize, u64) {
+/// What was found out about a texel.
+#[derive(Clone, Debug, Default)]
+struct Judged {
+    /// Whether each of the points of its fine footprint is in the open, bit by bit; empty where all are.
+    open: Vec<u64>,
+    rays: u32,
+}
+
+fields!(Judged { open: Vec<u64>, rays: u32 });
+
+/// The evenly spread points of a texel that are judged, the same ones each time.
+fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> {
     let mut triangles: Vec<u32> = match &texel.footprint {
         Footprint::Whole(triangle) => vec![*triangle],
         Footprint::Points(points) => points.iter().map(|point| point.triangle).collect(),
-        Footprint::Hidden => return (0, 0),
+        Footprint::Hidden => return None,
     };
     triangles.sort_unstable();
     triangles.dedup();
-    let Some(Footprint::Points(points)) = footprint(scene, triangles.into_iter(), texel.x, texel.y, FINE)
-    else {
-        return (0, 0);
-    };
+    match footprint(scene, triangles.into_iter(), texel.x, texel.y, FINE) {
+        Some(Footprint::Points(points)) => Some(points),
+        _ => None,
+    }
+}
+
+/// Which points of a texel are in the open. Between contact lines a surface is hidden or is not: in a texel that is not `mixed`, having none,
+/// the corners and the middle tell for all, if they agree.
+fn judge(scene: &BakeScene, texel: &Texel, mixed: bool) -> Judged {
+    let Some(points) = fine_points(scene, texel) else { return Judged::default() };
     let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index);
     let pressed = pressed(scene, texel);
     let mut rays = 0;
     let mut is_open = |index: usize| {
         let (is_open, cast) = in_the_open(scene, &points[index], sequence, index as u32, pressed);
-        rays += u64::from(cast);
+        rays += cast;
         is_open
     };
     let telling = if mixed { Vec::new() } else { corners_and_middle(&points) };
     let told: Vec<bool> = telling.into_iter().map(&mut is_open).collect();
     let agreed = told.first().copied().filter(|first| told.iter().all(|told| told == first));
-    let mut open: Vec<FootprintPoint> = Vec::new();
-    for (index, point) in points.iter().enumerate() {
+    let mut open = vec![0u64; points.len().div_ceil(64)];
+    let mut all = true;
+    for index in 0..points.len() {
         if agreed.unwrap_or_else(|| is_open(index)) {
-            open.push(*point);
+            open[index / 64] |= 1 << (index % 64);
+        } else {
+            all = false;
         }
     }
-    let reduced = open.len() < points.len();
+    if all {
+        open.clear();
+    }
+    Judged { open, rays }
+}
+
+/// All of a texel or nothing of it, by what most of the rays meet that look for something odd.
+fn judge_roughly(scene: &BakeScene, texel: &Texel) -> Judged {
+    let clear = (0..PROBES).filter(|&ray| probe(scene, texel, ray) == Probe::Clear).count();
+    let open = if 2 * clear >= PROBES as usize { Vec::new() } else { vec![0] };
+    Judged { open, rays: PROBES }
+}
+
+/// Keeps the points of a texel that are in the open; whether it has lost some.
+fn keep_open(scene: &BakeScene, texel: &mut Texel, judged: &Judged) -> bool {
+    if judged.open.is_empty() {
+        return false;
+    }
+    let Some(points) = fine_points(scene, texel) else { return false };
+    let is_open =
+        |index: usize| judged.open.get(index / 64).is_some_and(|bits| bits >> (index % 64) & 1 == 1);
+    let open: Vec<FootprintPoint> =
+        points.iter().enumerate().filter(|(index, _)| is_open(*index)).map(|(_, point)| *point).collect();
     if open.is_empty() {
         texel.footprint = Footprint::Hidden;
-    } else if reduced {
+    } else {
         texel.triangle = open[open.len() / 2].triangle;
         texel.footprint = Footprint::Points(open);
     }
-    (usize::from(reduced), rays)
+    true
 }
 
 /// The points of a footprint that are nearest to its square's corners and middle, by index.

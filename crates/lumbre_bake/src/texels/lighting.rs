@@ -32,9 +32,9 @@ pub(crate) fn direct_light(
     let scene = sources.scene;
     let known = |index: u32| known.get(index as usize).copied().flatten();
     let [few, many, most] = options.effort().direct;
-    let mut cuts = watch.during(0.0, || LightCuts::new(sources, texels, charts))?;
+    let mut cuts = watch.during(1.0, || LightCuts::new(sources, texels, charts))?;
     let wanted = |index: u32| known(index).is_none();
-    let shafts = watch.during(0.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
+    let shafts = watch.during(1.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
     // Where rays would have to tell, one to any of the sources tells as much as one to each.
     cuts.share(sources, &shafts.unresolved(&cuts));
     let cuts = cuts;

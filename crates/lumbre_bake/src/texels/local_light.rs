@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::blocks::Blocks;
 use super::footprint::{Texel, receiver};
 use crate::BakeError;
-use crate::chunks::in_chunks_anew;
+use crate::chunks::{in_chunks, in_chunks_anew};
 use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::material::Side;
@@ -19,8 +19,9 @@ use crate::transport::direct::{Direct, Receiver, Sources};
 
 /// Texels along the side of a block that has one number.
 const BLOCK: u32 = 16;
-/// Walks of a block, and most steps of one.
+/// Walks of a block, those when the time is up, and most steps of one.
 const WALKS: u32 = 32;
+const LATE_WALKS: u32 = 4;
 const BOUNCES: u32 = 6;
 /// Things in view that a walk looks at, none of them nearer to the one before than so many texels.
 const VIEW: usize = 2;
@@ -77,9 +78,16 @@ impl LocalLight {
             places[texel.index as usize] = place as u32;
         }
         let level = Level { sources, layout, places, blocks: &blocks, direct };
+        // Kept in the checkpoint, so that a bake which goes on from there judges by the same light.
+        let clock = watch.clock();
+        let late = in_chunks(1, watch, |_| clock.late())?.contains(&true);
         let walks: Vec<Vec<Walk>> = in_chunks_anew(blocks.members.len(), watch, |block| {
             let members = &blocks.members[block];
-            let walks = if members.is_empty() { 0 } else { WALKS };
+            let walks = match late {
+                _ if members.is_empty() => 0,
+                true => LATE_WALKS,
+                false => WALKS,
+            };
             (0..walks).map(|walk| level.walk(texels, members, block as u32, walk)).collect()
         })?;
         let mean_of = |members: &Vec<u32>, of: &dyn Fn(u32) -> f32| {
@@ -92,7 +100,7 @@ impl LocalLight {
             .map(|(members, walks)| {
                 let direct = mean_of(members, &|member| grey(direct[member as usize].baked));
                 let indirect = walks.iter().map(|walk| f64::from(walk.indirect)).sum::<f64>();
-                direct + indirect / f64::from(WALKS)
+                direct + indirect / walks.len().max(1) as f64
             })
             .collect();
         let (sum, count) =

@@ -27,7 +27,11 @@ pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(usize,
         .into_par_iter()
         .flat_map_iter(|index| divisions(scene, layout, &tree, index))
         .collect();
-    lines.sort_by_key(|(place, _)| *place);
+    // Millions, where a mesh is as fine as its texels.
+    if scene.stop.is_set() {
+        return Vec::new();
+    }
+    lines.par_sort_by_key(|(place, _)| *place);
     lines
 }
 

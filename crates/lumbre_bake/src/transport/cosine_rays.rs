@@ -12,6 +12,8 @@ use crate::scene::{BakeScene, SurfaceHit};
 /// Least and most rays of a patch. The sequence has 65,536 points.
 const RAYS: (f64, f64) = (LEAST_RAYS as f64, 65_536.0);
 pub(super) const LEAST_RAYS: u32 = 32;
+/// Rays of a patch when the time is up.
+const LATE_RAYS: u32 = 16;
 
 /// About `rays` rays, in proportion to the patches' areas, and how many they were.
 ///
@@ -32,7 +34,7 @@ pub(super) fn cast(
         .collect();
     let clock = watch.clock();
     let cast = in_chunks(patches.list.len(), watch, |index| {
-        let count = if clock.late() { LEAST_RAYS } else { counts[index] };
+        let count = if clock.late() { LATE_RAYS } else { counts[index] };
         of_patch(scene, patches, index as u32, count, seed)
     })?;
     let rays = cast.iter().flat_map(|cast| cast.count).map(u64::from).sum();

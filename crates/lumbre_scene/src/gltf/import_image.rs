@@ -58,9 +58,10 @@ impl Images<'_> {
                 return Ok(None);
             }
         };
-        let Some(source) = source(texture, &format!("textures[{}]", info.index), notes)? else {
+        let sources = sources(texture, &format!("textures[{}]", info.index), notes)?;
+        if sources.is_empty() {
             return Ok(None);
-        };
+        }
         let sampler = match texture.sampler {
             Some(index) => {
                 let place = format!("textures[{}].sampler", info.index);
@@ -96,7 +97,7 @@ impl Images<'_> {
                 expected: "use numbers that f32 can hold".to_owned(),
             });
         }
-        let image = self.image(source, &format!("textures[{}].source", info.index), notes)?;
+        let image = self.image(&sources, &format!("textures[{}].source", info.index), notes)?;
         Ok(Some(TextureReference { image, sampler, tex_coord, offset, rotation, scale }))
     }
 
@@ -112,11 +113,34 @@ impl Images<'_> {
         Ok(texture.filter(|texture| !Arc::ptr_eq(&texture.image, &self.stand_in)))
     }
 
-    /// An image, decoded once. White stands in for one that cannot be read, where that may be.
-    fn image(&mut self, index: usize, used_by: &str, notes: &mut Notes) -> Result<Arc<Image>, LoadProblem> {
-        if let Some(Some(image)) = self.decoded.get(index) {
-            return Ok(image.clone());
+    /// The first of a texture's images that can be read, each decoded once. Where that may be, white stands in if none can.
+    fn image(
+        &mut self,
+        sources: &[usize],
+        used_by: &str,
+        notes: &mut Notes,
+    ) -> Result<Arc<Image>, LoadProblem> {
+        for (number, &index) in sources.iter().enumerate() {
+            let next = sources.get(number + 1);
+            let image = match self.decoded.get(index) {
+                Some(Some(image)) => Arc::clone(image),
+                _ => self.decode_once(index, used_by, next, notes)?,
+            };
+            if next.is_none() || !Arc::ptr_eq(&image, &self.stand_in) {
+                return Ok(image);
+            }
         }
+        Ok(Arc::clone(&self.stand_in))
+    }
+
+    /// An image that was not decoded yet; white where it cannot be, which is noted with the image that is then tried.
+    fn decode_once(
+        &mut self,
+        index: usize,
+        used_by: &str,
+        next: Option<&usize>,
+        notes: &mut Notes,
+    ) -> Result<Arc<Image>, LoadProblem> {
         let name = self.buffers.document.images.get(index).and_then(|image| image.name.as_deref());
         let place = match name {
             Some(name) => format!("images[{index}] ({})", shortened(name)),
@@ -127,7 +151,11 @@ impl Images<'_> {
             // What would fill the memory is no fault to be repaired.
             Err(problem @ LoadProblem::TooLarge { .. }) => return Err(problem),
             Err(problem) => {
-                notes.repair(&place, problem, "white stands in for it")?;
+                let remedy = match next {
+                    Some(next) => format!("images[{next}], the texture's own source, stands in for it"),
+                    None => "white stands in for it".to_owned(),
+                };
+                notes.repair(&place, problem, &remedy)?;
                 Arc::clone(&self.stand_in)
             }
         };
@@ -163,16 +191,19 @@ impl Images<'_> {
     }
 }
 
-/// The image of a texture: that of an extension which is decoded, or its own. `None`, with a note, where neither is there.
-fn source(texture: &Texture, place: &str, notes: &mut Notes) -> Result<Option<usize>, LoadProblem> {
+/// The images of a texture, in the order in which they are tried: those of extensions that are decoded, and its own. None, with a note, where
+/// there are none.
+fn sources(texture: &Texture, place: &str, notes: &mut Notes) -> Result<Vec<usize>, LoadProblem> {
+    let mut sources = Vec::new();
     for name in TEXTURE_EXTENSIONS {
         if decoders::missing(name).is_none()
             && let Some(TextureSource { source }) = extension(&texture.extensions, name, place)?
         {
-            return Ok(Some(source));
+            sources.push(source);
         }
     }
-    if texture.source.is_none() {
+    sources.extend(texture.source);
+    if sources.is_empty() {
         let reasons = texture.extensions.keys().map(|name| match decoders::missing(name) {
             Some(decoder) => format!(
                 "{name}: built without the feature `{}`; convert it with {}",
@@ -183,7 +214,7 @@ fn source(texture: &Texture, place: &str, notes: &mut Notes) -> Result<Option<us
         let reasons: Vec<_> = reasons.collect();
         notes.add(place, format!("no image that is read ({}); left out", reasons.join(", ")));
     }
-    Ok(texture.source)
+    Ok(sources)
 }
 
 /// One white texel.

@@ -32,6 +32,19 @@ const MOST_STEPS: u32 = 400;
 /// Times that texels at their limit are taken out and the others solved again.
 const ACTIVE_SETS: u32 = 6;
 
+/// How long the solution is sought.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patience {
+    steps: u32,
+    active_sets: u32,
+}
+
+impl Patience {
+    pub const WHOLE: Self = Self { steps: MOST_STEPS, active_sets: ACTIVE_SETS };
+    /// When the time is up: a few steps close most of a jump, which is between texels that lie next to each other.
+    pub const LATE: Self = Self { steps: 12, active_sets: 2 };
+}
+
 /// The texels that may move.
 pub(crate) struct Unknowns {
     /// In the row of all maps, ascending.
@@ -62,7 +75,14 @@ impl Unknowns {
     }
 
     /// Moves the texels; edges are left for the caller to say.
-    pub fn solve(&self, samples: &[Sample], filled: &mut [Vec3], mean: f64, stop: &Stop) -> SeamReport {
+    pub fn solve(
+        &self,
+        samples: &[Sample],
+        filled: &mut [Vec3],
+        mean: f64,
+        patience: Patience,
+        stop: &Stop,
+    ) -> SeamReport {
         let equations: Vec<Equation> = samples.iter().map(|sample| self.equation(sample)).collect();
         let channels: Vec<(Vec<f64>, [f64; 2])> = (0..3usize)
             .into_par_iter()
@@ -70,7 +90,7 @@ impl Unknowns {
                 let values: Vec<f64> =
                     self.texels.iter().map(|&texel| f64::from(filled[texel as usize][channel])).collect();
                 let variances: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
-                let changes = Channel::new(&equations, &values, &variances, mean, stop).solve();
+                let changes = Channel::new(&equations, &values, &variances, mean, stop).solve(patience);
                 let moved: Vec<f64> = values
                     .iter()
                     .zip(&changes)
@@ -222,12 +242,12 @@ impl<'a> Channel<'a> {
     }
 
     /// The changes within their bounds: those at a bound are held there and the others solved again.
-    fn solve(&self) -> Vec<f64> {
+    fn solve(&self, patience: Patience) -> Vec<f64> {
         let count = self.stiffness.len();
         let mut held = vec![false; count];
         let mut changes = vec![0.0; count];
-        for _ in 0..ACTIVE_SETS {
-            self.conjugate_gradients(&held, &mut changes);
+        for _ in 0..patience.active_sets {
+            self.conjugate_gradients(&held, &mut changes, patience.steps);
             let mut cut = false;
             for ((change, [low, high]), held) in changes.iter_mut().zip(&self.bounds).zip(&mut held) {
                 let within = change.clamp(*low, *high);
@@ -243,7 +263,7 @@ impl<'a> Channel<'a> {
     }
 
     /// Solves for the changes that are not held, starting from what they are.
-    fn conjugate_gradients(&self, held: &[bool], changes: &mut [f64]) {
+    fn conjugate_gradients(&self, held: &[bool], changes: &mut [f64], steps: u32) {
         let count = changes.len();
         let free = |vector: &mut [f64]| {
             for (value, _) in vector.iter_mut().zip(held).filter(|(_, held)| **held) {
@@ -266,7 +286,7 @@ impl<'a> Channel<'a> {
         let mut direction = scaled.clone();
         let mut energy = dot(&residual, &scaled);
         let enough = energy * RESIDUAL * RESIDUAL;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..steps {
             if energy <= enough || !energy.is_finite() || self.stop.is_set() {
                 break;
             }

@@ -20,6 +20,7 @@ use glam::Vec3;
 use super::footprint::Texel;
 use crate::report::SeamReport;
 use crate::scene::{BakeScene, LightmapLayout};
+pub(crate) use least_squares::Patience;
 use least_squares::Unknowns;
 
 /// The maps as they are before the seams are closed.
@@ -47,7 +48,7 @@ pub(crate) struct Closed {
 }
 
 /// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known).
-pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3]) -> Closed {
+pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
     if maps.mean.is_nan() || maps.mean <= 0.0 {
         return Closed { report: Err("the maps are black"), rays: 0, warning: None };
     }
@@ -65,7 +66,7 @@ pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3]) -> Closed {
         return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
     }
     let unknowns = Unknowns::new(maps, &charts, filled, &found.samples);
-    let mut report = unknowns.solve(&found.samples, filled, maps.mean, &maps.scene.stop);
+    let mut report = unknowns.solve(&found.samples, filled, maps.mean, patience, &maps.scene.stop);
     report.edges = found.pairs;
     Closed { report: Ok(report), rays, warning }
 }
