@@ -15,7 +15,7 @@ use super::extensions::{CameraExtension, ObjectExtension};
 use super::{export_light, export_material, export_scene};
 use crate::{
     ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, IrradianceVolume, Lightmap,
-    LightmapImage, MaterialTextures, Mesh, Primitive, Transform,
+    LightmapImage, MaterialTextures, Medium, Mesh, Primitive, Transform,
 };
 
 /// The lists of a file being written.
@@ -48,7 +48,7 @@ type Parts = Vec<(*const TriangleMesh, usize)>;
 /// Materials written so far, and meshes by what they are made of.
 #[derive(Default)]
 struct Known {
-    materials: Vec<(Material, MaterialTextures, Arc<str>)>,
+    materials: Vec<(Material, MaterialTextures, Option<Medium>, Arc<str>)>,
     meshes: HashMap<(Arc<str>, Parts), usize>,
 }
 
@@ -282,11 +282,18 @@ impl Nodes {
         let material = world.get::<Material>(entity).cloned().unwrap_or_default();
         let textures = world.get::<MaterialTextures>(entity).cloned().unwrap_or_default();
         let name = label.map(|label| label.material.clone()).unwrap_or_default();
-        let key = (material, textures, name);
+        let medium = world.get::<Medium>(entity).copied();
+        let key = (material, textures, medium, name);
         if let Some(known) = known.materials.iter().position(|known| *known == key) {
             return Ok(known);
         }
-        self.materials.push(export_material::material(&key.0, &key.1, &key.2, place, &mut self.data)?);
+        self.materials.push(export_material::material(
+            (&key.0, key.2),
+            &key.1,
+            &key.3,
+            place,
+            &mut self.data,
+        )?);
         known.materials.push(key);
         Ok(self.materials.len() - 1)
     }

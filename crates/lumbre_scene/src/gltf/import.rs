@@ -264,6 +264,9 @@ fn spawn_primitive(world: &mut World, node: &PreparedNode, primitive: &PreparedP
     if primitive.textures != MaterialTextures::default() {
         entity.insert(primitive.textures.clone());
     }
+    if let Some(medium) = primitive.medium {
+        entity.insert(medium);
+    }
     if let Some(reflection) = node.reflection {
         entity.insert(reflection);
     }

@@ -32,6 +32,7 @@ mod import_irradiance_volume;
 mod import_light;
 mod import_lightmap;
 mod import_material;
+mod import_medium;
 mod import_mesh;
 mod import_scene;
 mod instancing;
@@ -72,6 +73,7 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_variants",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     #[cfg(feature = "basisu")]
     "KHR_texture_basisu",

@@ -22,8 +22,10 @@ use super::import_lightmap::Lightmaps;
 use super::limits::{Budget, LoadLimits};
 use super::uri::Base;
 use super::value::number;
-use super::{import_light, import_material, import_mesh, import_scene};
-use crate::{Camera, IrradianceVolume, Lightmap, MaterialTextures, Primitive, SceneSettings, Transform};
+use super::{import_light, import_material, import_medium, import_mesh, import_scene};
+use crate::{
+    Camera, IrradianceVolume, Lightmap, MaterialTextures, Medium, Primitive, SceneSettings, Transform,
+};
 
 /// A primitive of a mesh with its material.
 pub(crate) struct PreparedPrimitive {
@@ -31,6 +33,7 @@ pub(crate) struct PreparedPrimitive {
     pub mesh: Arc<TriangleMesh>,
     pub material: Material,
     pub textures: MaterialTextures,
+    pub medium: Option<Medium>,
 }
 
 /// A node with what hangs on it.
@@ -90,8 +93,9 @@ pub(crate) fn prepare(
     let mut images =
         Images { buffers, base, limits, budget: image_budget, decoded, stand_in: Arc::new(white()) };
     // Also those that nothing uses: what is wrong with them should be known before it matters.
-    let mut materials = Vec::new();
+    let (mut materials, mut media) = (Vec::new(), Vec::new());
     for (index, source) in document.materials.iter().enumerate() {
+        media.push(import_medium::medium(source, &document.material_place(index), notes)?);
         materials.push(import_material::material(
             source,
             &document.material_place(index),
@@ -125,8 +129,14 @@ pub(crate) fn prepare(
         if let Some(mesh) = node.mesh {
             element(&document.meshes, "meshes", mesh, || format!("{place}.mesh"))?;
             if let Entry::Vacant(entry) = meshes.entry(mesh) {
-                let mut source =
-                    Source { document, buffers, materials: &materials, budget: &mut budget, notes };
+                let mut source = Source {
+                    document,
+                    buffers,
+                    materials: &materials,
+                    media: &media,
+                    budget: &mut budget,
+                    notes,
+                };
                 entry.insert(source.primitives(mesh, node.name.as_deref(), &mut geometries)?);
             }
         }
@@ -230,6 +240,7 @@ struct Source<'a> {
     document: &'a Document,
     buffers: &'a Buffers<'a>,
     materials: &'a [(Material, MaterialTextures)],
+    media: &'a [Option<Medium>],
     budget: &'a mut Budget,
     notes: &'a mut Notes,
 }
@@ -272,7 +283,8 @@ impl Source<'_> {
             let Some(triangles) = triangles else { continue };
             let label = Primitive { index, mesh: name.clone(), material: material_name.into() };
             let textures = usable(textures, &triangles, &place, self.notes);
-            prepared.push(PreparedPrimitive { label, mesh: triangles, material, textures });
+            let medium = primitive.material.and_then(|index| *self.media.get(index)?);
+            prepared.push(PreparedPrimitive { label, mesh: triangles, material, textures, medium });
         }
         Ok(prepared)
     }
