@@ -227,11 +227,20 @@ fn print_report(asked: &Trace, report: &TraceReport) -> anyhow::Result<()> {
             writeln!(out, "standard error of the picture: {:.2} %", 100.0 * error)?
         }
         (Integrator::Path, None) => writeln!(out, "too few samples to state an error")?,
-        (Integrator::Whitted, _) if report.cut.largest_weight > 0.0 => writeln!(
-            out,
-            "cut off by depth and weight: {:.2e} of a pixel's light in the mean, at most {:.2e}; of the brightest that was met that is a radiance of {:.3}",
-            report.cut.mean_weight, report.cut.largest_weight, report.cut.bound
-        )?,
+        (Integrator::Whitted, _) if report.cut.largest_weight > 0.0 => {
+            let missing = match report.cut.bound {
+                Some(bound) => format!("at most a radiance of {bound:.3}"),
+                None => format!(
+                    "of the brightest that was met a radiance of {:.3}, but without a bound: a surface passes on all light and adds some",
+                    report.cut.largest_weight * report.cut.brightest
+                ),
+            };
+            writeln!(
+                out,
+                "cut off by depth and weight: {:.2e} of a pixel's light in the mean, {:.2e} at most; {missing}",
+                report.cut.mean_weight, report.cut.largest_weight
+            )?;
+        }
         (Integrator::Whitted, _) => writeln!(out, "no ray was cut off")?,
     }
     match report.ended {

@@ -14,6 +14,8 @@ pub(crate) struct Sample {
     pub cut: f64,
     /// The brightest radiance of all its rays.
     pub brightest: f64,
+    /// The brightest that any ray could have brought, by the points that were met; may be infinite.
+    pub limit: f64,
 }
 
 /// What the samples of a pixel came to in one pass.
@@ -26,6 +28,7 @@ pub(crate) struct PixelSum {
     pub rays: u32,
     pub cut: f64,
     pub brightest: f64,
+    pub limit: f64,
 }
 
 impl PixelSum {
@@ -38,6 +41,7 @@ impl PixelSum {
         self.rays = self.rays.saturating_add(sample.rays);
         self.cut = self.cut.max(sample.cut);
         self.brightest = self.brightest.max(sample.brightest);
+        self.limit = self.limit.max(sample.limit);
     }
 
     /// Their mean.
@@ -67,6 +71,7 @@ pub(crate) struct FilmPixel {
     pub rays: u32,
     pub cut: f64,
     pub brightest: f64,
+    pub limit: f64,
 }
 
 impl FilmPixel {
@@ -81,6 +86,7 @@ impl FilmPixel {
         self.rays = self.rays.saturating_add(pass.rays);
         self.cut = self.cut.max(pass.cut);
         self.brightest = self.brightest.max(pass.brightest);
+        self.limit = self.limit.max(pass.limit);
     }
 
     /// The pixel's radiance; 0 before the first pass.
@@ -125,7 +131,9 @@ impl Film {
         let largest_weight = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.cut));
         let sum: f64 = self.pixels.iter().map(|pixel| pixel.cut).sum();
         let mean_weight = sum / self.pixels.len().max(1) as f64;
-        Cut { mean_weight, largest_weight, brightest, bound: largest_weight * brightest }
+        let limit = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.limit));
+        let bound = if largest_weight == 0.0 { 0.0 } else { largest_weight * limit };
+        Cut { mean_weight, largest_weight, brightest, bound: bound.is_finite().then_some(bound) }
     }
 }
 

@@ -215,7 +215,8 @@ pub struct Cut {
     pub largest_weight: f64,
     /// The brightest radiance that any ray of the picture brought, W/(m² sr).
     pub brightest: f64,
-    /// So much radiance may be missing from any pixel, if nothing that was not seen is brighter than the brightest that was: the largest
-    /// weight times the brightest.
-    pub bound: f64,
+    /// So much radiance may be missing from any pixel at most, if no point that was not seen sends more by itself than the points that
+    /// were: the largest weight times the largest local light over 1 - (k_r + k_t). Nothing where that series has no end: a surface that
+    /// passes on all light and adds some.
+    pub bound: Option<f64>,
 }

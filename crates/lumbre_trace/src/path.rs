@@ -86,7 +86,7 @@ impl<'a> Paths<'a> {
         }
         // Lights at the ends of f64 may still be too much for a product of factors.
         let radiance = if walk.radiance.is_finite() { walk.radiance } else { DVec3::ZERO };
-        Sample { radiance, rays: walk.rays, cut: 0.0, brightest: radiance.max_element() }
+        Sample { radiance, rays: walk.rays, cut: 0.0, brightest: radiance.max_element(), limit: 0.0 }
     }
 
     fn step(&self, walk: &mut Walk, numbers: &mut Numbers) -> Next {

@@ -42,6 +42,23 @@ pub(crate) struct Seen {
     pub rays: u32,
     /// The brightest radiance that any ray of the tree brought.
     pub brightest: f64,
+    /// The brightest that any ray of the tree could bring, however far it were followed: of every point its own light over what
+    /// k_r + k_t leaves of 1. Infinite where a point that passes on all light adds some.
+    pub limit: f64,
+}
+
+impl Seen {
+    /// A point that adds light of its own and passes on a part of what comes.
+    fn meets(&mut self, own: DVec3, passed_on: DVec3) {
+        for channel in 0..3 {
+            let (own, left) = (own[channel], 1.0 - passed_on[channel]);
+            if own > 0.0 {
+                self.limit = self.limit.max(if left > 0.0 { own / left } else { f64::INFINITY });
+            } else if left < 0.0 {
+                self.limit = f64::INFINITY;
+            }
+        }
+    }
 }
 
 /// A ray on its way.
@@ -93,6 +110,7 @@ impl RayTree<'_> {
                 branch.meets_nothing(radiance);
             }
             seen.brightest = seen.brightest.max(radiance.max_element());
+            seen.meets(radiance, DVec3::ZERO);
             return radiance;
         };
         let point = SurfacePoint::new(scene, &twig.ray, &meeting);
@@ -103,6 +121,7 @@ impl RayTree<'_> {
         }
 
         let mut radiance = if object.material.unlit {
+            seen.meets(point.surface.diffuse, DVec3::ZERO);
             point.surface.diffuse
         } else {
             self.lit(&twig, &point, clear, left, seen, record.as_deref_mut())
@@ -110,6 +129,7 @@ impl RayTree<'_> {
         if let Some(fog) = &scene.settings.fog {
             let distance = if twig.first { self.camera.depth(point.position) } else { point.distance };
             radiance = apply_fog(fog_weight(&fog.mode, distance), radiance, fog.color.as_dvec3());
+            seen.meets(fog.color.as_dvec3(), DVec3::ZERO);
         }
         if point.coverage < 1.0 {
             let behind = DVec3::splat(1.0 - point.coverage);
@@ -154,6 +174,7 @@ impl RayTree<'_> {
         let light: DirectLight = direct_light(scene, point, viewer, (twig.media, behind, eta), self.lighting);
         seen.rays += light.rays;
         let mut radiance = light.total();
+        seen.meets(radiance, object.mirror() + object.transmission());
         if let Some(branch) = record.as_deref_mut() {
             branch.lit(scene, &light);
         }

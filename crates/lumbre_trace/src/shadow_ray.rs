@@ -20,9 +20,6 @@ pub(crate) enum Glass {
 
 /// After so many surfaces nothing is left, or the scene is a mistake.
 const MOST_SURFACES: usize = 1024;
-/// Distances to lights are cut by this part, so that a surface that the light lies on does not hide it.
-const SHORTENED: f64 = 1.0 - 4e-6;
-
 /// The part of the light that arrives along a ray, from a distance that may be infinite. `media` is where the ray starts. The second value counts the rays that were
 /// traced for it.
 pub(crate) fn transmittance(
@@ -32,7 +29,6 @@ pub(crate) fn transmittance(
     media: &MediumStack,
     glass: Glass,
 ) -> (DVec3, u32) {
-    let farthest = distance * SHORTENED;
     let open = |object: usize| {
         let object = &scene.objects[object];
         match object.passage() {
@@ -41,7 +37,7 @@ pub(crate) fn transmittance(
             Passage::Closed | Passage::Cut => false,
         }
     };
-    let hidden = scene.geometry.any(ray, farthest, |crossing| {
+    let hidden = scene.geometry.any_between(ray, distance, |crossing| {
         (!scene.see_through || !open(crossing.object)) && scene.blocks(crossing)
     });
     if hidden {
@@ -54,9 +50,9 @@ pub(crate) fn transmittance(
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
     for _ in 0..MOST_SURFACES {
         rays += 1;
-        let next = scene.geometry.closest(&ray, farthest - travelled, |crossing| open(crossing.object));
+        let next = scene.geometry.closest(&ray, distance - travelled, |crossing| open(crossing.object));
         let Some(meeting) = next else {
-            return (left * media.transmittance(farthest - travelled), rays);
+            return (left * media.transmittance(distance - travelled), rays);
         };
         let point = SurfacePoint::new(scene, &ray, &meeting);
         let object = &scene.objects[point.object];

@@ -172,7 +172,8 @@ impl SurfacePoint {
             emission: object.material.surface(lit_as_front).emission.as_dvec3(),
             coverage: coverage(object, f64::from(object.material.alpha)),
             baked: None,
-            extent: position.abs().max_element(),
+            // The point is as uncertain as the coordinates of what the ray began with.
+            extent: position.abs().max(ray.origin.abs()).max_element(),
             triangle: None,
         }
     }

@@ -34,6 +34,8 @@ pub type Listener<'a> = dyn Fn(Progress) -> ControlFlow<()> + Sync + 'a;
 
 /// Rays of one tree at most, shadow rays apart: what glass in glass would multiply without end is cut off, and counted.
 const MOST_RAYS: u32 = 100_000;
+/// Bytes of a thread's stack: trees of the greatest depth fit, and what is not used is never touched.
+const STACK: usize = 256 << 20;
 /// Paths of a pixel in one pass: passes are what the standard error is taken from.
 const PASS: u32 = 4;
 
@@ -86,6 +88,7 @@ impl Tracer {
     /// [`TraceError::Threads`].
     pub fn picture(&self, listener: &Listener<'_>) -> Result<(Picture, TraceReport), TraceError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.options.threads.unwrap_or(0));
+        let pool = pool.stack_size(STACK);
         let pool = pool.build().map_err(|error| TraceError::Threads { reason: error.to_string() })?;
         let started = Instant::now();
         let run = Run {
@@ -106,7 +109,17 @@ impl Tracer {
         let camera = self.camera.through(place);
         let mut root = Branch::new(Kind::Camera, &camera.ray, self.scene.origin, DVec3::ONE, DVec3::ONE);
         let tree = RayTree { lighting: Lighting { by_light: true, ..self.lighting() }, ..self.ray_tree() };
-        tree.grow(camera.ray, camera.farthest, &self.media_of(&camera.ray), Some(&mut root));
+        let mut grow = || {
+            tree.grow(camera.ray, camera.farthest, &self.media_of(&camera.ray), Some(&mut root));
+        };
+        std::thread::scope(|scope| {
+            // Deep trees need more than a main thread's stack.
+            let thread = std::thread::Builder::new().stack_size(STACK);
+            if let Ok(thread) = thread.spawn_scoped(scope, &mut grow) {
+                // What it did is in the tree.
+                let _ = thread.join();
+            }
+        });
         root
     }
 
@@ -377,7 +390,7 @@ impl<'a> Estimator<'a> {
             Self::Trees(_, tree) => {
                 let seen = tree.grow(camera.ray, camera.farthest, &media, None);
                 let (radiance, rays) = (seen.radiance, seen.rays);
-                Sample { radiance, rays, cut: seen.cut, brightest: seen.brightest }
+                Sample { radiance, rays, cut: seen.cut, brightest: seen.brightest, limit: seen.limit }
             }
             Self::Paths(_, paths) => paths.sample(&camera, media, &mut numbers),
         }

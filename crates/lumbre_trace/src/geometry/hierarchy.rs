@@ -56,6 +56,9 @@ pub(crate) struct Meeting {
     pub triangle: Option<u32>,
 }
 
+/// Rays end before the exact surface that their end lies on by this part of their length.
+const EXACTLY_SHORT: f64 = 1.0 - 1e-9;
+
 impl Geometry {
     /// `triangles` lists the corners of each, counter-clockwise seen from its front, with its object and its number there.
     pub fn build(
@@ -107,9 +110,11 @@ impl Geometry {
         nearest
     }
 
-    /// Whether there is a surface up to a distance for which `accept` holds.
-    pub fn any(&self, ray: &SpaceRay, farthest: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
-        let short = ray.for_triangles(farthest);
+    /// Whether a surface for which `accept` holds lies between the ray's start and the point at a distance, which may be infinite.
+    pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
+        let finite = distance.is_finite();
+        let short = if finite { ray.between_triangles(distance) } else { ray.for_triangles(distance) };
+        let farthest = if finite { distance * EXACTLY_SHORT } else { distance };
         self.bvh.any_hit_filtered(&short, |triangle, u, v| {
             accept(&self.crossing(short.direction, triangle, u, v))
         }) || self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, &accept).is_some())

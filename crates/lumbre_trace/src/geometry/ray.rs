@@ -24,7 +24,11 @@ pub(crate) struct Departure {
 }
 
 /// Relative rounding of a point that was found in f64 on a surface given by an equation, with room.
-const EXACT_ERROR: f64 = 1e-12;
+const EXACT_ERROR: f64 = 1e-13;
+
+/// What keeps the end of a ray off the surface that it ends on, as a part of coordinates: as much as keeps its start off, and again for the
+/// corners of triangles, which are f32.
+const ROUNDING: f64 = 32.0 / (1 << 24) as f64;
 
 impl SpaceRay {
     /// From a point in free space.
@@ -45,14 +49,27 @@ impl SpaceRay {
 
     /// For triangles, whose corners are f32.
     pub fn for_triangles(&self, farthest: f64) -> Ray {
-        let origin = match self.departure {
-            None => self.origin.as_vec3(),
-            Some(Departure { side, extent }) => {
-                offset_ray_origin(self.origin.as_vec3(), side.as_vec3(), extent as f32)
-            }
-        };
         let direction: Vec3 = self.direction.as_vec3();
-        Ray { origin, direction, t_min: 0.0, t_max: farthest as f32 }
+        Ray { origin: self.start_off_triangles(), direction, t_min: 0.0, t_max: farthest as f32 }
+    }
+
+    /// The same up to a point at a distance, or short of it by the rounding of its coordinates: what lies in that point's own surface is not
+    /// between. Seen from where the ray is set off to, the point lies in a slightly other direction.
+    pub fn between_triangles(&self, distance: f64) -> Ray {
+        let origin = self.start_off_triangles();
+        let target = self.at(distance);
+        let to = target - origin.as_dvec3();
+        let length = to.length();
+        let size = target.abs().max_element().max(length);
+        let t_max = (length - ROUNDING * size).max(0.0) as f32;
+        Ray { origin, direction: (to / length).as_vec3(), t_min: 0.0, t_max }
+    }
+
+    fn start_off_triangles(&self) -> Vec3 {
+        let origin = self.origin.as_vec3();
+        self.departure.map_or(origin, |Departure { side, extent }| {
+            offset_ray_origin(origin, side.as_vec3(), extent as f32)
+        })
     }
 
     /// For surfaces given by equations: the start, off the surface by its own rounding.

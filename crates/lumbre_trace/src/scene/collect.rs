@@ -45,6 +45,8 @@ type Found<'a> = (
     (Has<StaticObject>, Has<EmissiveLight>),
 );
 
+type FoundLight<'a> = (Entity, &'a Light, &'a GlobalTransform, Option<&'a Name>);
+
 /// Everything that is shown, with `origin` as the tracer's origin. `reflection` in place of the scene's model, if it is given.
 pub(crate) fn collect(
     world: &mut World,
@@ -54,6 +56,7 @@ pub(crate) fn collect(
 ) -> Result<Collected, TraceError> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let query = world.query_filtered::<Found<'static>, Without<Hidden>>();
+    let lamps = world.query::<FoundLight<'static>>();
     let world = &*world;
     let mut found: Vec<_> = query.iter_manual(world).collect();
     found.sort_by_key(|(entity, ..)| entity.index_u32());
@@ -65,7 +68,7 @@ pub(crate) fn collect(
         polygons: Vec::new(),
         notes: Vec::new(),
     };
-    collected.lights = lights(world, origin, &mut collected.notes);
+    collected.lights = lights(world, &lamps, origin, &mut collected.notes);
     for (entity, (mesh, material, place), choices, exact, (fixed, shines)) in found {
         let (own_model, lightmap, textures) = choices;
         let (medium, quadric, primitive) = exact;
@@ -116,11 +119,13 @@ fn relative(place: &GlobalTransform, origin: DVec3) -> DAffine3 {
 }
 
 /// The lights that are on, in the order of their entities.
-fn lights(world: &World, origin: DVec3, notes: &mut Vec<String>) -> Vec<PlacedLight> {
-    let Some(mut query) = world.try_query::<(Entity, &Light, &GlobalTransform, Option<&Name>)>() else {
-        return Vec::new();
-    };
-    let mut found: Vec<_> = query.iter(world).filter(|(_, light, ..)| light.enabled).collect();
+fn lights(
+    world: &World,
+    lamps: &QueryState<FoundLight<'static>>,
+    origin: DVec3,
+    notes: &mut Vec<String>,
+) -> Vec<PlacedLight> {
+    let mut found: Vec<_> = lamps.iter_manual(world).filter(|(_, light, ..)| light.enabled).collect();
     found.sort_by_key(|(entity, ..)| entity.index_u32());
     let mut lights = Vec::new();
     for (entity, light, place, name) in found {
