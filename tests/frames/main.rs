@@ -25,5 +25,6 @@ mod properties;
 mod reflection;
 mod settings;
 mod textures;
+mod traced;
 mod transforms;
 mod transparency;

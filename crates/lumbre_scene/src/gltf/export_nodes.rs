@@ -12,10 +12,11 @@ use super::error::{Note, Notes};
 use super::export::{LightmapFiles, SaveError};
 use super::export_data::Data;
 use super::extensions::{CameraExtension, ObjectExtension};
+use super::quadric_extension::QuadricExtension;
 use super::{export_light, export_material, export_scene};
 use crate::{
     ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, IrradianceVolume, Lightmap,
-    LightmapImage, MaterialTextures, Medium, Mesh, Primitive, Transform,
+    LightmapImage, MaterialTextures, Medium, Mesh, Primitive, Quadric, Transform,
 };
 
 /// The lists of a file being written.
@@ -39,6 +40,7 @@ struct Appearance {
     lightmap: Option<Arc<LightmapImage>>,
     hidden: bool,
     emissive_light: bool,
+    quadric: Option<Quadric>,
     dynamic: bool,
 }
 
@@ -265,6 +267,10 @@ impl Nodes {
         if !choices.is_empty() {
             extend(node, "LUMBRE_shading", choices.into());
         }
+        if let Some(quadric) = appearance.quadric.as_ref().filter(|_| node.contains_key("mesh")) {
+            let extension = serde_json::to_value(QuadricExtension::of(quadric));
+            extend(node, "LUMBRE_quadric", extension.map_err(|source| SaveError::Json { source })?);
+        }
         if let Some(image) = &appearance.lightmap {
             extend(node, "LUMBRE_lightmap", lightmaps.reference(image, name, number));
         }
@@ -333,6 +339,7 @@ fn appearance(world: &World, entity: Entity, dynamic: bool) -> Appearance {
         lightmap: world.get::<Lightmap>(entity).map(|lightmap| lightmap.image.clone()),
         hidden: world.get::<Hidden>(entity).is_some(),
         emissive_light: world.get::<EmissiveLight>(entity).is_some(),
+        quadric: world.get::<Quadric>(entity).cloned(),
         dynamic: dynamic || world.get::<DynamicObject>(entity).is_some(),
     }
 }

@@ -42,6 +42,7 @@ mod meshopt;
 mod options;
 mod patch;
 mod prepared;
+mod quadric_extension;
 mod source;
 mod texture_ktx2;
 mod texture_sets;
@@ -85,6 +86,7 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "LUMBRE_lights_phong",
     "LUMBRE_materials_phong",
     "LUMBRE_object",
+    "LUMBRE_quadric",
     "LUMBRE_scene",
     "LUMBRE_shading",
 ];

@@ -20,11 +20,13 @@ use super::import_image::{Images, white};
 use super::import_irradiance_volume::irradiance_volume;
 use super::import_lightmap::Lightmaps;
 use super::limits::{Budget, LoadLimits};
+use super::quadric_extension::QuadricExtension;
 use super::uri::Base;
 use super::value::number;
 use super::{import_light, import_material, import_medium, import_mesh, import_scene};
 use crate::{
-    Camera, IrradianceVolume, Lightmap, MaterialTextures, Medium, Primitive, SceneSettings, Transform,
+    Camera, IrradianceVolume, Lightmap, MaterialTextures, Medium, Primitive, Quadric, SceneSettings,
+    Transform,
 };
 
 /// A primitive of a mesh with its material.
@@ -54,6 +56,7 @@ pub(crate) struct PreparedNode {
     pub dynamic: bool,
     pub hidden: bool,
     pub emissive_light: bool,
+    pub quadric: Option<Quadric>,
     pub extras: Option<serde_json::Value>,
 }
 
@@ -208,6 +211,16 @@ pub(crate) fn prepare(
         }
         let object =
             extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &place)?.unwrap_or_default();
+        let exact = extension::<QuadricExtension>(&node.extensions, "LUMBRE_quadric", &place)?;
+        let mut quadric = exact.map(|exact| exact.surface(&place)).transpose()?;
+        let primitives = node.mesh.and_then(|mesh| meshes.get(&mesh)).map_or(0, Vec::len);
+        if quadric.is_some() && primitives != 1 {
+            notes.add(
+                &place,
+                format!("has LUMBRE_quadric and {primitives} primitives: it needs a mesh of one, whose material it takes; the exact surface is left out"),
+            );
+            quadric = None;
+        }
         nodes.push(PreparedNode {
             index,
             parent: parents[index],
@@ -224,6 +237,7 @@ pub(crate) fn prepare(
             dynamic: dynamic.contains(&index),
             hidden: object.hidden,
             emissive_light: object.emissive_light,
+            quadric,
             extras: node.extras.clone(),
         });
     }
