@@ -73,6 +73,12 @@ Examples:
   lumbre trace room.glb --pixel 640,360 --tree text
   lumbre trace room.glb --pixel 640,360 --tree svg > rays.svg")]
     Trace(Trace),
+    /// Say how far one picture is from another: in light, and to the eye (FLIP).
+    #[command(after_help = "\
+Examples:
+  lumbre compare traced.exr frame.exr
+  lumbre compare traced.png frame.png -o heat.png --json")]
+    Compare(Compare),
     /// Say what a scene calls for, which passes run and why the others do not.
     #[command(
         after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --measure\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
@@ -354,6 +360,20 @@ pub struct Trace {
 }
 
 #[derive(Args, Debug)]
+pub struct Compare {
+    /// What is right: .png, .jpg or .exr.
+    pub reference: PathBuf,
+    /// What is compared with it.
+    pub test: PathBuf,
+    /// Where a heat map of FLIP goes: black where nothing differs, white where most does.
+    #[arg(short, long, value_name = "HEATMAP.png")]
+    pub output: Option<PathBuf>,
+    /// Prints the figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Args, Debug)]
 pub struct Explain {
     /// The scene: .glb or .gltf, baked or not.
     pub input: PathBuf,
@@ -429,7 +449,10 @@ fn gltf_file(text: &str) -> Result<PathBuf, String> {
         .is_some_and(|extension| ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)));
     match is_named_so || path.exists() {
         true => Ok(path),
-        false => Err("neither a .glb or .gltf file nor a command: play, bake, render, trace, explain".into()),
+        false => {
+            Err("neither a .glb or .gltf file nor a command: play, bake, render, trace, compare, explain"
+                .into())
+        }
     }
 }
 

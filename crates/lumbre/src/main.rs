@@ -3,6 +3,7 @@
 mod arguments;
 mod bake;
 mod bake_record;
+mod compare;
 mod explain;
 mod interruption;
 mod lightmap_report;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         Some(Command::Bake(options)) => bake::run(&options),
         Some(Command::Render(options)) => render::run(&options),
         Some(Command::Trace(options)) => trace::run(&options),
+        Some(Command::Compare(options)) => compare::run(&options),
         Some(Command::Explain(options)) => explain::run(&options),
     };
     match outcome {

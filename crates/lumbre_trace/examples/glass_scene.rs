@@ -6,9 +6,7 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material, Surface};
-use lumbre_scene::{
-    Camera, Medium, Mesh, Name, Quadric, QuadricShape, SceneSettings, Transform, save,
-};
+use lumbre_scene::{Camera, Medium, Mesh, Name, Quadric, QuadricShape, SceneSettings, Transform, save};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("say where the scene goes, like glass.glb")?;
@@ -25,16 +23,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         world.spawn((name, Mesh(Arc::new(chequers(parity))), Material::matt(color)));
     }
     let shiny = |color: Vec3, shininess: f32| {
-        let front = Surface { ambient: color, diffuse: color, specular: Vec3::splat(0.4), shininess, ..Surface::default() };
+        let front = Surface {
+            ambient: color,
+            diffuse: color,
+            specular: Vec3::splat(0.4),
+            shininess,
+            ..Surface::default()
+        };
         Material { front, ..Material::default() }
     };
     let clear = Material { transmission: Vec3::ONE, ior: 1.5, ..shiny(Vec3::ZERO, 400.0) };
     let fresnel = Medium { fresnel: true, ..Medium::default() };
-    let green = Medium {
-        attenuation_color: Vec3::new(0.3, 0.9, 0.5),
-        attenuation_distance: 0.8,
-        ..fresnel
-    };
+    let green = Medium { attenuation_color: Vec3::new(0.3, 0.9, 0.5), attenuation_distance: 0.8, ..fresnel };
     let ball = Arc::new(shapes::uv_sphere(1.0, 48, 24));
     let sphere = |name: &'static str, radius: f64, at: DVec3| {
         let place = Transform::from_translation(at).with_scale(DVec3::splat(radius));
@@ -58,14 +58,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mirror = Material { mirror: Vec3::splat(0.9), ..Material::matt(Vec3::ZERO) };
     let place = Transform::from_xyz(0.0, 1.6, -3.0).with_rotation(DQuat::from_rotation_x(1.5));
     world.spawn((Name::new("mirror"), Mesh(Arc::new(shapes::plane(5.0, 3.0, 1, 1))), mirror, place));
-    let sheet = Material { transmission: Vec3::new(0.9, 0.5, 0.4), double_sided: true, ..Material::matt(Vec3::ZERO) };
+    let sheet =
+        Material { transmission: Vec3::new(0.9, 0.5, 0.4), double_sided: true, ..Material::matt(Vec3::ZERO) };
     let thin = Medium { thin: true, fresnel: true, ..Medium::default() };
     let place = Transform::from_xyz(3.0, 0.9, 0.2)
         .with_rotation(DQuat::from_rotation_y(-0.6) * DQuat::from_rotation_x(1.57));
     world.spawn((Name::new("sheet"), Mesh(Arc::new(shapes::plane(1.6, 1.8, 1, 1))), sheet, thin, place));
     let lamp = |color: Vec3, radius: f32| Light { radius, ..Light::point(color) };
     world.spawn((Name::new("lamp"), lamp(Vec3::splat(9.0), 0.2), Transform::from_xyz(2.5, 4.5, 3.0)));
-    world.spawn((Name::new("fill"), lamp(Vec3::new(3.0, 2.6, 2.0), 0.2), Transform::from_xyz(-4.0, 3.0, 2.5)));
+    world.spawn((
+        Name::new("fill"),
+        lamp(Vec3::new(3.0, 2.6, 2.0), 0.2),
+        Transform::from_xyz(-4.0, 3.0, 2.5),
+    ));
     let place = Transform::from_xyz(0.4, 1.9, 6.2).looking_at(DVec3::new(0.1, 0.85, 0.0), DVec3::Y);
     world.spawn((Name::new("view"), Camera::default(), place));
     save(&mut world, std::path::Path::new(&path))?;

@@ -111,7 +111,7 @@ pub(crate) fn direct_light(
                 &shadow_ray(point, sample.direction),
                 reach(placed, point),
                 start,
-                Glass::LetsThrough,
+                (Glass::LetsThrough, &placed.bulbs),
             );
             light.rays += rays;
             visible
@@ -208,8 +208,13 @@ fn polygon_visibility(
             if !(part > 0.0 && part.is_finite()) {
                 continue;
             }
-            let (visible, more) =
-                transmittance(scene, &shadow_ray(point, to / distance), distance, media, Glass::LetsThrough);
+            let (visible, more) = transmittance(
+                scene,
+                &shadow_ray(point, to / distance),
+                distance,
+                media,
+                (Glass::LetsThrough, &[]),
+            );
             (sum, weight, rays) = (sum + visible * part, weight + part, rays + more);
         }
     }

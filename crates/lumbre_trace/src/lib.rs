@@ -40,11 +40,13 @@
 mod branch;
 mod branch_drawing;
 mod camera_ray;
+mod comparison;
 mod direct_light;
 mod display;
 mod error;
 mod film;
 mod filter;
+pub mod flip;
 mod geometry;
 mod interface;
 mod light_sampling;
@@ -63,6 +65,7 @@ mod trace;
 
 pub use branch::{Branch, BranchLamp, BranchLight, BranchPoint, Kind};
 pub use branch_drawing::{TreeFormat, draw_tree};
+pub use comparison::{Comparison, compare};
 pub use display::{encode_srgb, tone_curve};
 pub use error::TraceError;
 pub use filter::Filter;

@@ -99,14 +99,14 @@ impl LightSampler {
         Self { emitters, distribution, densities }
     }
 
-    /// A lamp at a point, with the chance that it was chosen, where on it the ray goes, and how far that is.
-    pub fn lamp(
+    /// A lamp at a point, with the chance that it was chosen, where on it the ray goes, how far that is, and what does not hide it.
+    pub fn lamp<'s>(
         &self,
-        scene: &Scene,
+        scene: &'s Scene,
         point: &SurfacePoint,
         choice: f64,
         numbers: DVec2,
-    ) -> Option<(LightSample, f64, f64)> {
+    ) -> Option<(LightSample, f64, f64, &'s [usize])> {
         let mut weights = smallvec::SmallVec::<[(usize, LightSample, f64); 32]>::new();
         let mut total = 0.0;
         for (number, placed) in scene.lights.iter().enumerate() {
@@ -144,7 +144,7 @@ impl LightSampler {
                 (on_disc_of_sky(sample, half, numbers), f64::INFINITY)
             }
         };
-        Some((sample, weight / total, distance))
+        Some((sample, weight / total, distance, &placed.bulbs))
     }
 
     /// A point of the emissive triangles as a point of a surface meets it; nothing where it is the back of one, or there are none.

@@ -212,9 +212,9 @@ impl<'a> Paths<'a> {
         numbers: &mut Numbers,
     ) {
         let (choice, place) = (numbers.next(), numbers.pair());
-        if let Some((light, chance, distance)) = self.lights.lamp(self.scene, point, choice, place) {
+        if let Some((light, chance, distance, bulbs)) = self.lights.lamp(self.scene, point, choice, place) {
             let reflected = lobes.reflected(&light) / chance;
-            let seen = self.seen(walk, point, light.direction, distance, reflected);
+            let seen = self.seen(walk, point, (light.direction, distance, bulbs), reflected);
             walk.radiance += walk.throughput * seen;
         }
         let (choice, place) = (numbers.next(), numbers.pair());
@@ -222,7 +222,7 @@ impl<'a> Paths<'a> {
             // A path that ends here will not find it itself.
             let found = if last { 0.0 } else { self.chance(walk, point, lobes, sample.direction) };
             let reflected = lobes.reflectance(sample.direction) * sample.radiance / (sample.density + found);
-            let seen = self.seen(walk, point, sample.direction, sample.distance, reflected);
+            let seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
             walk.radiance += walk.throughput * seen;
         }
     }
@@ -244,8 +244,7 @@ impl<'a> Paths<'a> {
         &self,
         walk: &mut Walk,
         point: &SurfacePoint,
-        direction: DVec3,
-        distance: f64,
+        (direction, distance, bulbs): (DVec3, f64, &[usize]),
         light: DVec3,
     ) -> DVec3 {
         if light == DVec3::ZERO || direction.dot(point.geometric) <= 0.0 {
@@ -255,7 +254,8 @@ impl<'a> Paths<'a> {
             return light;
         }
         let ray = shadow_ray(point, direction);
-        let (visible, rays) = transmittance(self.scene, &ray, distance, &walk.media, Glass::OnlySheets);
+        let (visible, rays) =
+            transmittance(self.scene, &ray, distance, &walk.media, (Glass::OnlySheets, bulbs));
         walk.rays += rays;
         light * visible
     }

@@ -20,14 +20,14 @@ pub(crate) enum Glass {
 
 /// After so many surfaces nothing is left, or the scene is a mistake.
 const MOST_SURFACES: usize = 1024;
-/// The part of the light that arrives along a ray, from a distance that may be infinite. `media` is where the ray starts. The second value counts the rays that were
+/// The part of the light that arrives along a ray, from a distance that may be infinite. `media` is where the ray starts; `bulbs` are objects that do not count. The second value counts the rays that were
 /// traced for it.
 pub(crate) fn transmittance(
     scene: &Scene,
     ray: &SpaceRay,
     distance: f64,
     media: &MediumStack,
-    glass: Glass,
+    (glass, bulbs): (Glass, &[usize]),
 ) -> (DVec3, u32) {
     let open = |object: usize| {
         let object = &scene.objects[object];
@@ -38,7 +38,9 @@ pub(crate) fn transmittance(
         }
     };
     let hidden = scene.geometry.any_between(ray, distance, |crossing| {
-        (!scene.see_through || !open(crossing.object)) && scene.blocks(crossing)
+        (!scene.see_through || !open(crossing.object))
+            && !bulbs.contains(&crossing.object)
+            && scene.blocks(crossing)
     });
     if hidden {
         return (DVec3::ZERO, 1);
@@ -50,7 +52,9 @@ pub(crate) fn transmittance(
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
     for _ in 0..MOST_SURFACES {
         rays += 1;
-        let next = scene.geometry.closest(&ray, distance - travelled, |crossing| open(crossing.object));
+        let next = scene.geometry.closest(&ray, distance - travelled, |crossing| {
+            open(crossing.object) && !bulbs.contains(&crossing.object)
+        });
         let Some(meeting) = next else {
             return (left * media.transmittance(distance - travelled), rays);
         };

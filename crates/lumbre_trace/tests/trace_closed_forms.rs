@@ -342,6 +342,22 @@ fn a_light_shines_through_glass_in_part_and_makes_a_highlight_behind_it() {
 }
 
 #[test]
+fn a_bulb_does_not_hide_its_own_lamp_and_a_shade_does() {
+    for (emission, lit) in [(1.0, true), (0.0, false)] {
+        let mut world = World::new();
+        exact(&mut world, Quadric::new(QuadricShape::Plane), Material::matt(Vec3::ONE), Transform::IDENTITY);
+        let around = Mesh(Arc::new(shapes::uv_sphere(0.1, 16, 8)));
+        world.spawn((around, glowing(emission, 0.0), Transform::from_xyz(0.0, 2.0, 0.0)));
+        world.spawn((Light::point(Vec3::splat(4.0)), Transform::from_xyz(0.0, 2.0, 0.0)));
+        camera(&mut world, DVec3::new(0.0, 0.5, 0.0), DVec3::ZERO, 0.1);
+        let found = tree(&mut world, &options(8)).radiance;
+        assert!((found.x - if lit { 1.0 } else { 0.0 }).abs() < 1e-12, "{emission}: {found}");
+        let (picture, _) = draw(&mut world, &paths(1, 4));
+        assert_eq!(picture.radiance[0].x > 0.9, lit, "{emission}: {}", picture.radiance[0]);
+    }
+}
+
+#[test]
 fn nothing_to_trace_is_the_background() {
     let mut world = World::new();
     world.insert_resource(SceneSettings { background: Vec3::new(0.1, 0.2, 0.3), ..SceneSettings::default() });

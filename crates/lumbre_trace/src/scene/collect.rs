@@ -23,6 +23,18 @@ pub(crate) struct PlacedLight {
     /// Unit: where it shines.
     pub axis: DVec3,
     pub name: String,
+    /// Objects that do not hide it: what glows and has the light inside of its box is the lamp's bulb.
+    pub bulbs: Vec<usize>,
+}
+
+impl PlacedLight {
+    fn find_bulbs(&mut self, objects: &[Object]) {
+        if self.light.kind == LightKind::Point {
+            let is_bulb = |object: &Object| object.glows() && object.box_holds(self.position);
+            let found = objects.iter().enumerate().filter(|(_, object)| is_bulb(object));
+            self.bulbs = found.map(|(index, _)| index).collect();
+        }
+    }
 }
 
 /// What was found in a World.
@@ -111,6 +123,8 @@ pub(crate) fn collect(
         }
         collected.objects.push(object);
     }
+    let Collected { lights, objects, .. } = &mut collected;
+    lights.iter_mut().for_each(|light| light.find_bulbs(objects));
     Ok(collected)
 }
 
@@ -133,7 +147,9 @@ fn lights(
         let (position, axis) = (place.translation() - origin, place.forward());
         let placed = light.kind != LightKind::Point || position.is_finite();
         match light.validate(&name) {
-            Ok(()) if placed => lights.push(PlacedLight { light: light.clone(), position, axis, name }),
+            Ok(()) if placed => {
+                lights.push(PlacedLight { light: light.clone(), position, axis, name, bulbs: Vec::new() })
+            }
             Ok(()) => notes.push(format!("light \"{name}\" is left out: its position is not finite")),
             Err(error) => notes.push(format!("a light is left out: {error}")),
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Material, ReflectionModel};
 use lumbre_scene::{LightmapImage, MaterialTextures, Medium};
@@ -60,6 +60,22 @@ impl Object {
     /// k_r.
     pub fn mirror(&self) -> DVec3 {
         if self.material.unlit { DVec3::ZERO } else { self.material.mirror.as_dvec3() }
+    }
+
+    /// It sends light by itself, on either side.
+    pub fn glows(&self) -> bool {
+        let back = self.material.back.as_ref().map_or(Vec3::ZERO, |back| back.emission);
+        self.material.front.emission.max(back).max_element() > 0.0
+    }
+
+    /// Whether a point lies within the box around its mesh, in its own space.
+    pub fn box_holds(&self, point: DVec3) -> bool {
+        let own = self.place.inverse().transform_point3(point);
+        let positions = || self.shape.positions.iter().map(|position| position.as_dvec3());
+        let low = positions().fold(DVec3::INFINITY, DVec3::min);
+        let high = positions().fold(DVec3::NEG_INFINITY, DVec3::max);
+        // A sheet has no inside.
+        low.cmplt(high).all() && own.cmpge(low).all() && own.cmple(high).all()
     }
 
     /// It has an inside that light is refracted into.
