@@ -164,7 +164,7 @@ impl LightSampler {
         let at = a * (1.0 - root) + b * weights[0] + c * weights[1];
         let to = at - point.position;
         let distance = to.length();
-        if !(distance > 0.0) {
+        if distance.is_nan() || distance <= 0.0 {
             return None;
         }
         let direction = to / distance;

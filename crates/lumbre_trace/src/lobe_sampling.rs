@@ -192,7 +192,8 @@ mod tests {
         let mut lobes = Vec::new();
         for &model in ReflectionModel::ALL {
             for lobe in [Lobe::Bare, Lobe::EnergyKeeping] {
-                for &distribution in Distribution::ALL {
+                let spread = model == ReflectionModel::TorranceSparrow && lobe == Lobe::Bare;
+                for &distribution in if spread { Distribution::ALL } else { &Distribution::ALL[..1] } {
                     for shininess in [3.0, 40.0, 900.0] {
                         let surface = SurfaceSample {
                             ambient: DVec3::ZERO,
@@ -221,7 +222,7 @@ mod tests {
         for lobes in every_lobe() {
             // By directions that are chosen evenly: the density's integral over the sphere, which is 1 but for what half vectors send below
             // the horizon of no surface.
-            let count = 200_000u32;
+            let count = 100_000u32;
             let (mut whole, mut upper) = (0.0, 0.0);
             for index in 0..count {
                 let mut numbers = Numbers::new(7, index >> 16, index & 0xffff);
@@ -259,7 +260,7 @@ mod tests {
             }
             let found = sum / f64::from(count);
             let pole = reflected_direction(DVec3::Z, lobes.viewer);
-            let (rows, columns) = (1500, 240);
+            let (rows, columns) = (800, 160);
             let mut wanted = DVec3::ZERO;
             for row in 0..rows {
                 // Squared twice: the rows crowd at the pole.

@@ -186,7 +186,7 @@ fn exact_surfaces_keep_their_digits_far_away_and_at_grazing_rays() {
             let point = tree.point.expect("it meets the ball");
             // In the world; the tracer has an origin of its own far out.
             assert!((point.position.length() - 1.0).abs() < 1e-14 + 4e-16 * distance, "on the ball");
-            let wanted = tree.origin.z - ((1.0 - offset) * (1.0 + offset) as f64).sqrt();
+            let wanted = tree.origin.z - ((1.0_f64 - offset) * (1.0 + offset)).sqrt();
             assert!((point.distance - wanted).abs() < 4e-10, "{distance} {offset}: {}", point.distance);
         }
         // Just beside it.
