@@ -29,5 +29,6 @@ mod reflection;
 mod settings;
 mod shadows;
 mod textures;
+mod traced;
 mod transforms;
 mod transparency;

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{FlatRule, ReflectionModel, Shading};
 use lumbre::render::Display;
 use lumbre::scene::PackedFormat;
+use lumbre::trace::{DEFAULT_WEIGHT, Filter, Integrator, TreeFormat};
 
 /// Lighting for games that tells you what it costs.
 #[derive(Debug, Parser)]
@@ -20,6 +21,7 @@ Examples:
   lumbre room.glb                                look at a file: turn it, walk in it, bake it at a key press
   lumbre bake room.glb -o room.baked.glb         bake its radiosity into lightmaps
   lumbre render room.baked.glb -o room.png       draw it without a window
+  lumbre trace room.glb -o room.png              the same by ray tracing: mirrors, glass, shadows
   lumbre explain room.glb                        what it calls for, and what it does not"
 )]
 pub struct Arguments {
@@ -63,6 +65,20 @@ Examples:
   lumbre render ball.glb -o ball.exr --shading gouraud --display linear
   lumbre render room.glb -o room.png --frames 20 --timings times.json")]
     Render(Render),
+    /// Trace rays: mirrors, glass and shadows, or all light as it is.
+    #[command(after_help = "\
+Examples:
+  lumbre trace room.glb -o room.png --depth 8
+  lumbre trace room.glb -o room.exr --integrator path --error 0.01
+  lumbre trace room.glb --pixel 640,360 --tree text
+  lumbre trace room.glb --pixel 640,360 --tree svg > rays.svg")]
+    Trace(Trace),
+    /// Say how far one picture is from another: in light, and to the eye (FLIP).
+    #[command(after_help = "\
+Examples:
+  lumbre compare traced.exr frame.exr
+  lumbre compare traced.png frame.png -o heat.png --json")]
+    Compare(Compare),
     /// Say what a scene calls for, which passes run and why the others do not.
     #[command(
         after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --measure\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
@@ -286,6 +302,78 @@ pub struct Render {
 }
 
 #[derive(Args, Debug)]
+pub struct Trace {
+    /// The scene: .glb or .gltf, baked or not.
+    pub input: PathBuf,
+    #[command(flatten)]
+    pub reading: Reading,
+    /// The picture: .png (eight bits) or .exr (floats).
+    #[arg(short, long, value_name = "OUT.png|OUT.exr", required_unless_present = "pixel")]
+    pub output: Option<PathBuf>,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_negative_numbers = true)]
+    pub size: (u32, u32),
+    #[command(flatten)]
+    pub frame: Frame,
+    /// How light is followed: the documents' ray tree, or paths, which find all light and state their noise.
+    #[arg(long, value_name = "whitted|path", default_value = "whitted", value_parser = integrator)]
+    pub integrator: Integrator,
+    /// Mirrored and transmitted rays one after another; 5 without this. Of paths all reflections, and only chance ends them without this.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000), allow_negative_numbers = true)]
+    pub depth: Option<u32>,
+    /// Rays of the tree that count for less than this are not traced.
+    #[arg(long, value_name = "X", default_value_t = DEFAULT_WEIGHT, value_parser = weight, allow_negative_numbers = true)]
+    pub weight: f64,
+    /// Lets every light reach everything.
+    #[arg(long)]
+    pub no_shadows: bool,
+    /// Samples of a pixel: so many of the ray tree (1 without this), at most so many paths (64, or as many as --error or --time take).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576), allow_negative_numbers = true)]
+    pub samples: Option<u32>,
+    /// Relative standard error of the whole picture at which paths end, like 0.01 or 1%.
+    #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
+    pub error: Option<f64>,
+    /// Seconds after which no more samples are begun; what is there is written.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    pub time: Option<Duration>,
+    /// How samples make a pixel: box, mitchell, blackman-harris.
+    #[arg(long, value_name = "FILTER", default_value = "box", value_parser = filter)]
+    pub filter: Filter,
+    /// Takes a quarter of the samples where neighbouring pixels differ by less than this as shown, 0 to 1.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    pub adaptive: Option<f64>,
+    /// Worker threads; as many as there are cores without this.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
+    pub threads: Option<u16>,
+    /// Prints the ray tree of this pixel, counted from the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = pixel)]
+    pub pixel: Option<(u32, u32)>,
+    /// How it is printed: text, json, dot for Graphviz, svg as a drawing of the rays.
+    #[arg(long, value_name = "FORMAT", default_value = "text", value_parser = tree_format, requires = "pixel")]
+    pub tree: TreeFormat,
+    /// Prints the report as JSON.
+    #[arg(long, conflicts_with = "pixel")]
+    pub json: bool,
+    /// Says nothing of how far it is.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Compare {
+    /// What is right: .png, .jpg or .exr.
+    pub reference: PathBuf,
+    /// What is compared with it.
+    pub test: PathBuf,
+    /// Where a heat map of FLIP goes: black where nothing differs, white where most does.
+    #[arg(short, long, value_name = "HEATMAP.png")]
+    pub output: Option<PathBuf>,
+    /// Prints the figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Args, Debug)]
 pub struct Explain {
     /// The scene: .glb or .gltf, baked or not.
     pub input: PathBuf,
@@ -364,7 +452,10 @@ fn gltf_file(text: &str) -> Result<PathBuf, String> {
         .is_some_and(|extension| ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)));
     match is_named_so || path.exists() {
         true => Ok(path),
-        false => Err("neither a .glb or .gltf file nor a command: play, bake, render, explain".into()),
+        false => {
+            Err("neither a .glb or .gltf file nor a command: play, bake, render, trace, compare, explain"
+                .into())
+        }
     }
 }
 
@@ -463,6 +554,31 @@ fn shading(text: &str) -> Result<Shading, String> {
 
 fn reflection(text: &str) -> Result<ReflectionModel, String> {
     named(ReflectionModel::from_name(text), ReflectionModel::ALL.iter().map(|choice| choice.name()))
+}
+
+fn integrator(text: &str) -> Result<Integrator, String> {
+    named(Integrator::from_name(text), Integrator::ALL.iter().map(|choice| choice.name()))
+}
+
+fn filter(text: &str) -> Result<Filter, String> {
+    named(Filter::from_name(text), Filter::ALL.iter().map(|choice| choice.name()))
+}
+
+fn tree_format(text: &str) -> Result<TreeFormat, String> {
+    named(TreeFormat::from_name(text), TreeFormat::ALL.iter().map(|choice| choice.name()))
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err("a number from 0 to 1 is wanted, like 0.001".into()),
+    }
+}
+
+fn pixel(text: &str) -> Result<(u32, u32), String> {
+    let place =
+        text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    place.ok_or_else(|| "X,Y is wanted, like 640,360".into())
 }
 
 fn flat_rule(text: &str) -> Result<FlatRule, String> {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!    level.glb ─► scene ─► bake ─► level.baked.glb ─► scene ─► render ─► frame
-//!                   │                                            │
+//!                   │  └─► trace ─► reference picture            │
 //!                 optics, mesh, rays                           graph
 //! ```
 //!
@@ -24,3 +24,4 @@ pub use lumbre_optics as optics;
 pub use lumbre_rays as rays;
 pub use lumbre_render as render;
 pub use lumbre_scene as scene;
+pub use lumbre_trace as trace;

@@ -3,6 +3,7 @@
 mod arguments;
 mod bake;
 mod bake_record;
+mod compare;
 mod explain;
 mod interruption;
 mod lightmap_report;
@@ -11,6 +12,7 @@ mod output;
 mod play;
 mod progress;
 mod render;
+mod trace;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -37,6 +39,8 @@ fn main() -> ExitCode {
         Some(Command::Play(options)) => play::run(&options),
         Some(Command::Bake(options)) => bake::run(&options),
         Some(Command::Render(options)) => render::run(&options),
+        Some(Command::Trace(options)) => trace::run(&options),
+        Some(Command::Compare(options)) => compare::run(&options),
         Some(Command::Explain(options)) => explain::run(&options),
     };
     match outcome {

@@ -1,4 +1,4 @@
-//! How far a bake has come, for whoever waits: a bar on a terminal, a line every ten seconds in a pipe. Not the bake.
+//! How far a bake or a traced picture has come, for whoever waits: a bar on a terminal, a line every ten seconds in a pipe. Not the bake.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -17,12 +17,17 @@ pub enum Shown {
 }
 
 impl Shown {
-    /// A bar if standard error is a terminal, else lines; nothing if `quiet`.
+    /// Of a bake: a bar if standard error is a terminal, else lines; nothing if `quiet`.
     pub fn new(quiet: bool) -> Self {
+        Self::of("bake", quiet)
+    }
+
+    /// The same of something else that takes its time, by its name.
+    pub fn of(what: &'static str, quiet: bool) -> Self {
         match (quiet, std::io::stderr().is_terminal()) {
             (true, _) => Self::Nothing,
             (false, true) => Self::Bar(bar()),
-            (false, false) => Self::Lines(Lines::new()),
+            (false, false) => Self::Lines(Lines::new(what)),
         }
     }
 
@@ -61,16 +66,17 @@ fn bar() -> ProgressBar {
     bar
 }
 
-/// The lines of one bake.
+/// The lines of one bake, or of whatever else.
 pub struct Lines {
+    what: &'static str,
     begun: Instant,
     /// When the next one is due.
     due: Duration,
 }
 
 impl Lines {
-    fn new() -> Self {
-        Self { begun: Instant::now(), due: Duration::ZERO }
+    fn new(what: &'static str) -> Self {
+        Self { what, begun: Instant::now(), due: Duration::ZERO }
     }
 
     /// The line that is due, so long after the beginning.
@@ -81,9 +87,10 @@ impl Lines {
         self.due = after + EVERY;
         let Progress { stage, stage_fraction, fraction, error } = progress;
         let mut line = format!(
-            "lumbre: {stage}: {:.0} % ({:.0} % of the bake) after {:.0} s",
+            "lumbre: {stage}: {:.0} % ({:.0} % of the {}) after {:.0} s",
             100.0 * stage_fraction,
             100.0 * fraction,
+            self.what,
             after.as_secs_f64()
         );
         if let Some(error) = error {
@@ -101,7 +108,7 @@ mod tests {
     fn there_is_a_line_at_once_and_one_every_ten_seconds() {
         let at =
             |fraction: f32, error| Progress { stage: "direct light", stage_fraction: 0.45, fraction, error };
-        let mut lines = Lines::new();
+        let mut lines = Lines::new("bake");
         let mut said = Vec::new();
         for step in 0..=400u32 {
             let after = Duration::from_millis(100) * step;

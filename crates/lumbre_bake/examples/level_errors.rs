@@ -21,11 +21,11 @@ mod common;
 #[path = "../tests/held_out/mod.rs"]
 mod held_out;
 
-use held_out::flip::mean_flip;
 use held_out::judgement::judge;
 use held_out::path_tracer::{Effort, Irradiance, PathTracer};
 use held_out::view::{View, write_png};
 use held_out::{reference_points, scenes};
+use lumbre_trace::flip::mean_flip;
 
 /// Pixels of a view.
 const WIDTH: usize = 640;

@@ -44,6 +44,8 @@ mod gltf;
 mod hidden_cone;
 mod image;
 mod lightmap_files;
+mod medium;
+mod quadric;
 mod settings;
 mod transform;
 
@@ -70,5 +72,7 @@ pub use lightmap_files::{
     Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,
 };
 pub use lumbre_optics::{Light, Material, Shading};
+pub use medium::Medium;
+pub use quadric::{Quadric, QuadricError, QuadricShape};
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};

@@ -3,7 +3,6 @@
 
 #![allow(dead_code, reason = "every test and example uses its own part of this module")]
 
-pub mod flip;
 pub mod input;
 pub mod judgement;
 pub mod local_errors;

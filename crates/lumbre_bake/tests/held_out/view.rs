@@ -10,10 +10,10 @@ use lumbre_optics::Material;
 use lumbre_scene::{Camera, GlobalTransform, Lightmap, Mesh, Projection, SceneSettings, StaticObject};
 use rayon::prelude::*;
 
-use super::flip::Picture;
 use super::path_tracer::hierarchy::Hierarchy;
 use super::path_tracer::triangles;
 use crate::common::{Surface, bilinear};
+use lumbre_trace::flip::Picture;
 
 /// Radiance row by row.
 pub struct View {

@@ -8,11 +8,11 @@ use super::export::SaveError;
 use super::export_data::Data;
 use super::extensions::{PhongMaterial, PhongSurface};
 use super::import_material::{default_lobe, front_from_metallic_roughness};
-use crate::MaterialTextures;
+use crate::{MaterialTextures, Medium};
 
 /// The JSON of a material. Without our extension it reads back the same, or the extension is there.
 pub(crate) fn material(
-    material: &Material,
+    (material, medium): (&Material, Option<Medium>),
     textures: &MaterialTextures,
     name: &str,
     place: &str,
@@ -20,6 +20,9 @@ pub(crate) fn material(
 ) -> Result<Value, SaveError> {
     let label = if name.is_empty() { place } else { name };
     material.validate(label).map_err(|source| SaveError::Material { place: place.to_owned(), source })?;
+    if let Some((field, ..)) = medium.and_then(|medium| medium.fault()) {
+        return Err(SaveError::NotFinite { place: place.to_owned(), field: format!("Medium.{field}") });
+    }
     let mut extensions = Map::new();
     let emission = material.front.emission;
     // A power of two, so that factor times strength is the same f32 again.
@@ -54,6 +57,7 @@ pub(crate) fn material(
         || material.mirror != defaults.mirror
         || material.transmission != defaults.transmission
         || material.ior != defaults.ior
+        || medium.is_some_and(|medium| medium != Medium::default())
         || material.distribution != defaults.distribution
         || material.lobe != Lobe::EnergyKeeping
         || !plain_fresnel;
@@ -83,6 +87,14 @@ pub(crate) fn material(
             eta: conductor.map(|(eta, _)| color(eta)),
             absorption: conductor.map(|(_, absorption)| color(absorption)),
             lobe: None,
+            thin: medium.filter(|medium| medium.thin).map(|_| true),
+            fresnel_split: medium.filter(|medium| medium.fresnel).map(|_| true),
+            attenuation_color: medium
+                .filter(|medium| medium.attenuation_color != Vec3::ONE)
+                .map(|medium| color(medium.attenuation_color)),
+            attenuation_distance: medium
+                .filter(|medium| medium.attenuation_distance.is_finite())
+                .map(|medium| f64::from(medium.attenuation_distance)),
         };
         if material.lobe != default_lobe(Some(&phong), textured) {
             phong.lobe = Some(material.lobe.name().to_owned());

@@ -12,10 +12,11 @@ use super::error::{Note, Notes};
 use super::export::{LightmapFiles, SaveError};
 use super::export_data::Data;
 use super::extensions::{CameraExtension, ObjectExtension};
+use super::quadric_extension::QuadricExtension;
 use super::{export_light, export_material, export_scene};
 use crate::{
     ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, IrradianceVolume, Lightmap,
-    LightmapImage, MaterialTextures, Mesh, Primitive, Transform,
+    LightmapImage, MaterialTextures, Medium, Mesh, Primitive, Quadric, Transform,
 };
 
 /// The lists of a file being written.
@@ -39,6 +40,7 @@ struct Appearance {
     lightmap: Option<Arc<LightmapImage>>,
     hidden: bool,
     emissive_light: bool,
+    quadric: Option<Quadric>,
     dynamic: bool,
 }
 
@@ -48,7 +50,7 @@ type Parts = Vec<(*const TriangleMesh, usize)>;
 /// Materials written so far, and meshes by what they are made of.
 #[derive(Default)]
 struct Known {
-    materials: Vec<(Material, MaterialTextures, Arc<str>)>,
+    materials: Vec<(Material, MaterialTextures, Option<Medium>, Arc<str>)>,
     meshes: HashMap<(Arc<str>, Parts), usize>,
 }
 
@@ -265,6 +267,10 @@ impl Nodes {
         if !choices.is_empty() {
             extend(node, "LUMBRE_shading", choices.into());
         }
+        if let Some(quadric) = appearance.quadric.as_ref().filter(|_| node.contains_key("mesh")) {
+            let extension = serde_json::to_value(QuadricExtension::of(quadric));
+            extend(node, "LUMBRE_quadric", extension.map_err(|source| SaveError::Json { source })?);
+        }
         if let Some(image) = &appearance.lightmap {
             extend(node, "LUMBRE_lightmap", lightmaps.reference(image, name, number));
         }
@@ -282,11 +288,18 @@ impl Nodes {
         let material = world.get::<Material>(entity).cloned().unwrap_or_default();
         let textures = world.get::<MaterialTextures>(entity).cloned().unwrap_or_default();
         let name = label.map(|label| label.material.clone()).unwrap_or_default();
-        let key = (material, textures, name);
+        let medium = world.get::<Medium>(entity).copied();
+        let key = (material, textures, medium, name);
         if let Some(known) = known.materials.iter().position(|known| *known == key) {
             return Ok(known);
         }
-        self.materials.push(export_material::material(&key.0, &key.1, &key.2, place, &mut self.data)?);
+        self.materials.push(export_material::material(
+            (&key.0, key.2),
+            &key.1,
+            &key.3,
+            place,
+            &mut self.data,
+        )?);
         known.materials.push(key);
         Ok(self.materials.len() - 1)
     }
@@ -326,6 +339,7 @@ fn appearance(world: &World, entity: Entity, dynamic: bool) -> Appearance {
         lightmap: world.get::<Lightmap>(entity).map(|lightmap| lightmap.image.clone()),
         hidden: world.get::<Hidden>(entity).is_some(),
         emissive_light: world.get::<EmissiveLight>(entity).is_some(),
+        quadric: world.get::<Quadric>(entity).cloned(),
         dynamic: dynamic || world.get::<DynamicObject>(entity).is_some(),
     }
 }

@@ -33,6 +33,17 @@ pub(crate) struct PhongMaterial {
     pub eta: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absorption: Option<Color>,
+    /// A see-through surface is a sheet without an inside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thin: Option<bool>,
+    /// Fresnel's equations divide what passes.
+    #[serde(rename = "fresnelSplit", skip_serializing_if = "Option::is_none")]
+    pub fresnel_split: Option<bool>,
+    #[serde(rename = "attenuationColor", skip_serializing_if = "Option::is_none")]
+    pub attenuation_color: Option<Color>,
+    /// Metres.
+    #[serde(rename = "attenuationDistance", skip_serializing_if = "Option::is_none")]
+    pub attenuation_distance: Option<f64>,
 }
 
 /// The coefficients of one side.
@@ -265,6 +276,16 @@ pub(crate) struct Specular {
 pub(crate) struct Transmission {
     pub transmission_factor: Option<f64>,
     pub transmission_texture: Option<serde_json::Value>,
+}
+
+/// KHR_materials_volume.
+#[derive(Deserialize, Debug, Default)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Volume {
+    pub thickness_factor: Option<f64>,
+    pub thickness_texture: Option<serde_json::Value>,
+    pub attenuation_distance: Option<f64>,
+    pub attenuation_color: Option<Color>,
 }
 
 /// KHR_texture_transform.

@@ -264,6 +264,12 @@ fn spawn_primitive(world: &mut World, node: &PreparedNode, primitive: &PreparedP
     if primitive.textures != MaterialTextures::default() {
         entity.insert(primitive.textures.clone());
     }
+    if let Some(medium) = primitive.medium {
+        entity.insert(medium);
+    }
+    if let Some(quadric) = &node.quadric {
+        entity.insert(quadric.clone());
+    }
     if let Some(reflection) = node.reflection {
         entity.insert(reflection);
     }

@@ -227,7 +227,7 @@ fn transmission(
         notes.add(
             place,
             format!(
-                "{name} is kept as the coefficient of transmission; frames and bakes show the surface opaque"
+                "{name} is kept as the coefficient of transmission; frames and bakes show the surface opaque, and `lumbre trace` lets light through it"
             ),
         );
     }

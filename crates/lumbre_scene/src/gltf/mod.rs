@@ -32,6 +32,7 @@ mod import_irradiance_volume;
 mod import_light;
 mod import_lightmap;
 mod import_material;
+mod import_medium;
 mod import_mesh;
 mod import_scene;
 mod instancing;
@@ -41,6 +42,7 @@ mod meshopt;
 mod options;
 mod patch;
 mod prepared;
+mod quadric_extension;
 mod source;
 mod texture_ktx2;
 mod texture_sets;
@@ -72,6 +74,7 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_variants",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     #[cfg(feature = "basisu")]
     "KHR_texture_basisu",
@@ -83,6 +86,7 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "LUMBRE_lights_phong",
     "LUMBRE_materials_phong",
     "LUMBRE_object",
+    "LUMBRE_quadric",
     "LUMBRE_scene",
     "LUMBRE_shading",
 ];

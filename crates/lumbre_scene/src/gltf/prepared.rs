@@ -20,10 +20,14 @@ use super::import_image::{Images, white};
 use super::import_irradiance_volume::irradiance_volume;
 use super::import_lightmap::Lightmaps;
 use super::limits::{Budget, LoadLimits};
+use super::quadric_extension::QuadricExtension;
 use super::uri::Base;
 use super::value::number;
-use super::{import_light, import_material, import_mesh, import_scene};
-use crate::{Camera, IrradianceVolume, Lightmap, MaterialTextures, Primitive, SceneSettings, Transform};
+use super::{import_light, import_material, import_medium, import_mesh, import_scene};
+use crate::{
+    Camera, IrradianceVolume, Lightmap, MaterialTextures, Medium, Primitive, Quadric, SceneSettings,
+    Transform,
+};
 
 /// A primitive of a mesh with its material.
 pub(crate) struct PreparedPrimitive {
@@ -31,6 +35,7 @@ pub(crate) struct PreparedPrimitive {
     pub mesh: Arc<TriangleMesh>,
     pub material: Material,
     pub textures: MaterialTextures,
+    pub medium: Option<Medium>,
 }
 
 /// A node with what hangs on it.
@@ -51,6 +56,7 @@ pub(crate) struct PreparedNode {
     pub dynamic: bool,
     pub hidden: bool,
     pub emissive_light: bool,
+    pub quadric: Option<Quadric>,
     pub extras: Option<serde_json::Value>,
 }
 
@@ -90,8 +96,9 @@ pub(crate) fn prepare(
     let mut images =
         Images { buffers, base, limits, budget: image_budget, decoded, stand_in: Arc::new(white()) };
     // Also those that nothing uses: what is wrong with them should be known before it matters.
-    let mut materials = Vec::new();
+    let (mut materials, mut media) = (Vec::new(), Vec::new());
     for (index, source) in document.materials.iter().enumerate() {
+        media.push(import_medium::medium(source, &document.material_place(index), notes)?);
         materials.push(import_material::material(
             source,
             &document.material_place(index),
@@ -125,8 +132,14 @@ pub(crate) fn prepare(
         if let Some(mesh) = node.mesh {
             element(&document.meshes, "meshes", mesh, || format!("{place}.mesh"))?;
             if let Entry::Vacant(entry) = meshes.entry(mesh) {
-                let mut source =
-                    Source { document, buffers, materials: &materials, budget: &mut budget, notes };
+                let mut source = Source {
+                    document,
+                    buffers,
+                    materials: &materials,
+                    media: &media,
+                    budget: &mut budget,
+                    notes,
+                };
                 entry.insert(source.primitives(mesh, node.name.as_deref(), &mut geometries)?);
             }
         }
@@ -198,6 +211,16 @@ pub(crate) fn prepare(
         }
         let object =
             extension::<ObjectExtension>(&node.extensions, "LUMBRE_object", &place)?.unwrap_or_default();
+        let exact = extension::<QuadricExtension>(&node.extensions, "LUMBRE_quadric", &place)?;
+        let mut quadric = exact.map(|exact| exact.surface(&place)).transpose()?;
+        let primitives = node.mesh.and_then(|mesh| meshes.get(&mesh)).map_or(0, Vec::len);
+        if quadric.is_some() && primitives != 1 {
+            notes.add(
+                &place,
+                format!("has LUMBRE_quadric and {primitives} primitives: it needs a mesh of one, whose material it takes; the exact surface is left out"),
+            );
+            quadric = None;
+        }
         nodes.push(PreparedNode {
             index,
             parent: parents[index],
@@ -214,6 +237,7 @@ pub(crate) fn prepare(
             dynamic: dynamic.contains(&index),
             hidden: object.hidden,
             emissive_light: object.emissive_light,
+            quadric,
             extras: node.extras.clone(),
         });
     }
@@ -230,6 +254,7 @@ struct Source<'a> {
     document: &'a Document,
     buffers: &'a Buffers<'a>,
     materials: &'a [(Material, MaterialTextures)],
+    media: &'a [Option<Medium>],
     budget: &'a mut Budget,
     notes: &'a mut Notes,
 }
@@ -272,7 +297,8 @@ impl Source<'_> {
             let Some(triangles) = triangles else { continue };
             let label = Primitive { index, mesh: name.clone(), material: material_name.into() };
             let textures = usable(textures, &triangles, &place, self.notes);
-            prepared.push(PreparedPrimitive { label, mesh: triangles, material, textures });
+            let medium = primitive.material.and_then(|index| *self.media.get(index)?);
+            prepared.push(PreparedPrimitive { label, mesh: triangles, material, textures, medium });
         }
         Ok(prepared)
     }

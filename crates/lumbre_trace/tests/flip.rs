@@ -1,12 +1,7 @@
-//! The tests' FLIP against what its authors publish of it, and against what any difference of pictures has to be.
+//! FLIP against what its authors publish of it, and against what any difference of pictures has to be.
 
 use glam::DVec3;
-
-#[path = "held_out/flip.rs"]
-#[allow(dead_code, reason = "the mean is for programs")]
-mod flip;
-
-use flip::{PIXELS_PER_DEGREE, Picture, flip};
+use lumbre_trace::flip::{PIXELS_PER_DEGREE, Picture, flip};
 
 fn picture(width: usize, height: usize, color: impl Fn(usize, usize) -> DVec3) -> Picture {
     let pixels = (0..width * height).map(|i| color(i % width, i / width)).collect();

@@ -12,7 +12,9 @@ pub const PIXELS_PER_DEGREE: f64 = 0.7 * 3840.0 / 0.7 * PI / 180.0;
 /// Colours in sRGB, each channel in [0, 1], row by row.
 #[derive(Clone, Debug)]
 pub struct Picture {
+    /// Columns.
     pub width: usize,
+    /// Colours, top row first.
     pub pixels: Vec<DVec3>,
 }
 
@@ -29,16 +31,17 @@ const FEATURE_EXPONENT: f64 = 0.5;
 /// Differences up to this share of the largest one are spread over this share of [0, 1].
 const KNEE: [f64; 2] = [0.4, 0.95];
 
-/// The difference of each pixel, in [0, 1].
+/// The difference of each pixel, in [0, 1], of two pictures of one size.
 pub fn flip(reference: &Picture, test: &Picture, pixels_per_degree: f64) -> Vec<f64> {
     let color = color_differences(reference, test, pixels_per_degree);
     let feature = feature_differences(reference, test, pixels_per_degree);
     color.iter().zip(feature).map(|(color, feature)| color.powf(1.0 - feature)).collect()
 }
 
+/// The mean difference, in [0, 1]; 0 of pictures without pixels.
 pub fn mean_flip(reference: &Picture, test: &Picture) -> f64 {
     let map = flip(reference, test, PIXELS_PER_DEGREE);
-    map.iter().sum::<f64>() / map.len() as f64
+    map.iter().sum::<f64>() / map.len().max(1) as f64
 }
 
 fn linear(color: DVec3) -> DVec3 {
@@ -158,7 +161,7 @@ fn kernel(radius: i64, weight: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
 
 /// Channel by channel; what is beyond the border is as the border.
 fn convolved(pixels: &[DVec3], width: usize, radius: i64, kernel: &[DVec3]) -> Vec<DVec3> {
-    let height = pixels.len() / width;
+    let height = pixels.len() / width.max(1);
     let at = |x: i64, y: i64| {
         let (x, y) = (x.clamp(0, width as i64 - 1), y.clamp(0, height as i64 - 1));
         pixels[y as usize * width + x as usize]

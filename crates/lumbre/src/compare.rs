@@ -1,0 +1,117 @@
+//! `lumbre compare`: how far one picture is from another, in light and to the eye.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use glam::DVec3;
+use lumbre::trace::{compare, encode_srgb, tone_curve};
+
+use crate::arguments::Compare;
+use crate::loading::extension;
+use crate::output::write_file;
+
+/// A picture from a file.
+struct Read {
+    width: u32,
+    height: u32,
+    pixels: Vec<DVec3>,
+    /// Floats of light; else bytes with sRGB's curve.
+    is_light: bool,
+}
+
+/// Runs the command.
+pub fn run(asked: &Compare) -> anyhow::Result<()> {
+    let (reference, test) = (read(&asked.reference)?, read(&asked.test)?);
+    if (reference.width, reference.height) != (test.width, test.height) {
+        bail!(
+            "{} has {} x {} pixels and {} {} x {}: only pictures of one size can be compared",
+            asked.reference.display(),
+            reference.width,
+            reference.height,
+            asked.test.display(),
+            test.width,
+            test.height
+        );
+    }
+    if let Some(output) = &asked.output
+        && extension(output)? != "png"
+    {
+        bail!("{}: the heat map is written as .png", output.display());
+    }
+    let shown = [&reference, &test]
+        .map(|picture| picture.pixels.iter().map(|p| picture.shown(*p)).collect::<Vec<_>>());
+    // Light is compared with light; where one has been through a tone curve, both are as they are shown.
+    let both_light = reference.is_light && test.is_light;
+    let light = |picture: &Read, shown: &[DVec3]| match both_light {
+        true => picture.pixels.clone(),
+        false => shown.iter().map(|color| decoded(*color)).collect(),
+    };
+    let linear = [light(&reference, &shown[0]), light(&test, &shown[1])];
+    let found = compare(reference.width as usize, [&linear[0], &linear[1]], shown);
+    if let Some(output) = &asked.output {
+        let bytes: Vec<u8> = found.map.iter().flat_map(|value| heat(*value)).collect();
+        let image = image::RgbImage::from_raw(reference.width, reference.height, bytes);
+        let image = image.context("the heat map has another size than the pictures")?;
+        write_file(output, |path| Ok(image.save(path)?))?;
+    }
+    let mut out = std::io::stdout().lock();
+    if asked.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&found)?)?;
+        return Ok(());
+    }
+    let [x, y] = found.largest_at;
+    writeln!(
+        out,
+        "relative error {:.3} %, bias {:+.3} %",
+        100.0 * found.relative_error,
+        100.0 * found.relative_bias
+    )?;
+    writeln!(out, "largest difference {:.4e} of a channel, at pixel {x},{y}", found.largest)?;
+    match found.psnr {
+        Some(psnr) => writeln!(out, "as shown: PSNR {psnr:.1} dB, FLIP {:.4}", found.flip)?,
+        None => writeln!(out, "as shown: the same")?,
+    }
+    Ok(())
+}
+
+impl Read {
+    fn shown(&self, pixel: DVec3) -> DVec3 {
+        if self.is_light { encode_srgb(tone_curve(pixel)) } else { pixel }
+    }
+}
+
+fn read(path: &Path) -> anyhow::Result<Read> {
+    let image = image::ImageReader::open(path)
+        .with_context(|| format!("{} cannot be read", path.display()))?
+        .with_guessed_format()
+        .with_context(|| format!("{} cannot be read", path.display()))?
+        .decode()
+        .with_context(|| {
+            format!("{} is no picture that can be read; give .png, .jpg or .exr", path.display())
+        })?;
+    let is_light =
+        matches!(image, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
+    let (width, height) = (image.width(), image.height());
+    let pixels = image.to_rgb32f().pixels().map(|pixel| glam::Vec3::from(pixel.0).as_dvec3()).collect();
+    Ok(Read { width, height, pixels, is_light })
+}
+
+/// From sRGB's curve to light.
+fn decoded(color: DVec3) -> DVec3 {
+    let channel = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    DVec3::new(channel(color.x), channel(color.y), channel(color.z))
+}
+
+/// Black, violet, red, yellow, white: the brighter the farther apart, in any print.
+fn heat(value: f64) -> [u8; 3] {
+    const STOPS: [[f64; 3]; 5] =
+        [[0.0, 0.0, 0.02], [0.34, 0.06, 0.43], [0.74, 0.21, 0.33], [0.98, 0.56, 0.04], [0.99, 1.0, 0.64]];
+    let place = value.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
+    let below = (place as usize).min(STOPS.len() - 2);
+    let part = place - below as f64;
+    [0, 1, 2].map(|channel| {
+        let (low, high) = (STOPS[below][channel], STOPS[below + 1][channel]);
+        (255.0 * (low + (high - low) * part)).round() as u8
+    })
+}

@@ -1,0 +1,255 @@
+//! `lumbre trace`: the reference picture of a scene, or the ray tree of one of its pixels.
+
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Mutex;
+
+use anyhow::{Context, bail};
+use glam::{DVec2, DVec3};
+use lumbre::bake::Progress;
+use lumbre::render::Display;
+use lumbre::trace::{
+    Ended, Integrator, Metering, Picture, TraceOptions, TraceReport, Tracer, draw_tree, encode_srgb,
+    tone_curve,
+};
+
+use crate::arguments::{Exposure, Trace};
+use crate::interruption::Interruption;
+use crate::loading::{extension, frame_options, load};
+use crate::output::write_file;
+use crate::progress::Shown;
+
+/// Share of a picture that has to be white for want of an exposure before one is metered unasked: as of a frame.
+const CLIPPED: f64 = 0.02;
+/// Samples of the ray tree with `--msaa`: as many as a frame then has.
+const MULTISAMPLES: u32 = 4;
+
+/// Runs the command.
+pub fn run(asked: &Trace) -> anyhow::Result<()> {
+    let floats = match asked.output.as_deref().map(extension).transpose()?.as_deref() {
+        None | Some("png") => false,
+        Some("exr") => true,
+        Some(other) => bail!(
+            "{}: .{other} is not written, only .png and .exr",
+            asked.output.as_deref().unwrap_or(Path::new("")).display()
+        ),
+    };
+    let mut loaded = load(&asked.input, &asked.reading)?;
+    for note in meaningless(asked) {
+        eprintln!("lumbre: note: {note}");
+    }
+    let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
+    let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
+    let frame = frame_options(&mut loaded.world, &asked.frame, display, aspect, &asked.input)?;
+    let options = options(asked, &frame);
+    let tracer = Tracer::new(&mut loaded.world, &options)
+        .with_context(|| format!("{} cannot be traced", asked.input.display()))?;
+    for note in tracer.notes() {
+        eprintln!("lumbre: note: {}: {note}", asked.input.display());
+    }
+    if let Some((x, y)) = asked.pixel {
+        return print_tree(asked, &tracer, (x, y));
+    }
+    let Some(output) = &asked.output else { bail!("say with -o where the picture goes") };
+    let (picture, report) = traced(asked, &tracer)?;
+    let photometric = loaded.report.photometric_lights > 0 && !loaded.report.states_exposure;
+    let exposure = exposure(asked, &picture, photometric && display == Display::Srgb);
+    write_picture(output, &picture, display, exposure, floats)?;
+    let black = picture.radiance.iter().all(|pixel| pixel.max_element() <= 0.0);
+    if black && loaded.report.triangles > 0 && report.finished == 1.0 {
+        eprintln!(
+            "lumbre: note: {}: the picture is black: no light reaches what the camera sees; try another --camera",
+            asked.input.display()
+        );
+    }
+    print_report(asked, &report)?;
+    if report.ended == Ended::Interrupted {
+        bail!("interrupted; {} holds {:.0} % of the picture", output.display(), 100.0 * report.finished);
+    }
+    Ok(())
+}
+
+fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions {
+    TraceOptions {
+        camera: frame.camera,
+        size: asked.size,
+        integrator: asked.integrator,
+        reflection: asked.frame.reflection,
+        depth: asked.depth,
+        weight: asked.weight,
+        shadows: !asked.no_shadows,
+        lightmaps: !asked.frame.no_lightmaps,
+        samples: asked
+            .samples
+            .or((asked.frame.msaa && asked.integrator == Integrator::Whitted).then_some(MULTISAMPLES)),
+        error: asked.error,
+        time: asked.time,
+        threads: asked.threads.map(usize::from),
+        filter: asked.filter,
+        adaptive: asked.adaptive,
+    }
+}
+
+/// What a frame knows and rays do not, and options of one integrator for the other.
+fn meaningless(asked: &Trace) -> Vec<&'static str> {
+    let trees = asked.integrator == Integrator::Whitted;
+    let told = [
+        (
+            asked.frame.shading.is_some() || asked.frame.flat_rule.is_some(),
+            "--shading and --flat-rule mean nothing to rays: every point is lit by itself, as under Phong shading",
+        ),
+        (
+            asked.frame.specular_antialiasing.is_some(),
+            "--specular-antialiasing means nothing to rays: --samples filters highlights and everything else",
+        ),
+        (trees && asked.error.is_some(), "--error is for --integrator path: the ray tree has no noise"),
+        (
+            !trees && asked.adaptive.is_some(),
+            "--adaptive is for the ray tree: paths sample every pixel alike",
+        ),
+        (
+            !trees && asked.frame.no_lightmaps,
+            "--no-lightmaps is for the ray tree: paths never read lightmaps, they find that light themselves",
+        ),
+        (
+            trees && asked.adaptive.is_some() && asked.samples.unwrap_or(1) < 4,
+            "--adaptive needs --samples of 4 or more",
+        ),
+    ];
+    told.into_iter().filter_map(|(holds, words)| holds.then_some(words)).collect()
+}
+
+fn print_tree(asked: &Trace, tracer: &Tracer, (x, y): (u32, u32)) -> anyhow::Result<()> {
+    let (width, height) = asked.size;
+    if x >= width || y >= height {
+        bail!(
+            "there is no pixel {x},{y} in a picture of {width}x{height}; count from 0,0 in its upper left corner"
+        );
+    }
+    if asked.integrator != Integrator::Whitted {
+        bail!("paths are no tree; leave out --integrator path, or --pixel");
+    }
+    let tree = tracer.tree(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+    std::io::stdout().write_all(draw_tree(&tree, asked.tree).as_bytes())?;
+    Ok(())
+}
+
+fn traced(asked: &Trace, tracer: &Tracer) -> anyhow::Result<(Picture, TraceReport)> {
+    let stage = match asked.integrator {
+        Integrator::Whitted => "ray trees",
+        Integrator::Path => "paths",
+    };
+    let interruption = Interruption::handle();
+    let shown = Mutex::new(Shown::of("picture", asked.quiet));
+    let found = interruption.told(|is_asked| {
+        tracer.picture(&|progress| {
+            if let Ok(mut shown) = shown.lock() {
+                let fraction = progress.fraction as f32;
+                let error = progress.error;
+                shown.update(Progress { stage, stage_fraction: fraction, fraction, error });
+            }
+            if is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+    });
+    if let Ok(shown) = shown.lock() {
+        shown.finish();
+    }
+    Ok(found?)
+}
+
+/// The factor on radiance that is asked for, or metered as of a frame, or the camera's.
+fn exposure(asked: &Trace, picture: &Picture, may_be_metered: bool) -> f64 {
+    let metered = match asked.frame.exposure {
+        Some(Exposure::Factor(factor)) => return f64::from(factor),
+        Some(Exposure::Auto) => Metering::of(&picture.radiance),
+        None if may_be_metered => Metering::of(&picture.radiance).filter(|found| found.clipped > CLIPPED),
+        None => None,
+    };
+    let Some(found) = metered else { return f64::from(picture.exposure) };
+    eprintln!(
+        "lumbre: note: {}: exposure {:.3e} ({:.1} EV), metered: the log-average luminance is {:.4} (--exposure X or EV for another)",
+        asked.input.display(),
+        found.exposure,
+        found.exposure_value(),
+        found.luminance
+    );
+    f64::from(found.exposure)
+}
+
+fn write_picture(
+    path: &Path,
+    picture: &Picture,
+    display: Display,
+    exposure: f64,
+    floats: bool,
+) -> anyhow::Result<()> {
+    let shown = |radiance: &DVec3| {
+        let color = *radiance * exposure;
+        match display {
+            Display::Linear => color,
+            Display::Clamp => color.clamp(DVec3::ZERO, DVec3::ONE),
+            Display::Srgb => encode_srgb(tone_curve(color)),
+        }
+    };
+    let (width, height) = (picture.width, picture.height);
+    let image = if floats {
+        let values = picture.radiance.iter().flat_map(|pixel| shown(pixel).as_vec3().to_array()).collect();
+        image::Rgb32FImage::from_raw(width, height, values).map(image::DynamicImage::ImageRgb32F)
+    } else {
+        let byte = |value: f64| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let bytes = picture.radiance.iter().flat_map(|pixel| shown(pixel).to_array().map(byte)).collect();
+        image::RgbImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgb8)
+    };
+    let image = image.context("the picture has another size than was asked for")?;
+    write_file(path, |path| Ok(image.save(path)?))
+}
+
+fn print_report(asked: &Trace, report: &TraceReport) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    if asked.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(report)?)?;
+        return Ok(());
+    }
+    let [least, most] = report.samples;
+    let samples = if least == most { format!("{most}") } else { format!("{least} to {most}") };
+    writeln!(
+        out,
+        "{} x {}, {samples} samples a pixel, {:.1} million rays in {:.1} s ({:.2} million a second)",
+        asked.size.0,
+        asked.size.1,
+        report.rays as f64 / 1e6,
+        report.seconds,
+        report.mega_rays_per_second
+    )?;
+    match (asked.integrator, report.standard_error) {
+        (Integrator::Path, Some(error)) => {
+            writeln!(out, "standard error of the picture: {:.2} %", 100.0 * error)?
+        }
+        (Integrator::Path, None) => writeln!(out, "too few samples to state an error")?,
+        (Integrator::Whitted, _) if report.cut.largest_weight > 0.0 => {
+            let missing = match report.cut.bound {
+                Some(bound) => format!("at most a radiance of {bound:.3}"),
+                None => format!(
+                    "of the brightest that was met a radiance of {:.3}, but without a bound: a surface passes on all light and adds some",
+                    report.cut.largest_weight * report.cut.brightest
+                ),
+            };
+            writeln!(
+                out,
+                "cut off by depth and weight: {:.2e} of a pixel's light in the mean, {:.2e} at most; {missing}",
+                report.cut.mean_weight, report.cut.largest_weight
+            )?;
+        }
+        (Integrator::Whitted, _) => writeln!(out, "no ray was cut off")?,
+    }
+    match report.ended {
+        Ended::Complete => {}
+        Ended::Error => writeln!(out, "ended: the error asked for is reached")?,
+        Ended::Time => {
+            writeln!(out, "ended: the time is over, with {:.0} % of the picture", 100.0 * report.finished)?
+        }
+        Ended::Interrupted => writeln!(out, "ended: interrupted")?,
+    }
+    Ok(())
+}

@@ -1,0 +1,239 @@
+//! A ray tree for people and programs: as indented text, as JSON, for Graphviz, and as a drawing of its rays from above and from the side.
+//! Not the tree itself.
+
+use std::fmt::Write;
+
+use glam::{DVec2, DVec3};
+
+use crate::branch::{Branch, Kind};
+
+/// How a tree is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TreeFormat {
+    /// A line for each ray, and one for each term.
+    Text,
+    /// All of it.
+    Json,
+    /// A graph for Graphviz.
+    Dot,
+    /// The rays where they run, from above and from the side.
+    Svg,
+}
+
+impl TreeFormat {
+    /// All.
+    pub const ALL: &'static [Self] = &[Self::Text, Self::Json, Self::Dot, Self::Svg];
+
+    /// The name used on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Json => "json",
+            Self::Dot => "dot",
+            Self::Svg => "svg",
+        }
+    }
+
+    /// The choice with that name, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|choice| choice.name() == name)
+    }
+}
+
+/// The tree in a format, with a line's end at its end.
+pub fn draw_tree(tree: &Branch, format: TreeFormat) -> String {
+    let mut out = String::new();
+    let written = match format {
+        TreeFormat::Text => text(&mut out, tree, 0),
+        TreeFormat::Json => {
+            // Numbers, names and lists: nothing that JSON could not hold.
+            out = serde_json::to_string_pretty(tree).unwrap_or_default() + "\n";
+            Ok(())
+        }
+        TreeFormat::Dot => dot(&mut out, tree),
+        TreeFormat::Svg => svg(&mut out, tree),
+    };
+    // A String takes whatever is written to it.
+    debug_assert!(written.is_ok());
+    out
+}
+
+fn color(value: DVec3) -> String {
+    let channel = |value: f64| match value {
+        0.0 => "0".to_owned(),
+        value if (1e-3..1e4).contains(&value.abs()) => format!("{value:.4}"),
+        value => format!("{value:.2e}"),
+    };
+    if value.x == value.y && value.y == value.z {
+        return channel(value.x);
+    }
+    format!("({} {} {})", channel(value.x), channel(value.y), channel(value.z))
+}
+
+fn place(value: DVec3) -> String {
+    format!("({:.3}, {:.3}, {:.3})", value.x, value.y, value.z)
+}
+
+fn text(out: &mut String, branch: &Branch, depth: usize) -> std::fmt::Result {
+    let indent = "  ".repeat(depth);
+    let kind = branch.kind.name();
+    let weights = match branch.kind {
+        Kind::Camera => String::new(),
+        _ => format!(", times {}, counts {}", color(branch.factor), color(branch.weight)),
+    };
+    if branch.cut {
+        return writeln!(out, "{indent}{kind}: cut off{weights}");
+    }
+    let Some(point) = &branch.point else {
+        return writeln!(out, "{indent}{kind}: background {}{weights}", color(branch.radiance));
+    };
+    let side = if point.front { "front" } else { "back" };
+    writeln!(
+        out,
+        "{indent}{kind}: {} ({side}) at {}, {:.4} m through {} (index {:.3}){weights}",
+        point.object,
+        place(point.position),
+        point.distance,
+        point.medium,
+        point.index
+    )?;
+    if point.transmittance != DVec3::ONE {
+        writeln!(out, "{indent}  left by the way: {}", color(point.transmittance))?;
+    }
+    if let Some(light) = &branch.light {
+        for (name, value) in [
+            ("emission", light.emission),
+            ("ambient", light.ambient),
+            ("lightmap", light.baked),
+            ("diffuse", light.diffuse),
+            ("specular", light.specular),
+            ("transmitted highlight", light.transmitted),
+        ] {
+            if value != DVec3::ZERO {
+                writeln!(out, "{indent}  + {name} {}", color(value))?;
+            }
+        }
+        for lamp in &light.lights {
+            writeln!(
+                out,
+                "{indent}    {}: S = {}, diffuse {}, specular {}{}",
+                lamp.light,
+                color(lamp.visibility),
+                color(lamp.diffuse),
+                color(lamp.specular),
+                if lamp.transmitted == DVec3::ZERO {
+                    String::new()
+                } else {
+                    format!(", transmitted {}", color(lamp.transmitted))
+                }
+            )?;
+        }
+    }
+    for next in &branch.branches {
+        text(out, next, depth + 1)?;
+    }
+    writeln!(out, "{indent}  = {}", color(branch.radiance))
+}
+
+fn dot(out: &mut String, tree: &Branch) -> std::fmt::Result {
+    writeln!(out, "digraph rays {{\n  node [shape=box, fontname=\"sans-serif\"];\n  eye [shape=circle];")?;
+    let mut count = 0;
+    dot_branch(out, tree, "eye", &mut count)?;
+    writeln!(out, "}}")
+}
+
+fn dot_branch(out: &mut String, branch: &Branch, parent: &str, count: &mut usize) -> std::fmt::Result {
+    let own = format!("n{count}");
+    *count += 1;
+    let label = match (&branch.point, branch.cut) {
+        (_, true) => "cut off".to_owned(),
+        (None, false) => format!("background\\n{}", color(branch.radiance)),
+        (Some(point), false) => {
+            format!("{}\\n{}\\nI = {}", escaped(&point.object), place(point.position), color(branch.radiance))
+        }
+    };
+    writeln!(out, "  {own} [label=\"{label}\"];")?;
+    let style = if branch.cut { ", style=dashed" } else { "" };
+    writeln!(out, "  {parent} -> {own} [label=\"{} {}\"{style}];", branch.kind.name(), color(branch.factor))?;
+    for next in &branch.branches {
+        dot_branch(out, next, &own, count)?;
+    }
+    Ok(())
+}
+
+fn escaped(name: &str) -> String {
+    name.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', " ")
+}
+
+/// Side of a view in pixels.
+const SIDE: f64 = 480.0;
+/// Around a view.
+const MARGIN: f64 = 24.0;
+/// Length of a ray that meets nothing, as a part of the drawing.
+const OPEN_RAY: f64 = 0.15;
+
+fn svg(out: &mut String, tree: &Branch) -> std::fmt::Result {
+    let mut points = Vec::new();
+    ends(tree, &mut points);
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for point in &points {
+        (low, high) = (low.min(*point), high.max(*point));
+    }
+    let size = (high - low).max_element().max(1e-9);
+    let (width, height) = (2.0 * (SIDE + 2.0 * MARGIN), SIDE + 2.0 * MARGIN);
+    writeln!(
+        out,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
+    )?;
+    let middle = 0.5 * (low + high);
+    for (view, name, left) in [
+        (0, "from above (x to the right, z down)", 0.0),
+        (1, "from the side (z to the left, y up)", width / 2.0),
+    ] {
+        let project = |point: DVec3| {
+            let off = (point - middle) / size * SIDE;
+            let flat = if view == 0 { DVec2::new(off.x, off.z) } else { DVec2::new(-off.z, -off.y) };
+            flat + DVec2::new(left + MARGIN + 0.5 * SIDE, MARGIN + 0.5 * SIDE)
+        };
+        writeln!(out, "<text x=\"{}\" y=\"16\">{name}</text>", left + MARGIN)?;
+        svg_branch(out, tree, OPEN_RAY * size, &project)?;
+    }
+    writeln!(out, "</svg>")
+}
+
+fn ends(branch: &Branch, points: &mut Vec<DVec3>) {
+    points.push(branch.origin);
+    points.extend(branch.point.as_ref().map(|point| point.position));
+    branch.branches.iter().for_each(|next| ends(next, points));
+}
+
+fn svg_branch(
+    out: &mut String,
+    branch: &Branch,
+    open: f64,
+    project: &impl Fn(DVec3) -> DVec2,
+) -> std::fmt::Result {
+    let end = match &branch.point {
+        Some(point) => point.position,
+        None => branch.origin + branch.direction * open,
+    };
+    let (from, to) = (project(branch.origin), project(end));
+    let stroke = match branch.kind {
+        Kind::Camera => "#202020",
+        Kind::Mirrored => "#c03020",
+        Kind::Transmitted => "#2060c0",
+        Kind::Behind => "#808080",
+    };
+    let dashes = if branch.cut { " stroke-dasharray=\"3 3\"" } else { "" };
+    let width = 0.5 + 2.0 * branch.weight.max_element().clamp(0.0, 1.0).sqrt();
+    writeln!(
+        out,
+        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{stroke}\" stroke-width=\"{width:.2}\"{dashes}/>",
+        from.x, from.y, to.x, to.y
+    )?;
+    if branch.point.is_some() {
+        writeln!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.5\" fill=\"{stroke}\"/>", to.x, to.y)?;
+    }
+    branch.branches.iter().try_for_each(|next| svg_branch(out, next, open, project))
+}

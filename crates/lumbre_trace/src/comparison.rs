@@ -1,0 +1,83 @@
+//! How far two pictures are apart: in light, and as they are shown. Not how far they may be.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::flip;
+
+/// How far a picture is from a reference.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Root mean square difference over the reference's root mean square, all channels, linear.
+    pub relative_error: f64,
+    /// Mean difference over the reference's mean, linear: positive where the picture is brighter.
+    pub relative_bias: f64,
+    /// Largest difference of a channel, linear.
+    pub largest: f64,
+    /// Column and row where that is.
+    pub largest_at: [usize; 2],
+    /// Peak signal-to-noise ratio of the pictures as shown, decibels; nothing if they are the same.
+    pub psnr: Option<f64>,
+    /// Mean of LDR-FLIP of the pictures as shown, 0 to 1.
+    pub flip: f64,
+    /// FLIP of every pixel, top row first.
+    #[serde(skip)]
+    pub map: Vec<f64>,
+}
+
+/// Compares pictures of one size: `linear` light and colours as `shown`, each the reference first; in [0, 1] as shown.
+///
+/// Channels that are not finite in either picture count as infinitely far apart.
+pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> Comparison {
+    let [reference, test] = linear;
+    let (mut squares, mut of_reference, mut sum, mut brightness) = (0.0, 0.0, 0.0, 0.0);
+    let (mut largest, mut at) = (0.0, 0);
+    for (pixel, (wanted, found)) in reference.iter().zip(test).enumerate() {
+        let apart = *found - *wanted;
+        let most = if apart.is_finite() { apart.abs().max_element() } else { f64::INFINITY };
+        if most > largest {
+            (largest, at) = (most, pixel);
+        }
+        squares += if most.is_finite() { apart.length_squared() } else { f64::INFINITY };
+        of_reference += wanted.length_squared();
+        sum += apart.element_sum();
+        brightness += wanted.element_sum();
+    }
+    let over = |value: f64, size: f64| if value == 0.0 { 0.0 } else { value / size };
+    let noise: f64 = shown[0].iter().zip(&shown[1]).map(|(a, b)| (*a - *b).length_squared()).sum();
+    let mean = noise / (3 * shown[0].len().max(1)) as f64;
+    let [reference, test] = shown.map(|pixels| flip::Picture { width, pixels });
+    let map = flip::flip(&reference, &test, flip::PIXELS_PER_DEGREE);
+    Comparison {
+        relative_error: over(squares, of_reference).sqrt(),
+        relative_bias: over(sum, brightness),
+        largest,
+        largest_at: [at % width.max(1), at / width.max(1)],
+        psnr: (mean > 0.0).then(|| -10.0 * mean.log10()),
+        flip: map.iter().sum::<f64>() / map.len().max(1) as f64,
+        map,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_known_difference_in_one_channel() {
+        let reference = vec![DVec3::splat(0.5); 64];
+        let mut test = reference.clone();
+        test[10].y += 0.25;
+        let found = compare(8, [&reference, &test], [reference.clone(), test.clone()]);
+        assert!((found.relative_error - (0.0625_f64 / (192.0 * 0.25)).sqrt()).abs() < 1e-15);
+        assert!((found.relative_bias - 0.25 / 96.0).abs() < 1e-15);
+        assert_eq!((found.largest, found.largest_at), (0.25, [2, 1]));
+        assert!((found.psnr.unwrap_or(0.0) + 10.0 * (0.0625_f64 / 192.0).log10()).abs() < 1e-12);
+        assert!(found.flip > 0.0 && found.map[10] > found.map[60]);
+        let same = compare(8, [&reference, &reference], [reference.clone(), reference.clone()]);
+        assert_eq!((same.relative_error, same.largest, same.psnr, same.flip), (0.0, 0.0, None, 0.0));
+        test[3].x = f64::NAN;
+        let broken = compare(8, [&reference, &test], [reference.clone(), reference.clone()]);
+        assert_eq!((broken.largest, broken.relative_error), (f64::INFINITY, f64::INFINITY));
+    }
+}

@@ -1,0 +1,228 @@
+//! The picture while it grows: what the samples of each pixel came to. Not where the radiance comes from.
+
+use glam::{DVec2, DVec3};
+
+use crate::filter::Filter;
+use crate::options::Cut;
+
+/// What one sample found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sample {
+    pub radiance: DVec3,
+    pub rays: u32,
+    /// Weight of what the limits cut off.
+    pub cut: f64,
+    /// The brightest radiance of all its rays.
+    pub brightest: f64,
+    /// The brightest that any ray could have brought, by the points that were met; may be infinite.
+    pub limit: f64,
+}
+
+/// What the samples of a pixel came to in one pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct PixelSum {
+    pub radiance: DVec3,
+    pub weight: f64,
+    pub squares: DVec3,
+    pub samples: u32,
+    pub rays: u32,
+    pub cut: f64,
+    pub brightest: f64,
+    pub limit: f64,
+}
+
+impl PixelSum {
+    /// Adds a sample of a weight: the sign of the filter where it lies.
+    pub fn add(&mut self, sample: &Sample, weight: f64) {
+        self.radiance += sample.radiance * weight;
+        self.squares += sample.radiance * sample.radiance * weight;
+        self.weight += weight;
+        self.samples += 1;
+        self.rays = self.rays.saturating_add(sample.rays);
+        self.cut = self.cut.max(sample.cut);
+        self.brightest = self.brightest.max(sample.brightest);
+        self.limit = self.limit.max(sample.limit);
+    }
+
+    /// Their mean.
+    pub fn mean(&self) -> DVec3 {
+        // Samples whose signs cancel say nothing of the pixel.
+        if self.weight.abs() > 1e-6 { self.radiance / self.weight } else { DVec3::ZERO }
+    }
+}
+
+/// All passes of a picture.
+#[derive(Debug)]
+pub(crate) struct Film {
+    pub width: usize,
+    pub pixels: Vec<FilmPixel>,
+}
+
+/// All passes of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FilmPixel {
+    /// Sum of the passes' means, each times its samples.
+    sum: DVec3,
+    /// Sum of the squares of the passes' means.
+    squares: DVec3,
+    means: DVec3,
+    pub passes: u32,
+    pub samples: u32,
+    pub rays: u32,
+    pub cut: f64,
+    pub brightest: f64,
+    pub limit: f64,
+}
+
+impl FilmPixel {
+    /// Adds a pass.
+    pub fn add(&mut self, pass: &PixelSum) {
+        let mean = pass.mean();
+        self.sum += mean * f64::from(pass.samples);
+        self.means += mean;
+        self.squares += mean * mean;
+        self.passes += 1;
+        self.samples += pass.samples;
+        self.rays = self.rays.saturating_add(pass.rays);
+        self.cut = self.cut.max(pass.cut);
+        self.brightest = self.brightest.max(pass.brightest);
+        self.limit = self.limit.max(pass.limit);
+    }
+
+    /// The pixel's radiance; 0 before the first pass.
+    pub fn mean(&self) -> DVec3 {
+        self.sum / f64::from(self.samples.max(1))
+    }
+
+    /// Standard error of the mean by how much passes of as many samples differ; nothing before the second.
+    pub fn standard_error(&self) -> Option<DVec3> {
+        if self.passes < 2 {
+            return None;
+        }
+        let count = f64::from(self.passes);
+        let mean = self.means / count;
+        let variance = (self.squares / count - mean * mean).max(DVec3::ZERO) * (count / (count - 1.0));
+        let root = variance / count;
+        Some(DVec3::new(root.x.sqrt(), root.y.sqrt(), root.z.sqrt()))
+    }
+}
+
+impl Film {
+    pub fn new(width: usize, height: usize) -> Self {
+        Self { width, pixels: vec![FilmPixel::default(); width * height] }
+    }
+
+    /// Root mean square of the pixels' standard errors over the mean radiance of the picture, all channels together; nothing before it can
+    /// be stated, and 0 for a black picture.
+    pub fn relative_error(&self) -> Option<f64> {
+        let (mut variance, mut sum, mut count) = (0.0, 0.0, 0.0_f64);
+        for pixel in &self.pixels {
+            variance += pixel.standard_error()?.length_squared();
+            sum += pixel.mean().element_sum();
+            count += 3.0;
+        }
+        let mean = sum / count.max(1.0);
+        if mean <= 0.0 { Some(0.0) } else { Some((variance / count.max(1.0)).sqrt() / mean) }
+    }
+
+    /// What the limits cut off.
+    pub fn cut(&self) -> Cut {
+        let brightest = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.brightest));
+        let largest_weight = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.cut));
+        let sum: f64 = self.pixels.iter().map(|pixel| pixel.cut).sum();
+        let mean_weight = sum / self.pixels.len().max(1) as f64;
+        let limit = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.limit));
+        let bound = if largest_weight == 0.0 { 0.0 } else { largest_weight * limit };
+        Cut { mean_weight, largest_weight, brightest, bound: bound.is_finite().then_some(bound) }
+    }
+}
+
+/// Chooses places by a filter's size, so that every sample of a pixel counts alike but for the filter's sign.
+#[derive(Clone, Debug)]
+pub(crate) struct FilterSampler {
+    filter: Filter,
+    /// Distribution of |filter| from -radius to radius, beginning with 0 and ending with 1.
+    distribution: Vec<f64>,
+}
+
+/// Pieces of a filter's distribution.
+const PIECES: usize = 512;
+
+impl FilterSampler {
+    pub fn new(filter: Filter) -> Self {
+        let middle =
+            |piece: usize| 2.0 * filter.radius() * ((piece as f64 + 0.5) / PIECES as f64) - filter.radius();
+        let mut distribution = vec![0.0];
+        let mut sum = 0.0;
+        for piece in 0..PIECES {
+            sum += filter.value(DVec2::new(middle(piece), 0.0)).abs();
+            distribution.push(sum);
+        }
+        distribution.iter_mut().for_each(|value| *value /= sum);
+        Self { filter, distribution }
+    }
+
+    /// An offset from the pixel's middle in pixels, and the filter's sign there.
+    pub fn place(&self, numbers: DVec2) -> (DVec2, f64) {
+        if self.filter == Filter::Box {
+            return (numbers - 0.5, 1.0);
+        }
+        let along = |number: f64| {
+            let piece = self.distribution.partition_point(|value| *value <= number).clamp(1, PIECES) - 1;
+            let (low, high) = (self.distribution[piece], self.distribution[piece + 1]);
+            let part = if high > low { ((number - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 };
+            let radius = self.filter.radius();
+            2.0 * radius * (piece as f64 + part) / PIECES as f64 - radius
+        };
+        let offset = DVec2::new(along(numbers.x), along(numbers.y));
+        (offset, if self.filter.value(offset) < 0.0 { -1.0 } else { 1.0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_seen_through_a_filter_is_the_filters_integral() {
+        for filter in Filter::ALL {
+            let sampler = FilterSampler::new(*filter);
+            // Radiance 1 to the right of 0.3 pixels off the middle.
+            let (mut sum, mut weight) = (0.0, 0.0);
+            let steps = 400;
+            for row in 0..steps {
+                for column in 0..steps {
+                    let at = |index: i32| (f64::from(index) + 0.5) / f64::from(steps);
+                    let (offset, sign) = sampler.place(DVec2::new(at(column), at(row)));
+                    weight += sign;
+                    sum += if offset.x > 0.3 { sign } else { 0.0 };
+                }
+            }
+            let (mut expected, mut whole) = (0.0, 0.0);
+            let fine = 20_000;
+            for step in 0..fine {
+                let x = filter.radius() * (2.0 * (f64::from(step) + 0.5) / f64::from(fine) - 1.0);
+                let value = filter.value(DVec2::new(x, 0.0));
+                whole += value;
+                expected += if x > 0.3 { value } else { 0.0 };
+            }
+            let (found, wanted) = (sum / weight, expected / whole);
+            assert!((found - wanted).abs() < 4e-3, "{}: {found} for {wanted}", filter.name());
+        }
+    }
+
+    #[test]
+    fn the_standard_error_is_that_of_the_mean() {
+        // Passes of one sample each: 1, 2, 3, 4 have the variance 5/3, of their mean 5/12.
+        let mut pixel = FilmPixel::default();
+        for value in [1.0, 2.0, 3.0, 4.0] {
+            let mut pass = PixelSum::default();
+            pass.add(&Sample { radiance: DVec3::splat(value), ..Sample::default() }, 1.0);
+            pixel.add(&pass);
+        }
+        assert_eq!(pixel.mean(), DVec3::splat(2.5));
+        let error = pixel.standard_error().expect("there are passes enough");
+        assert!((error.x - (5.0f64 / 12.0).sqrt()).abs() < 1e-14);
+        assert_eq!(FilmPixel::default().standard_error(), None);
+    }
+}

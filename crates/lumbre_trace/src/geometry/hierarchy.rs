@@ -1,0 +1,160 @@
+//! All surfaces of a scene, and the questions that rays ask of them: what is met first, and whether anything is. Not what happens there.
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use lumbre_rays::Bvh;
+use lumbre_scene::Quadric;
+
+use super::quadric::{QuadricHit, QuadricSurface};
+use super::ray::SpaceRay;
+
+/// The surfaces.
+#[derive(Debug)]
+pub(crate) struct Geometry {
+    bvh: Bvh,
+    /// Of every triangle: its object, its number there.
+    triangles: Vec<(u32, u32)>,
+    /// Of every triangle, to its front; of any length.
+    fronts: Vec<Vec3>,
+    quadrics: Vec<PlacedQuadric>,
+}
+
+#[derive(Debug)]
+struct PlacedQuadric {
+    object: u32,
+    surface: QuadricSurface,
+    /// From the tracer's space to its own.
+    to_own: DAffine3,
+    from_own: DAffine3,
+    normals: DMat3,
+}
+
+/// A surface that a ray may meet, before it is known whether it counts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crossing {
+    pub object: usize,
+    /// The ray comes to the front.
+    pub front: bool,
+    pub place: Place,
+}
+
+/// Where on its object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Place {
+    /// In a triangle: its number in the object, the weights of its second and third corner.
+    Triangle { triangle: u32, weights: [f64; 2] },
+    /// On the exact surface: the point, and its unit normal to the front.
+    Exact { point: DVec3, normal: DVec3 },
+}
+
+/// The surface that a ray meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Meeting {
+    pub crossing: Crossing,
+    /// Metres.
+    pub distance: f64,
+    /// Number of the triangle in the scene, if it is one.
+    pub triangle: Option<u32>,
+}
+
+/// Rays end before the exact surface that their end lies on by this part of their length.
+const EXACTLY_SHORT: f64 = 1.0 - 1e-9;
+
+impl Geometry {
+    /// `triangles` lists the corners of each, counter-clockwise seen from its front, with its object and its number there.
+    pub fn build(
+        triangles: Vec<([Vec3; 3], (u32, u32))>,
+        quadrics: &[(usize, Quadric, DAffine3, DMat3)],
+    ) -> Self {
+        let corners: Vec<[Vec3; 3]> = triangles.iter().map(|(corners, _)| *corners).collect();
+        let front = |[a, b, c]: &[Vec3; 3]| {
+            let normal = (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3());
+            normal.normalize_or_zero().as_vec3()
+        };
+        let placed = |(object, quadric, place, normals): &(usize, Quadric, DAffine3, DMat3)| PlacedQuadric {
+            object: *object as u32,
+            surface: QuadricSurface::new(quadric),
+            to_own: place.inverse(),
+            from_own: *place,
+            normals: *normals,
+        };
+        Self {
+            bvh: Bvh::build(&corners),
+            fronts: corners.iter().map(front).collect(),
+            triangles: triangles.into_iter().map(|(_, owner)| owner).collect(),
+            quadrics: quadrics.iter().map(placed).collect(),
+        }
+    }
+
+    /// The nearest surface up to a distance for which `accept` holds.
+    pub fn closest(
+        &self,
+        ray: &SpaceRay,
+        farthest: f64,
+        accept: impl Fn(&Crossing) -> bool,
+    ) -> Option<Meeting> {
+        let short = ray.for_triangles(farthest);
+        let found = self.bvh.closest_hit_filtered(&short, |triangle, u, v| {
+            accept(&self.crossing(short.direction, triangle, u, v))
+        });
+        let mut nearest = found.map(|hit| Meeting {
+            crossing: self.crossing(short.direction, hit.triangle, hit.barycentric.0, hit.barycentric.1),
+            distance: f64::from(hit.distance),
+            triangle: Some(hit.triangle),
+        });
+        for quadric in &self.quadrics {
+            let farthest = nearest.as_ref().map_or(farthest, |nearest| nearest.distance);
+            if let Some(meeting) = quadric.closest(ray, farthest, &accept) {
+                nearest = Some(meeting);
+            }
+        }
+        nearest
+    }
+
+    /// Whether a surface for which `accept` holds lies between the ray's start and the point at a distance, which may be infinite.
+    pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
+        let finite = distance.is_finite();
+        let short = if finite { ray.between_triangles(distance) } else { ray.for_triangles(distance) };
+        let farthest = if finite { distance * EXACTLY_SHORT } else { distance };
+        self.bvh.any_hit_filtered(&short, |triangle, u, v| {
+            accept(&self.crossing(short.direction, triangle, u, v))
+        }) || self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, &accept).is_some())
+    }
+
+    /// The object and the number there of a triangle of the scene.
+    pub fn owner(&self, triangle: u32) -> (usize, u32) {
+        let (object, number) = self.triangles[triangle as usize];
+        (object as usize, number)
+    }
+
+    /// How many triangles there are.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    #[inline]
+    fn crossing(&self, direction: Vec3, triangle: u32, u: f32, v: f32) -> Crossing {
+        let (object, number) = self.triangles[triangle as usize];
+        Crossing {
+            object: object as usize,
+            front: direction.dot(self.fronts[triangle as usize]) < 0.0,
+            place: Place::Triangle { triangle: number, weights: [f64::from(u), f64::from(v)] },
+        }
+    }
+}
+
+impl PlacedQuadric {
+    fn closest(&self, ray: &SpaceRay, farthest: f64, accept: &impl Fn(&Crossing) -> bool) -> Option<Meeting> {
+        // Distances are in units of the direction, which is not made unit, so that they are the same in both spaces.
+        let origin = self.to_own.transform_point3(ray.exact_origin());
+        let direction = self.to_own.transform_vector3(ray.direction);
+        let crossing = |hit: &QuadricHit| {
+            let normal = (self.normals * hit.normal).normalize_or_zero();
+            let point = self.from_own.transform_point3(hit.point);
+            let front = ray.direction.dot(normal) < 0.0;
+            Crossing { object: self.object as usize, front, place: Place::Exact { point, normal } }
+        };
+        let taken = |hit: &QuadricHit| accept(&crossing(hit));
+        let hit = self.surface.closest(origin, direction, farthest, &taken)?;
+        Some(Meeting { crossing: crossing(&hit), distance: hit.distance, triangle: None })
+    }
+}

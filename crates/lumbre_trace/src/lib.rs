@@ -1,0 +1,77 @@
+//! The reference picture: Whitted's recursive ray tracing and paths over the same World that frames are drawn of. No GPU, no files.
+//!
+//! ```text
+//!   World ─► Scene: objects, lights, polygons ─► Geometry: triangles (lumbre_rays) + quadrics
+//!                                                    │
+//!   camera_ray ─► SpaceRay ──────────────────────────┴──► Meeting ─► SurfacePoint: normals, textures, coefficients
+//!      ▲                                                                  │
+//!      │ film: filters,          ┌────────────────────────────────────────┤
+//!      │ samples, errors         ▼                                        ▼
+//!    tiles, trace        ray_tree (Whitted)                          path (all light)
+//!                          direct_light ─► shadow_ray                  light_sampling ─► shadow_ray
+//!                          interface: mirror, Snell, Fresnel           lobe_sampling, interface
+//!                          medium: what rays are inside of             medium
+//!                          branch: the tree as data
+//! ```
+//!
+//! - One lighting equation: every term comes from `lumbre_optics`, whose twins frames evaluate. With depth 0 and without shadows a picture
+//!   is the frame under Phong shading.
+//! - The same bits on any number of threads: every pixel is computed by itself, from its own numbers.
+//! - Points are found in f64: the hierarchy's f32 says which triangle, the ray's own arithmetic where. Chains of mirrors keep their digits.
+//! - What limits cut off is counted and stated ([`Cut`]); what paths are uncertain of too ([`TraceReport::standard_error`]).
+//!
+//! ```
+//! use std::{ops::ControlFlow, sync::Arc};
+//! use bevy_ecs::world::World;
+//! use lumbre_scene::{Camera, Light, Material, Mesh, Transform};
+//! use lumbre_trace::{TraceOptions, trace};
+//!
+//! let mut world = World::new();
+//! let glass = Material { transmission: glam::Vec3::ONE, ior: 1.5, ..Material::matt(glam::Vec3::ZERO) };
+//! world.spawn((Mesh(Arc::new(lumbre_mesh::shapes::uv_sphere(1.0, 64, 32))), glass));
+//! world.spawn((Light::point(glam::Vec3::ONE), Transform::from_xyz(2.0, 2.0, 2.0)));
+//! world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 4.0)));
+//! let options = TraceOptions { size: (64, 48), depth: Some(5), ..TraceOptions::default() };
+//! let (picture, report) = trace(&mut world, &options, &|_| ControlFlow::Continue(()))?;
+//! assert!(picture.radiance.len() == 64 * 48 && report.finished == 1.0);
+//! # Ok::<(), lumbre_trace::TraceError>(())
+//! ```
+
+mod branch;
+mod branch_drawing;
+mod camera_ray;
+mod comparison;
+mod direct_light;
+mod display;
+mod error;
+mod film;
+mod filter;
+pub mod flip;
+mod geometry;
+mod interface;
+mod light_sampling;
+mod lobe_sampling;
+mod medium;
+mod metering;
+mod options;
+mod path;
+mod random;
+mod ray_tree;
+mod scene;
+mod shadow_ray;
+mod surface_point;
+mod tiles;
+mod trace;
+
+pub use branch::{Branch, BranchLamp, BranchLight, BranchPoint, Kind};
+pub use branch_drawing::{TreeFormat, draw_tree};
+pub use comparison::{Comparison, compare};
+pub use display::{encode_srgb, tone_curve};
+pub use error::TraceError;
+pub use filter::Filter;
+pub use metering::Metering;
+pub use options::{
+    Cut, DEFAULT_DEPTH, DEFAULT_PATHS, DEFAULT_WEIGHT, Ended, Integrator, MAXIMUM_DEPTH, MAXIMUM_SAMPLES,
+    Picture, Progress, TraceOptions, TraceReport,
+};
+pub use trace::{FirstHit, Listener, Tracer, trace};

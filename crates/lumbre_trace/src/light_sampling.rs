@@ -1,0 +1,232 @@
+//! Which light a path asks at a point, and where on it: one lamp by what each would send if nothing stood between, and one point of the emissive
+//! triangles by their power. Not whether it is seen.
+//!
+//! Lamps are weighed one by one at every point, so that a point costs as many evaluations as there are lamps; the baker's light tree, which
+//! would find one among thousands sooner, stands above this crate.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+use lumbre_optics::{LightKind, LightSample, evaluate_light};
+use lumbre_scene::EmissiveLight;
+
+use crate::lobe_sampling::within_cone;
+use crate::metering::luminance;
+use crate::scene::{Object, Passage, Scene, sample_color};
+use crate::surface_point::SurfacePoint;
+
+/// The lights that paths can ask.
+#[derive(Debug)]
+pub(crate) struct LightSampler {
+    emitters: Vec<Emitter>,
+    /// Distribution of the emitters, ending with 1.
+    distribution: Vec<f64>,
+    /// Chance per square metre of every triangle of the scene, by its number; empty without emitters.
+    densities: Vec<f64>,
+}
+
+/// A triangle that shines.
+#[derive(Clone, Copy, Debug)]
+struct Emitter {
+    object: usize,
+    /// Number in its object.
+    number: u32,
+    corners: [DVec3; 3],
+    /// Unit, to the front.
+    normal: DVec3,
+    area: f64,
+}
+
+/// A point of an emissive triangle as a surface meets it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EmitterSample {
+    /// Radiance towards the surface.
+    pub radiance: DVec3,
+    /// Unit, to the light.
+    pub direction: DVec3,
+    pub distance: f64,
+    /// Chance per steradian.
+    pub density: f64,
+}
+
+/// A texture that is dark in the middle of a triangle may be bright at its corners: a triangle's chance never falls below this part of it.
+const LEAST_TINT: f64 = 0.1;
+/// Lamps with a size reach beyond the horizon of their middle.
+const SIZED_FLOOR: f64 = 0.1;
+/// The sine of the angle that a lamp is seen under is at most this.
+const LARGEST_SINE: f64 = 0.99;
+
+impl LightSampler {
+    pub fn new(scene: &Scene) -> Self {
+        let mut emitters = Vec::new();
+        let mut powers = Vec::new();
+        let mut triangles = Vec::new();
+        for triangle in 0..scene.geometry.triangle_count() as u32 {
+            let (index, number) = scene.geometry.owner(triangle);
+            let object = &scene.objects[index];
+            let [front, back] = EmissiveLight::radiance(&object.material).map(|color| color.as_dvec3());
+            let shines = luminance(front) + luminance(back);
+            // What is seen through its own holes is met by chance alone.
+            if shines <= 0.0 || matches!(object.passage(), Passage::Cut | Passage::Covering) {
+                continue;
+            }
+            let first = 3 * number as usize;
+            let corners = object.corners([0, 1, 2].map(|next| object.shape.indices[first + next]));
+            let [a, b, c] = corners;
+            let cross = (b - a).cross(c - a);
+            let area = 0.5 * cross.length();
+            if area > 0.0 && area.is_finite() {
+                let tint = luminance(tint(object, number, [1.0 / 3.0; 2])).max(LEAST_TINT);
+                emitters.push(Emitter { object: index, number, corners, normal: cross / (2.0 * area), area });
+                powers.push(area * shines * tint);
+                triangles.push(triangle);
+            }
+        }
+        let total: f64 = powers.iter().sum();
+        let mut sum = 0.0;
+        let distribution = powers.iter().map(|power| {
+            sum += power / total;
+            sum
+        });
+        let distribution: Vec<f64> = distribution.collect();
+        let mut densities = Vec::new();
+        if !emitters.is_empty() {
+            densities = vec![0.0; scene.geometry.triangle_count()];
+            for ((triangle, emitter), power) in triangles.iter().zip(&emitters).zip(&powers) {
+                densities[*triangle as usize] = power / total / emitter.area;
+            }
+        }
+        Self { emitters, distribution, densities }
+    }
+
+    /// A lamp at a point, with the chance that it was chosen, where on it the ray goes, how far that is, and what does not hide it.
+    pub fn lamp<'s>(
+        &self,
+        scene: &'s Scene,
+        point: &SurfacePoint,
+        choice: f64,
+        numbers: DVec2,
+    ) -> Option<(LightSample, f64, f64, &'s [usize])> {
+        let mut weights = smallvec::SmallVec::<[(usize, LightSample, f64); 32]>::new();
+        let mut total = 0.0;
+        for (number, placed) in scene.lights.iter().enumerate() {
+            let light = &placed.light;
+            if light.kind == LightKind::Ambient {
+                continue;
+            }
+            let sample = evaluate_light(light, placed.position, placed.axis, point.position);
+            let sized = match light.kind {
+                LightKind::Point => light.radius > 0.0,
+                LightKind::Directional | LightKind::Ambient => light.angle > 0.0,
+            };
+            let cosine = point.normal.dot(sample.direction).max(if sized { SIZED_FLOOR } else { 0.0 });
+            let color = luminance(sample.diffuse) + luminance(sample.specular);
+            let weight = color * sample.attenuation * sample.spot * cosine;
+            if weight > 0.0 && weight.is_finite() {
+                total += weight;
+                weights.push((number, sample, weight));
+            }
+        }
+        let mut left = choice * total;
+        let last = weights.len().checked_sub(1)?;
+        let (number, sample, weight) = weights.into_iter().enumerate().find_map(|(place, found)| {
+            left -= found.2;
+            (left < 0.0 || place == last).then_some(found)
+        })?;
+        let placed = &scene.lights[number];
+        let (sample, distance) = match placed.light.kind {
+            LightKind::Point => {
+                let distance = placed.position.distance(point.position);
+                on_sphere_lamp(sample, f64::from(placed.light.radius), distance, numbers)
+            }
+            LightKind::Directional | LightKind::Ambient => {
+                let half = 0.5 * f64::from(placed.light.angle);
+                (on_disc_of_sky(sample, half, numbers), f64::INFINITY)
+            }
+        };
+        Some((sample, weight / total, distance, &placed.bulbs))
+    }
+
+    /// A point of the emissive triangles as a point of a surface meets it; nothing where it is the back of one, or there are none.
+    pub fn emitter(
+        &self,
+        scene: &Scene,
+        point: &SurfacePoint,
+        choice: f64,
+        numbers: DVec2,
+    ) -> Option<EmitterSample> {
+        let last = self.emitters.len().checked_sub(1)?;
+        let place = self.distribution.partition_point(|sum| *sum <= choice).min(last);
+        let emitter = &self.emitters[place];
+        let root = numbers.x.sqrt();
+        let weights = [root * (1.0 - numbers.y), root * numbers.y];
+        let [a, b, c] = emitter.corners;
+        let at = a * (1.0 - root) + b * weights[0] + c * weights[1];
+        let to = at - point.position;
+        let distance = to.length();
+        if distance.is_nan() || distance <= 0.0 {
+            return None;
+        }
+        let direction = to / distance;
+        let cosine = -direction.dot(emitter.normal);
+        let object = &scene.objects[emitter.object];
+        let radiance = emitted(object, emitter.number, weights, cosine > 0.0);
+        let before = if place == 0 { 0.0 } else { self.distribution[place - 1] };
+        let chance = self.distribution[place] - before;
+        let density = chance / emitter.area * distance * distance / cosine.abs();
+        (radiance != DVec3::ZERO && density.is_finite() && density > 0.0).then_some(EmitterSample {
+            radiance,
+            direction,
+            distance,
+            density,
+        })
+    }
+
+    /// Chance per steradian that a triangle's point is chosen, seen so far away under a cosine; 0 of what is never chosen.
+    pub fn density(&self, triangle: Option<u32>, distance: f64, cosine: f64) -> f64 {
+        let density = triangle.and_then(|triangle| self.densities.get(triangle as usize)).copied();
+        density.unwrap_or(0.0) * distance * distance / cosine.abs().max(1e-12)
+    }
+}
+
+/// What a side of a triangle sends, of what lights others.
+pub(crate) fn emitted(object: &Object, number: u32, weights: [f64; 2], front: bool) -> DVec3 {
+    let radiance = EmissiveLight::radiance(&object.material)[usize::from(!front)].as_dvec3();
+    if radiance == DVec3::ZERO { radiance } else { radiance * tint(object, number, weights) }
+}
+
+/// The emissive texture at a place of a triangle.
+fn tint(object: &Object, number: u32, weights: [f64; 2]) -> DVec3 {
+    let Some(texture) = &object.textures.emissive else { return DVec3::ONE };
+    let (vertices, weights) = object.vertices(number, weights);
+    sample_color(texture, object.coordinates(texture.tex_coord, vertices, weights)).truncate()
+}
+
+/// A lamp that is a sphere of one radiance: a direction within the cone that it fills, so weighted that all directions together are the
+/// light of its middle. The ray ends on the sphere.
+fn on_sphere_lamp(sample: LightSample, radius: f64, distance: f64, numbers: DVec2) -> (LightSample, f64) {
+    let sine = (radius / distance.max(f64::MIN_POSITIVE)).clamp(0.0, LARGEST_SINE);
+    if sine == 0.0 {
+        return (sample, distance);
+    }
+    let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
+    let direction = within_cone(sample.direction, cosine, numbers);
+    let along = direction.dot(sample.direction);
+    let inner = (radius * radius - distance * distance * (1.0 - along) * (1.0 + along)).max(0.0).sqrt();
+    let reach = (distance * along - inner).max(0.0);
+    (spread(sample, direction, cosine), reach)
+}
+
+/// A distant light that is a disc on the sky.
+fn on_disc_of_sky(sample: LightSample, half_angle: f64, numbers: DVec2) -> LightSample {
+    if half_angle <= 0.0 {
+        return sample;
+    }
+    let cosine = half_angle.min(0.5 * PI).cos();
+    spread(sample, within_cone(sample.direction, cosine, numbers), cosine)
+}
+
+/// The mean of cosines over a cone is (1 + cos)/2 of that of its axis.
+fn spread(sample: LightSample, direction: DVec3, cosine: f64) -> LightSample {
+    LightSample { direction, attenuation: sample.attenuation * 2.0 / (1.0 + cosine), ..sample }
+}

@@ -1,0 +1,281 @@
+//! Directions by the lobes of a surface: cosine for the diffuse part, Phong's about the mirrored line of sight, Blinn's and the microfacets'
+//! about the normal of the half vector; and how probable each direction is. Not what the surface reflects: those are `lumbre_optics`'
+//! functions, whatever chose the direction.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
+use lumbre_optics::{
+    Contribution, Distribution, LightSample, Lobe, ReflectionModel, SurfaceSample, light_contribution,
+    model_exponent, reflected_direction,
+};
+
+/// The lobes of a surface, seen from a direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lobes {
+    model: ReflectionModel,
+    surface: SurfaceSample,
+    normal: DVec3,
+    viewer: DVec3,
+    /// Chance of the specular lobe.
+    specular: f64,
+    shape: Shape,
+}
+
+/// About what the specular lobe is spread, and how.
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    /// cosⁿ about the mirrored line of sight.
+    Mirrored { exponent: f64 },
+    /// cosⁿ⁺¹ of the half vector about the normal.
+    HalfVector { exponent: f64 },
+    /// Trowbridge and Reitz's distribution of the half vector, α² given.
+    LongTail { alpha_squared: f64 },
+}
+
+/// The least chance of a lobe that is there: what one lobe seldom chooses the other may be full of.
+const LEAST_CHANCE: f64 = 0.1;
+
+impl Lobes {
+    pub fn new(model: ReflectionModel, surface: &SurfaceSample, normal: DVec3, viewer: DVec3) -> Self {
+        let n = surface.shininess;
+        let exponent = model_exponent(model, surface.lobe, n);
+        let keeps_energy = surface.lobe == Lobe::EnergyKeeping;
+        let shape = match model {
+            ReflectionModel::Phong => Shape::Mirrored { exponent },
+            ReflectionModel::Blinn => Shape::HalfVector { exponent: n },
+            ReflectionModel::Blinn4n | ReflectionModel::BlinnMatched if keeps_energy => {
+                Shape::HalfVector { exponent: n }
+            }
+            ReflectionModel::Blinn4n | ReflectionModel::BlinnMatched => {
+                Shape::HalfVector { exponent: 4.0 * n }
+            }
+            ReflectionModel::TorranceSparrow
+                if keeps_energy || surface.distribution == Distribution::TrowbridgeReitz =>
+            {
+                Shape::LongTail { alpha_squared: 2.0 / (n + 2.0) }
+            }
+            ReflectionModel::TorranceSparrow => Shape::HalfVector { exponent: n },
+        };
+        let diffuse = surface.diffuse.element_sum();
+        let share = if keeps_energy { 1.0 } else { 2.0 / (n + 2.0) };
+        let shiny = surface.specular.element_sum() * share;
+        let specular = match (diffuse > 0.0, surface.specular != DVec3::ZERO) {
+            (_, false) => 0.0,
+            (false, true) => 1.0 - LEAST_CHANCE,
+            (true, true) => (shiny / (diffuse + shiny)).clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE),
+        };
+        Self { model, surface: *surface, normal, viewer, specular, shape }
+    }
+
+    /// Whether any direction reflects anything.
+    pub fn are_black(&self) -> bool {
+        self.surface.diffuse == DVec3::ZERO && self.surface.specular == DVec3::ZERO
+    }
+
+    /// About how much of the light the lobes send back, for choosing between them and other rays.
+    pub fn albedo(&self) -> f64 {
+        let share = match self.surface.lobe {
+            Lobe::EnergyKeeping => 1.0,
+            Lobe::Bare => 2.0 / (self.surface.shininess + 2.0),
+        };
+        (self.surface.diffuse + self.surface.specular * share).element_sum() / 3.0
+    }
+
+    /// A direction.
+    pub fn direction(&self, choice: f64, numbers: DVec2) -> DVec3 {
+        if choice >= self.specular {
+            return around(self.normal, power_of_cosine(numbers, 1.0));
+        }
+        match self.shape {
+            Shape::Mirrored { exponent } => {
+                around(reflected_direction(self.normal, self.viewer), power_of_cosine(numbers, exponent))
+            }
+            Shape::HalfVector { exponent } => {
+                let half = around(self.normal, power_of_cosine(numbers, exponent + 1.0));
+                reflected_direction(half, self.viewer)
+            }
+            Shape::LongTail { alpha_squared } => {
+                let squared = (1.0 - numbers.x) / (1.0 + (alpha_squared - 1.0) * numbers.x);
+                let cosine = squared.clamp(0.0, 1.0).sqrt();
+                reflected_direction(around(self.normal, on_sphere(cosine, numbers.y)), self.viewer)
+            }
+        }
+    }
+
+    /// Chance of a direction per steradian.
+    pub fn density(&self, direction: DVec3) -> f64 {
+        let diffuse = self.normal.dot(direction).max(0.0) / PI;
+        if self.specular == 0.0 {
+            return diffuse;
+        }
+        let specular = match self.shape {
+            Shape::Mirrored { exponent } => {
+                let mirrored = reflected_direction(self.normal, self.viewer);
+                density_of_power(mirrored.dot(direction), exponent)
+            }
+            Shape::HalfVector { exponent } => {
+                self.of_half_vector(direction, |cosine| density_of_power(cosine, exponent + 1.0))
+            }
+            Shape::LongTail { alpha_squared } => self.of_half_vector(direction, |cosine| {
+                let root = cosine * cosine * (alpha_squared - 1.0) + 1.0;
+                alpha_squared * cosine.max(0.0) / (PI * root * root)
+            }),
+        };
+        self.specular * specular + (1.0 - self.specular) * diffuse
+    }
+
+    fn of_half_vector(&self, direction: DVec3, density: impl Fn(f64) -> f64) -> f64 {
+        let sum = direction + self.viewer;
+        let length = sum.length();
+        let half = if length > 0.0 { sum / length } else { return 0.0 };
+        let half = if half.dot(self.normal) < 0.0 { -half } else { half };
+        // v·h = |l + v|/2.
+        density(half.dot(self.normal)) / (4.0 * (0.5 * length).max(1e-12))
+    }
+
+    /// The bidirectional reflectance times the cosine, linear RGB, 1/sr: the lighting equation for a light of unit irradiance.
+    pub fn reflectance(&self, direction: DVec3) -> DVec3 {
+        self.reflected(&LightSample {
+            diffuse: DVec3::splat(1.0 / PI),
+            specular: DVec3::splat(1.0 / PI),
+            direction,
+            attenuation: 1.0,
+            spot: 1.0,
+            ..LightSample::DARK
+        })
+    }
+
+    /// What is reflected of a light.
+    pub fn reflected(&self, light: &LightSample) -> DVec3 {
+        let Contribution { diffuse, specular, .. } =
+            light_contribution(self.model, self.surface, light, self.normal, self.viewer);
+        diffuse + specular
+    }
+}
+
+/// cosⁿ about +Z, from two numbers.
+fn power_of_cosine(numbers: DVec2, exponent: f64) -> DVec3 {
+    on_sphere((1.0 - numbers.x).powf(1.0 / (exponent + 1.0)), numbers.y)
+}
+
+fn density_of_power(cosine: f64, exponent: f64) -> f64 {
+    if cosine <= 0.0 { 0.0 } else { (exponent + 1.0) / TAU * cosine.powf(exponent) }
+}
+
+/// A unit vector at an angle to +Z with this cosine.
+fn on_sphere(cosine: f64, turn: f64) -> DVec3 {
+    let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
+    let (along_y, along_x) = (TAU * turn).sin_cos();
+    DVec3::new(sine * along_x, sine * along_y, cosine)
+}
+
+/// A vector about +Z, turned to lie about an axis.
+pub(crate) fn around(axis: DVec3, vector: DVec3) -> DVec3 {
+    let (right, up) = axis.any_orthonormal_pair();
+    (right * vector.x + up * vector.y + axis * vector.z).normalize_or(axis)
+}
+
+/// A unit vector within a cone about an axis, all alike.
+pub(crate) fn within_cone(axis: DVec3, cosine: f64, numbers: DVec2) -> DVec3 {
+    around(axis, on_sphere(1.0 - numbers.x * (1.0 - cosine), numbers.y))
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_optics::Fresnel;
+
+    use super::*;
+    use crate::random::Numbers;
+
+    fn every_lobe() -> Vec<Lobes> {
+        let mut lobes = Vec::new();
+        for &model in ReflectionModel::ALL {
+            for lobe in [Lobe::Bare, Lobe::EnergyKeeping] {
+                let spread = model == ReflectionModel::TorranceSparrow && lobe == Lobe::Bare;
+                for &distribution in if spread { Distribution::ALL } else { &Distribution::ALL[..1] } {
+                    for shininess in [3.0, 40.0, 900.0] {
+                        let surface = SurfaceSample {
+                            ambient: DVec3::ZERO,
+                            diffuse: DVec3::splat(0.3),
+                            specular: DVec3::new(0.6, 0.5, 0.4),
+                            shininess,
+                            ior: 1.5,
+                            lobe,
+                            distribution,
+                            fresnel: Fresnel::Dielectric,
+                            peak: 1.0,
+                        };
+                        for tilt in [0.0, 0.7, 1.3] {
+                            let viewer = DVec3::new(f64::sin(tilt), 0.0, f64::cos(tilt));
+                            lobes.push(Lobes::new(model, &surface, DVec3::Z, viewer));
+                        }
+                    }
+                }
+            }
+        }
+        lobes
+    }
+
+    #[test]
+    fn densities_add_up_to_what_is_chosen() {
+        for lobes in every_lobe() {
+            // By directions that are chosen evenly: the density's integral over the sphere, which is 1 but for what half vectors send below
+            // the horizon of no surface.
+            let count = 100_000u32;
+            let (mut whole, mut upper) = (0.0, 0.0);
+            for index in 0..count {
+                let mut numbers = Numbers::new(7, index >> 16, index & 0xffff);
+                let pair = numbers.pair();
+                // Half of them about the lobes, by the balance heuristic, so that sharp ones are met.
+                let direction = if index % 2 == 0 {
+                    on_sphere(1.0 - 2.0 * pair.x, pair.y)
+                } else {
+                    lobes.direction(numbers.next(), pair)
+                };
+                let density = lobes.density(direction);
+                let part = density / (0.5 * density + 0.5 / (4.0 * PI)) / f64::from(count);
+                whole += part;
+                upper += if direction.z > 0.0 { part } else { 0.0 };
+            }
+            assert!((whole - 1.0).abs() < 0.01, "{lobes:?}: {whole}");
+            assert!(upper <= whole);
+        }
+    }
+
+    #[test]
+    fn chosen_directions_estimate_the_integral_of_the_reflectance() {
+        for lobes in every_lobe() {
+            // Against a grid over the hemisphere, in the cosine and the turn, with the grid's pole at the mirrored direction, where it is fine.
+            let count = 60_000u32;
+            let mut sum = DVec3::ZERO;
+            for index in 0..count {
+                let mut numbers = Numbers::new(11, index >> 16, index & 0xffff);
+                let (pair, choice) = (numbers.pair(), numbers.next());
+                let direction = lobes.direction(choice, pair);
+                let density = lobes.density(direction);
+                if direction.z > 0.0 && density > 0.0 {
+                    sum += lobes.reflectance(direction) / density;
+                }
+            }
+            let found = sum / f64::from(count);
+            let pole = reflected_direction(DVec3::Z, lobes.viewer);
+            let (rows, columns) = (800, 160);
+            let mut wanted = DVec3::ZERO;
+            for row in 0..rows {
+                // Squared twice: the rows crowd at the pole.
+                let edge = |row: i32| 2.0 * (f64::from(row) / f64::from(rows)).powi(4);
+                let (low, high) = (edge(row), edge(row + 1));
+                for column in 0..columns {
+                    let turn = (f64::from(column) + 0.5) / f64::from(columns);
+                    let direction = around(pole, on_sphere(1.0 - 0.5 * (low + high), turn));
+                    if direction.z > 0.0 {
+                        wanted += lobes.reflectance(direction) * ((high - low) * TAU / f64::from(columns));
+                    }
+                }
+            }
+            let apart = ((found - wanted) / wanted).abs().max_element();
+            assert!(apart < 0.02, "{lobes:?}: {found} for {wanted}");
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Paths: all light as it is, by chance. At every point one lamp and one emissive triangle are asked, and the path goes on by the lobes of
+//! the surface, its mirror or its glass; what both find is weighed by the balance heuristic (Veach and Guibas 1995), what goes on for long
+//! ends by Russian roulette. Nothing is left out or clamped, so that the mean over many paths is the light.
+//!
+//! What no path finds: lamps without a size, and those of a size, through glass that refracts. Such light is a caustic of a point, and needs
+//! rays from the lamp. Emissive triangles and the sky are found through glass.
+
+use glam::DVec3;
+use lumbre_optics::{apply_fog, fog_weight};
+
+use crate::camera_ray::{CameraRay, CameraRays};
+use crate::direct_light::shadow_ray;
+use crate::film::Sample;
+use crate::geometry::{Place, SpaceRay};
+use crate::interface::Division;
+use crate::light_sampling::{LightSampler, emitted};
+use crate::lobe_sampling::Lobes;
+use crate::medium::MediumStack;
+use crate::random::Numbers;
+use crate::scene::Scene;
+use crate::shadow_ray::{Glass, transmittance};
+use crate::surface_point::SurfacePoint;
+
+/// What follows the paths of a picture.
+pub(crate) struct Paths<'a> {
+    scene: &'a Scene,
+    camera: &'a CameraRays,
+    lights: LightSampler,
+    /// Reflections of a path; without a number only chance ends it.
+    depth: Option<u32>,
+    shadows: bool,
+}
+
+/// Points before chance may end a path.
+const SAFE_DEPTH: u32 = 4;
+/// The largest chance of going on: between two perfect mirrors a path would not end otherwise.
+const LIKELIEST: f64 = 0.95;
+/// Surfaces that a path goes straight through, sheets and what covers in part, and all others.
+const MOST_SURFACES: u32 = 100_000;
+
+/// A path on its way.
+struct Walk {
+    ray: SpaceRay,
+    farthest: f64,
+    media: MediumStack,
+    throughput: DVec3,
+    /// What it brings.
+    radiance: DVec3,
+    /// Chance per steradian of the last direction, and metres since: nothing where it was a mirror's, glass's or the camera's.
+    last: Option<(f64, f64)>,
+    reflections: u32,
+    rays: u32,
+    /// It has met nothing but sheets and what covers in part.
+    first: bool,
+}
+
+/// Whether a path goes on.
+#[derive(PartialEq, Eq)]
+enum Next {
+    Goes,
+    Ends,
+}
+
+impl<'a> Paths<'a> {
+    pub fn new(scene: &'a Scene, camera: &'a CameraRays, depth: Option<u32>, shadows: bool) -> Self {
+        Self { scene, camera, lights: LightSampler::new(scene), depth, shadows }
+    }
+
+    /// One path.
+    pub fn sample(&self, camera: &CameraRay, media: MediumStack, numbers: &mut Numbers) -> Sample {
+        let mut walk = Walk {
+            ray: camera.ray,
+            farthest: camera.farthest,
+            media,
+            throughput: DVec3::ONE,
+            radiance: DVec3::ZERO,
+            last: None,
+            reflections: 0,
+            rays: 0,
+            first: true,
+        };
+        for _ in 0..MOST_SURFACES {
+            if self.step(&mut walk, numbers) == Next::Ends {
+                break;
+            }
+        }
+        // Lights at the ends of f64 may still be too much for a product of factors.
+        let radiance = if walk.radiance.is_finite() { walk.radiance } else { DVec3::ZERO };
+        Sample { radiance, rays: walk.rays, cut: 0.0, brightest: radiance.max_element(), limit: 0.0 }
+    }
+
+    fn step(&self, walk: &mut Walk, numbers: &mut Numbers) -> Next {
+        let scene = self.scene;
+        walk.rays += 1;
+        let looks = walk.last.is_none();
+        // What looks sees through the backs of what has none; light stops there.
+        let found = scene.geometry.closest(&walk.ray, walk.farthest, |crossing| {
+            if looks { scene.is_seen(crossing) } else { scene.blocks(crossing) }
+        });
+        let Some(meeting) = found else {
+            walk.escapes(scene);
+            return Next::Ends;
+        };
+        let point = SurfacePoint::new(scene, &walk.ray, &meeting);
+        let object = &scene.objects[point.object];
+        walk.throughput *= walk.media.transmittance(point.distance);
+        let since = walk.last.map_or(0.0, |(_, before)| before) + point.distance;
+        if point.coverage < 1.0 && numbers.next() >= point.coverage {
+            return walk.goes_straight(&point, since);
+        }
+        if walk.first {
+            self.add_fog(walk, &point);
+        }
+        if object.material.unlit {
+            if looks {
+                walk.radiance += walk.throughput * point.surface.diffuse;
+            }
+            return Next::Ends;
+        }
+        if !(point.front || object.shows_back()) {
+            return Next::Ends;
+        }
+        self.add_emission(walk, &point, &meeting.crossing.place, since);
+        self.scatter(walk, &point, since, numbers)
+    }
+
+    /// Fog between the eye and what it sees, as a frame has it.
+    fn add_fog(&self, walk: &mut Walk, point: &SurfacePoint) {
+        let Some(fog) = &self.scene.settings.fog else { return };
+        let clear = fog_weight(&fog.mode, self.camera.depth(point.position));
+        walk.radiance += walk.throughput * apply_fog(clear, DVec3::ZERO, fog.color.as_dvec3());
+        walk.throughput *= clear;
+    }
+
+    /// What the surface sends by itself: all of it to what looks; to others by how probable the ways are on which it is found.
+    fn add_emission(&self, walk: &mut Walk, point: &SurfacePoint, place: &Place, since: f64) {
+        let Some((density, _)) = walk.last else {
+            walk.radiance += walk.throughput * point.emission;
+            return;
+        };
+        let object = &self.scene.objects[point.object];
+        let radiance = match *place {
+            Place::Triangle { triangle, weights } => emitted(object, triangle, weights, point.front),
+            Place::Exact { .. } => emitted(object, 0, [0.0; 2], point.front),
+        };
+        if radiance == DVec3::ZERO {
+            return;
+        }
+        let cosine = point.geometric.dot(walk.ray.direction);
+        let asked = self.lights.density(point.triangle, since, cosine);
+        walk.radiance += walk.throughput * radiance * (density / (density + asked));
+    }
+
+    /// Asks the lights, and sends the path on.
+    fn scatter(&self, walk: &mut Walk, point: &SurfacePoint, since: f64, numbers: &mut Numbers) -> Next {
+        let scene = self.scene;
+        let object = &scene.objects[point.object];
+        let viewer = -walk.ray.direction;
+        let lobes = Lobes::new(object.model, &point.surface, point.normal, viewer);
+        let matt = !lobes.are_black() && point.normal.dot(viewer) > 0.0;
+        let last = self.depth.is_some_and(|depth| walk.reflections >= depth);
+        if matt {
+            self.ask_lights(walk, point, &lobes, last, numbers);
+        }
+        if last {
+            return Next::Ends;
+        }
+        let divides = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
+        let division = divides.then(|| Division::new(scene, &walk.ray, point, &walk.media));
+        let mean = |color: DVec3| color.element_sum() / 3.0;
+        let (mirrored, through) =
+            division.as_ref().map_or((0.0, 0.0), |found| (mean(found.mirrored), mean(found.transmitted)));
+        let local = if matt { lobes.albedo().max(1e-3) } else { 0.0 };
+        let total = local + mirrored + through;
+        if total <= 0.0 {
+            return Next::Ends;
+        }
+        let choice = numbers.next() * total;
+        if let Some(division) = division.filter(|_| choice >= local) {
+            return if choice < local + mirrored {
+                walk.throughput *= division.mirrored * (total / mirrored);
+                walk.turns(division.mirrored_ray(point), None, numbers)
+            } else {
+                walk.throughput *= division.transmitted * (total / through);
+                if object.medium.thin {
+                    return walk.goes_straight(point, since);
+                }
+                // Radiance is squeezed with the solid angle.
+                walk.throughput /= division.eta * division.eta;
+                walk.media = division.behind.clone();
+                walk.turns(division.transmitted_ray(point), None, numbers)
+            };
+        }
+        let direction = lobes.direction(numbers.next(), numbers.pair());
+        let density = lobes.density(direction);
+        if direction.dot(point.geometric) <= 0.0 || density <= 0.0 {
+            return Next::Ends;
+        }
+        walk.throughput *= lobes.reflectance(direction) * (total / (local * density));
+        // What finds a light by this direction would have found it with this chance: that of the lobes alone times theirs.
+        let chance = density * local / total;
+        walk.turns(shadow_ray(point, direction), Some(chance), numbers)
+    }
+
+    /// The light of one lamp and of one emissive triangle.
+    fn ask_lights(
+        &self,
+        walk: &mut Walk,
+        point: &SurfacePoint,
+        lobes: &Lobes,
+        last: bool,
+        numbers: &mut Numbers,
+    ) {
+        let (choice, place) = (numbers.next(), numbers.pair());
+        if let Some((light, chance, distance, bulbs)) = self.lights.lamp(self.scene, point, choice, place) {
+            let reflected = lobes.reflected(&light) / chance;
+            let seen = self.seen(walk, point, (light.direction, distance, bulbs), reflected);
+            walk.radiance += walk.throughput * seen;
+        }
+        let (choice, place) = (numbers.next(), numbers.pair());
+        if let Some(sample) = self.lights.emitter(self.scene, point, choice, place) {
+            // A path that ends here will not find it itself.
+            let found = if last { 0.0 } else { self.chance(walk, point, lobes, sample.direction) };
+            let reflected = lobes.reflectance(sample.direction) * sample.radiance / (sample.density + found);
+            let seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
+            walk.radiance += walk.throughput * seen;
+        }
+    }
+
+    /// Chance per steradian that the path itself goes on in a direction by its lobes.
+    fn chance(&self, walk: &Walk, point: &SurfacePoint, lobes: &Lobes, direction: DVec3) -> f64 {
+        let object = &self.scene.objects[point.object];
+        let local = lobes.albedo().max(1e-3);
+        let mut total = local;
+        if object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO {
+            let division = Division::new(self.scene, &walk.ray, point, &walk.media);
+            total += (division.mirrored + division.transmitted).element_sum() / 3.0;
+        }
+        lobes.density(direction) * local / total
+    }
+
+    /// What arrives of it.
+    fn seen(
+        &self,
+        walk: &mut Walk,
+        point: &SurfacePoint,
+        (direction, distance, bulbs): (DVec3, f64, &[usize]),
+        light: DVec3,
+    ) -> DVec3 {
+        if light == DVec3::ZERO || direction.dot(point.geometric) <= 0.0 {
+            return DVec3::ZERO;
+        }
+        if !self.shadows {
+            return light;
+        }
+        let ray = shadow_ray(point, direction);
+        let (visible, rays) =
+            transmittance(self.scene, &ray, distance, &walk.media, (Glass::OnlySheets, bulbs));
+        walk.rays += rays;
+        light * visible
+    }
+}
+
+impl Walk {
+    fn escapes(&mut self, scene: &Scene) {
+        let radiance = match self.last {
+            None => scene.settings.shown_background(),
+            Some(_) => scene.settings.sky,
+        };
+        if self.media.transmittance(f64::INFINITY) == DVec3::ONE || self.media.innermost().is_none() {
+            self.radiance += self.throughput * radiance.as_dvec3();
+        }
+    }
+
+    /// Through a sheet, or past what covers in part: the same line goes on.
+    fn goes_straight(&mut self, point: &SurfacePoint, since: f64) -> Next {
+        self.farthest -= point.distance;
+        self.ray = SpaceRay::leaving(point.position, self.ray.direction, point.geometric, point.extent);
+        self.last = self.last.map(|(density, _)| (density, since));
+        Next::Goes
+    }
+
+    /// Into another direction, if chance lets it.
+    fn turns(&mut self, ray: SpaceRay, density: Option<f64>, numbers: &mut Numbers) -> Next {
+        self.ray = ray;
+        self.farthest = f64::INFINITY;
+        self.last = density.map(|density| (density, 0.0));
+        self.reflections += 1;
+        self.first = false;
+        if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
+            return Next::Ends;
+        }
+        if self.reflections > SAFE_DEPTH {
+            let chance = self.throughput.max_element().min(LIKELIEST);
+            if numbers.next() >= chance {
+                return Next::Ends;
+            }
+            self.throughput /= chance;
+        }
+        Next::Goes
+    }
+}

@@ -1,0 +1,233 @@
+//! Whitted's ray tree: at every point the light of the lamps, and two rays more, one mirrored and one through the surface,
+//! I = I_a k_a O_d + Σ S_i f_att I_p (…) + k_r I_r + k_t I_t. Diffuse light from other surfaces is what a lightmap has of it. Not paths.
+
+use glam::DVec3;
+use lumbre_optics::{apply_fog, fog_weight};
+
+use crate::branch::{Branch, Kind};
+use crate::camera_ray::CameraRays;
+use crate::direct_light::{DirectLight, Lighting, direct_light};
+use crate::geometry::SpaceRay;
+use crate::interface::Division;
+use crate::medium::MediumStack;
+use crate::scene::Scene;
+use crate::surface_point::SurfacePoint;
+
+/// Where the tree ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// Mirrored and transmitted rays, one after another.
+    pub depth: u32,
+    /// Rays that count for less in every channel are not traced.
+    pub weight: f64,
+    /// Rays of one tree, shadow rays apart.
+    pub rays: u32,
+}
+
+/// What grows the trees of a picture.
+pub(crate) struct RayTree<'a> {
+    pub scene: &'a Scene,
+    pub camera: &'a CameraRays,
+    pub limits: Limits,
+    pub lighting: Lighting,
+}
+
+/// What a tree found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Seen {
+    pub radiance: DVec3,
+    /// Sum of the weights of the rays that were cut off: times the radiance that they would have brought, that is the error.
+    pub cut: f64,
+    /// All rays, shadow rays too.
+    pub rays: u32,
+    /// The brightest radiance that any ray of the tree brought.
+    pub brightest: f64,
+    /// The brightest that any ray of the tree could bring, however far it were followed: of every point its own light over what
+    /// k_r + k_t leaves of 1. Infinite where a point that passes on all light adds some.
+    pub limit: f64,
+}
+
+impl Seen {
+    /// A point that adds light of its own and passes on a part of what comes.
+    fn meets(&mut self, own: DVec3, passed_on: DVec3) {
+        for channel in 0..3 {
+            let (own, left) = (own[channel], 1.0 - passed_on[channel]);
+            if own > 0.0 {
+                self.limit = self.limit.max(if left > 0.0 { own / left } else { f64::INFINITY });
+            } else if left < 0.0 {
+                self.limit = f64::INFINITY;
+            }
+        }
+    }
+}
+
+/// A ray on its way.
+struct Twig<'m> {
+    ray: SpaceRay,
+    farthest: f64,
+    media: &'m MediumStack,
+    weight: DVec3,
+    depth: u32,
+    /// It comes straight from the eye.
+    first: bool,
+}
+
+impl RayTree<'_> {
+    /// The tree of a camera ray, and every branch of it if there is room for them.
+    pub fn grow(
+        &self,
+        ray: SpaceRay,
+        farthest: f64,
+        media: &MediumStack,
+        record: Option<&mut Branch>,
+    ) -> Seen {
+        let mut seen = Seen::default();
+        let mut left = self.limits.rays;
+        let root = Twig { ray, farthest, media, weight: DVec3::ONE, depth: 0, first: true };
+        seen.radiance = self.radiance(root, &mut left, &mut seen, record);
+        seen
+    }
+
+    fn radiance(
+        &self,
+        twig: Twig<'_>,
+        left: &mut u32,
+        seen: &mut Seen,
+        mut record: Option<&mut Branch>,
+    ) -> DVec3 {
+        seen.rays += 1;
+        *left = left.saturating_sub(1);
+        let scene = self.scene;
+        let found = scene.geometry.closest(&twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
+        let Some(meeting) = found else {
+            // Nothing absorbs on the way to infinity but what has no end, and that leaves nothing.
+            let background = scene.settings.shown_background().as_dvec3();
+            let radiance = match twig.media.transmittance(f64::INFINITY) {
+                clear if clear == DVec3::ONE => background,
+                clear => background * DVec3::select(clear.cmpgt(DVec3::ZERO), clear, DVec3::ZERO),
+            };
+            if let Some(branch) = record {
+                branch.meets_nothing(radiance);
+            }
+            seen.brightest = seen.brightest.max(radiance.max_element());
+            seen.meets(radiance, DVec3::ZERO);
+            return radiance;
+        };
+        let point = SurfacePoint::new(scene, &twig.ray, &meeting);
+        let object = &scene.objects[point.object];
+        let clear = twig.media.transmittance(point.distance);
+        if let Some(branch) = record.as_deref_mut() {
+            branch.meets(scene, &point, twig.media, clear);
+        }
+
+        let mut radiance = if object.material.unlit {
+            seen.meets(point.surface.diffuse, DVec3::ZERO);
+            point.surface.diffuse
+        } else {
+            self.lit(&twig, &point, clear, left, seen, record.as_deref_mut())
+        };
+        if let Some(fog) = &scene.settings.fog {
+            let distance = if twig.first { self.camera.depth(point.position) } else { point.distance };
+            radiance = apply_fog(fog_weight(&fog.mode, distance), radiance, fog.color.as_dvec3());
+            seen.meets(fog.color.as_dvec3(), DVec3::ZERO);
+        }
+        if point.coverage < 1.0 {
+            let behind = DVec3::splat(1.0 - point.coverage);
+            let ray = SpaceRay::leaving(point.position, twig.ray.direction, point.geometric, point.extent);
+            let next = Twig {
+                ray,
+                farthest: twig.farthest - point.distance,
+                media: twig.media,
+                weight: twig.weight * behind * clear,
+                ..twig
+            };
+            radiance = radiance * point.coverage
+                + self.branch_off(Kind::Behind, next, behind, left, seen, record.as_deref_mut());
+        }
+        let radiance = radiance * clear;
+        seen.brightest = seen.brightest.max(radiance.max_element());
+        if let Some(branch) = record {
+            branch.radiance = radiance;
+        }
+        radiance
+    }
+
+    /// What a surface sends to where the ray comes from: lamps, mirror, transmission.
+    fn lit(
+        &self,
+        twig: &Twig<'_>,
+        point: &SurfacePoint,
+        clear: DVec3,
+        left: &mut u32,
+        seen: &mut Seen,
+        mut record: Option<&mut Branch>,
+    ) -> DVec3 {
+        let scene = self.scene;
+        let object = &scene.objects[point.object];
+        let viewer = match (twig.first, scene.settings.local_viewer) {
+            (true, false) => self.camera.basis.z_axis,
+            _ => -twig.ray.direction,
+        };
+        let divides = object.mirror() != DVec3::ZERO || object.transmission() != DVec3::ZERO;
+        let division = divides.then(|| Division::new(scene, &twig.ray, point, twig.media));
+        let (behind, eta) = division.as_ref().map_or((twig.media, 1.0), |found| (&found.behind, found.eta));
+        let light: DirectLight = direct_light(scene, point, viewer, (twig.media, behind, eta), self.lighting);
+        seen.rays += light.rays;
+        let mut radiance = light.total();
+        seen.meets(radiance, object.mirror() + object.transmission());
+        if let Some(branch) = record.as_deref_mut() {
+            branch.lit(scene, &light);
+        }
+        let Some(division) = division else { return radiance };
+        let share = point.coverage;
+        if division.mirrored != DVec3::ZERO {
+            let next = Twig {
+                ray: division.mirrored_ray(point),
+                farthest: f64::INFINITY,
+                media: twig.media,
+                weight: twig.weight * division.mirrored * clear * share,
+                depth: twig.depth + 1,
+                first: false,
+            };
+            radiance +=
+                self.branch_off(Kind::Mirrored, next, division.mirrored, left, seen, record.as_deref_mut());
+        }
+        if division.transmitted != DVec3::ZERO {
+            let next = Twig {
+                ray: division.transmitted_ray(point),
+                farthest: f64::INFINITY,
+                media: &division.behind,
+                weight: twig.weight * division.transmitted * clear * share,
+                depth: twig.depth + 1,
+                first: false,
+            };
+            radiance += self.branch_off(Kind::Transmitted, next, division.transmitted, left, seen, record);
+        }
+        radiance
+    }
+
+    /// A ray more, times its factor, if the limits let it grow.
+    fn branch_off(
+        &self,
+        kind: Kind,
+        twig: Twig<'_>,
+        factor: DVec3,
+        left: &mut u32,
+        seen: &mut Seen,
+        record: Option<&mut Branch>,
+    ) -> DVec3 {
+        let weight = twig.weight.max_element();
+        if twig.depth > self.limits.depth || weight < self.limits.weight || *left == 0 {
+            seen.cut += weight;
+            if let Some(branch) = record {
+                branch.cuts(kind, &twig.ray, twig.weight, factor);
+            }
+            return DVec3::ZERO;
+        }
+        let Some(branch) = record else { return factor * self.radiance(twig, left, seen, None) };
+        let mut own = Branch::new(kind, &twig.ray, self.scene.origin, twig.weight, factor);
+        let radiance = factor * self.radiance(twig, left, seen, Some(&mut own));
+        branch.branches.push(own);
+        radiance
+    }
+}

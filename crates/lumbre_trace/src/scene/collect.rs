@@ -1,0 +1,187 @@
+//! From a World to what the tracer reads of it: the same components as a frame, in the tracer's space. Not the rays.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DVec3};
+use lumbre_mesh::{TextureCoordinateSet, TriangleMesh};
+use lumbre_optics::{Light, LightKind, Material, ReflectionModel};
+use lumbre_scene::{
+    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Medium, Mesh,
+    Name, Primitive, Quadric, SceneSettings, StaticObject,
+};
+
+use super::emissive_polygons::{EmissivePolygon, emissive_polygons};
+use super::object::Object;
+use crate::TraceError;
+
+/// A light and where it stands in the tracer's space.
+#[derive(Clone, Debug)]
+pub(crate) struct PlacedLight {
+    pub light: Light,
+    pub position: DVec3,
+    /// Unit: where it shines.
+    pub axis: DVec3,
+    pub name: String,
+    /// Objects that do not hide it: what glows and has the light inside of its box is the lamp's bulb.
+    pub bulbs: Vec<usize>,
+}
+
+impl PlacedLight {
+    fn find_bulbs(&mut self, objects: &[Object]) {
+        if self.light.kind == LightKind::Point {
+            let is_bulb = |object: &Object| object.glows() && object.box_holds(self.position);
+            let found = objects.iter().enumerate().filter(|(_, object)| is_bulb(object));
+            self.bulbs = found.map(|(index, _)| index).collect();
+        }
+    }
+}
+
+/// What was found in a World.
+#[derive(Debug)]
+pub(crate) struct Collected {
+    pub settings: SceneSettings,
+    pub objects: Vec<Object>,
+    /// The exact surface of an object, in its own space.
+    pub quadrics: Vec<(usize, Quadric)>,
+    pub lights: Vec<PlacedLight>,
+    pub polygons: Vec<EmissivePolygon>,
+    pub notes: Vec<String>,
+}
+
+type Found<'a> = (
+    Entity,
+    (&'a Mesh, &'a Material, &'a GlobalTransform),
+    (Option<&'a ReflectionModel>, Option<&'a Lightmap>, Option<&'a MaterialTextures>),
+    (Option<&'a Medium>, Option<&'a Quadric>, Option<&'a Primitive>),
+    (Has<StaticObject>, Has<EmissiveLight>),
+);
+
+type FoundLight<'a> = (Entity, &'a Light, &'a GlobalTransform, Option<&'a Name>);
+
+/// Everything that is shown, with `origin` as the tracer's origin. `reflection` in place of the scene's model, if it is given.
+pub(crate) fn collect(
+    world: &mut World,
+    origin: DVec3,
+    reflection: Option<ReflectionModel>,
+    lightmaps: bool,
+) -> Result<Collected, TraceError> {
+    let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+    let query = world.query_filtered::<Found<'static>, Without<Hidden>>();
+    let lamps = world.query::<FoundLight<'static>>();
+    let world = &*world;
+    let mut found: Vec<_> = query.iter_manual(world).collect();
+    found.sort_by_key(|(entity, ..)| entity.index_u32());
+    let mut collected = Collected {
+        settings,
+        objects: Vec::new(),
+        quadrics: Vec::new(),
+        lights: Vec::new(),
+        polygons: Vec::new(),
+        notes: Vec::new(),
+    };
+    collected.lights = lights(world, &lamps, origin, &mut collected.notes);
+    for (entity, (mesh, material, place), choices, exact, (fixed, shines)) in found {
+        let (own_model, lightmap, textures) = choices;
+        let (medium, quadric, primitive) = exact;
+        let name = name(world, entity, primitive);
+        let place = relative(place, origin);
+        if !place.is_finite() {
+            collected.notes.push(format!("\"{name}\" is left out: its transform is not finite"));
+            continue;
+        }
+        material.validate(&name).map_err(|source| TraceError::Material { object: name.clone(), source })?;
+        mesh.0.validate().map_err(|source| TraceError::Mesh { object: name.clone(), source })?;
+        let textures = textures.cloned().unwrap_or_default();
+        let normals = GlobalTransform(place).normal_matrix();
+        let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let object = Object {
+            shape: with_tangents(&mesh.0, &textures),
+            material: material.clone(),
+            textures,
+            medium: medium.copied().unwrap_or_default(),
+            model: reflection.or(own_model.copied()).unwrap_or(settings.reflection),
+            lightmap: lightmap.filter(|_| lightmaps).map(|lightmap| Arc::clone(&lightmap.image)),
+            place,
+            normals: if largest > 0.0 { normals * (1.0 / largest) } else { normals },
+            mirrored: GlobalTransform(place).mirrors(),
+            two_sided: settings.two_sided,
+            name,
+        };
+        let index = collected.objects.len();
+        if let Some(quadric) = quadric {
+            let fault = |reason: String| TraceError::Quadric { object: object.name.clone(), reason };
+            quadric.validate().map_err(|error| fault(error.to_string()))?;
+            if place.matrix3.determinant() == 0.0 {
+                return Err(fault("its transform flattens it; give a scale that is not 0".to_owned()));
+            }
+            collected.quadrics.push((index, quadric.clone()));
+        }
+        if shines {
+            let baked = fixed && lightmaps && !moves(world, entity);
+            collected.polygons.extend(emissive_polygons(index, &object, baked));
+        }
+        collected.objects.push(object);
+    }
+    let Collected { lights, objects, .. } = &mut collected;
+    lights.iter_mut().for_each(|light| light.find_bulbs(objects));
+    Ok(collected)
+}
+
+fn relative(place: &GlobalTransform, origin: DVec3) -> DAffine3 {
+    DAffine3 { translation: place.0.translation - origin, ..place.0 }
+}
+
+/// The lights that are on, in the order of their entities.
+fn lights(
+    world: &World,
+    lamps: &QueryState<FoundLight<'static>>,
+    origin: DVec3,
+    notes: &mut Vec<String>,
+) -> Vec<PlacedLight> {
+    let mut found: Vec<_> = lamps.iter_manual(world).filter(|(_, light, ..)| light.enabled).collect();
+    found.sort_by_key(|(entity, ..)| entity.index_u32());
+    let mut lights = Vec::new();
+    for (entity, light, place, name) in found {
+        let name = name.map_or_else(|| format!("entity {entity}"), ToString::to_string);
+        let (position, axis) = (place.translation() - origin, place.forward());
+        let placed = light.kind != LightKind::Point || position.is_finite();
+        match light.validate(&name) {
+            Ok(()) if placed => {
+                lights.push(PlacedLight { light: light.clone(), position, axis, name, bulbs: Vec::new() })
+            }
+            Ok(()) => notes.push(format!("light \"{name}\" is left out: its position is not finite")),
+            Err(error) => notes.push(format!("a light is left out: {error}")),
+        }
+    }
+    lights
+}
+
+/// The mesh as its normal map needs it.
+fn with_tangents(mesh: &Arc<TriangleMesh>, textures: &MaterialTextures) -> Arc<TriangleMesh> {
+    let Some(map) = textures.normal.as_ref().filter(|_| mesh.tangents.is_empty()) else {
+        return Arc::clone(mesh);
+    };
+    let set = match map.texture.tex_coord {
+        0 => TextureCoordinateSet::First,
+        _ => TextureCoordinateSet::Second,
+    };
+    mesh.with_tangents(set).map_or_else(|_| Arc::clone(mesh), Arc::new)
+}
+
+/// Whether the entity or what it hangs from moves: the baker leaves it out then.
+fn moves(world: &World, entity: Entity) -> bool {
+    let above = |entity: &Entity| world.get::<ChildOf>(*entity).map(ChildOf::parent);
+    std::iter::successors(Some(entity), above).any(|entity| world.get::<DynamicObject>(entity).is_some())
+}
+
+/// What a person calls it: its own name, its node's, or its mesh's.
+fn name(world: &World, entity: Entity, primitive: Option<&Primitive>) -> String {
+    let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
+    let named = [Some(entity), parent].into_iter().flatten().find_map(|entity| world.get::<Name>(entity));
+    match (named, primitive) {
+        (Some(name), _) => name.to_string(),
+        (None, Some(primitive)) if !primitive.mesh.is_empty() => primitive.mesh.to_string(),
+        _ => format!("entity {entity}"),
+    }
+}

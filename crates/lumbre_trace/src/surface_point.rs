@@ -1,0 +1,218 @@
+//! What a surface is where a ray meets it: point, normals, coefficients with textures multiplied in. Not the light that falls on it.
+
+use glam::{DVec3, DVec4};
+use lumbre_optics::{
+    AlphaMode, SurfaceSample, facing_normal, map_normal, occlusion, safe_normalize, shininess_from_roughness,
+    transformed_tangent, try_normalize,
+};
+
+use crate::geometry::{Meeting, Place, SpaceRay};
+use crate::scene::{Object, Scene, sample_color, sample_lightmap, sample_linear, transform};
+
+/// One point of a surface, seen along a ray.
+#[derive(Clone, Debug)]
+pub(crate) struct SurfacePoint {
+    pub object: usize,
+    /// In the tracer's space, metres.
+    pub position: DVec3,
+    /// Metres along the ray.
+    pub distance: f64,
+    /// Unit normal of the face itself, on the side from which the ray comes.
+    pub geometric: DVec3,
+    /// Unit normal that is lit: interpolated, mapped, and turned as the scene's two-sided rule says.
+    pub normal: DVec3,
+    /// The ray comes to the front.
+    pub front: bool,
+    pub surface: SurfaceSample,
+    pub emission: DVec3,
+    /// How much it covers of what is behind, 0 to 1.
+    pub coverage: f64,
+    /// k_d E/π of its lightmap.
+    pub baked: Option<DVec3>,
+    /// Largest coordinate of what was met: its rounding is relative to that.
+    pub extent: f64,
+    /// Number of the triangle in the scene, if it is one.
+    pub triangle: Option<u32>,
+}
+
+/// A point found in f64 may be apart from the one that the f32 hierarchy found by this part of its distance, where rays graze.
+const TRUSTED: f64 = 1e-3;
+
+impl SurfacePoint {
+    /// Where a ray meets a surface.
+    pub fn new(scene: &Scene, ray: &SpaceRay, meeting: &Meeting) -> Self {
+        let crossing = &meeting.crossing;
+        let object = &scene.objects[crossing.object];
+        match crossing.place {
+            Place::Triangle { triangle, weights } => {
+                Self::in_triangle(object, ray, meeting, triangle, weights)
+            }
+            Place::Exact { point, normal } => Self::on_exact_surface(object, ray, meeting, point, normal),
+        }
+    }
+
+    fn in_triangle(
+        object: &Object,
+        ray: &SpaceRay,
+        meeting: &Meeting,
+        triangle: u32,
+        found: [f64; 2],
+    ) -> Self {
+        let first = 3 * triangle as usize;
+        let corners = object.corners([0, 1, 2].map(|next| object.shape.indices[first + next]));
+        let [a, b, c] = corners;
+        let cross = (b - a).cross(c - a);
+        let face = try_normalize(cross).unwrap_or(-ray.direction);
+        // The hierarchy's corners are f32; the point is found again in f64, so that long chains of mirrors keep their digits.
+        let (distance, found) =
+            refined(ray, corners, cross, meeting.distance).unwrap_or((meeting.distance, found));
+        let (vertices, weights) = object.vertices(triangle, found);
+        let position = a * weights[0] + b * weights[1] + c * weights[2];
+        let extent = corners.iter().fold(0.0_f64, |largest, corner| largest.max(corner.abs().max_element()));
+
+        let front = meeting.crossing.front;
+        let lit_as_front = front || !backs_are_lit(object);
+        let shape = &object.shape;
+        let smooth: DVec3 = (0..3)
+            .map(|corner| {
+                let own = shape.normals.get(vertices[corner]).map_or(DVec3::ZERO, |normal| normal.as_dvec3());
+                safe_normalize(object.normals * own) * weights[corner]
+            })
+            .sum();
+        let mapped = object.textures.normal.as_ref().map(|map| {
+            let uv = object.coordinates(map.texture.tex_coord, vertices, weights);
+            let texel = sample_linear(&map.texture, uv).truncate();
+            let [u, v] = transform(&map.texture);
+            let tangent: DVec4 = (0..3)
+                .map(|corner| {
+                    let own = shape.tangents.get(vertices[corner]).map_or(DVec4::ZERO, |own| own.as_dvec4());
+                    let side = if (own.w < 0.0) != object.mirrored { -1.0 } else { 1.0 };
+                    let along = safe_normalize(object.place.matrix3 * own.truncate()).extend(side);
+                    let normal =
+                        shape.normals.get(vertices[corner]).map_or(DVec3::ZERO, |own| own.as_dvec3());
+                    transformed_tangent(u, v, along, safe_normalize(object.normals * normal))
+                        * weights[corner]
+                })
+                .sum();
+            map_normal(texel, f64::from(map.scale), tangent, smooth)
+        });
+        let normal = mapped.filter(|normal| *normal != DVec3::ZERO);
+        let normal = normal.or_else(|| try_normalize(smooth)).unwrap_or(face);
+
+        let mut tint = DVec4::ONE;
+        if let Some(texture) = &object.textures.base_color {
+            tint = sample_color(texture, object.coordinates(texture.tex_coord, vertices, weights));
+        }
+        if !shape.colors.is_empty() {
+            let vertex = |corner: usize| shape.colors[vertices[corner]].as_dvec4() * weights[corner];
+            tint *= (0..3).map(vertex).sum::<DVec4>();
+        }
+        let mut surface = SurfaceSample::new(&object.material, lit_as_front);
+        if let Some(mapped) = &object.textures.metallic_roughness {
+            let uv = object.coordinates(mapped.texture.tex_coord, vertices, weights);
+            let texel = sample_linear(&mapped.texture, uv);
+            let metallic = f64::from(mapped.metallic) * texel.z;
+            let base = mapped.base_color.as_dvec3();
+            surface.ambient = base;
+            surface.diffuse = base * (1.0 - metallic);
+            surface.specular = mapped.dielectric.as_dvec3().lerp(base * tint.truncate(), metallic);
+            surface.shininess =
+                f64::from(shininess_from_roughness((f64::from(mapped.roughness) * texel.y) as f32));
+        }
+        surface.ambient *= tint.truncate();
+        surface.diffuse *= tint.truncate();
+        let unoccluded = object.textures.occlusion.as_ref().map_or(1.0, |map| {
+            let uv = object.coordinates(map.texture.tex_coord, vertices, weights);
+            occlusion(sample_linear(&map.texture, uv).x, f64::from(map.strength))
+        });
+        surface.ambient *= unoccluded;
+        let mut emission = object.material.surface(lit_as_front).emission.as_dvec3();
+        if let Some(texture) = &object.textures.emissive {
+            let uv = object.coordinates(texture.tex_coord, vertices, weights);
+            emission *= sample_color(texture, uv).truncate();
+        }
+        let baked = object.lightmap.as_ref().map(|image| {
+            let uv = object.coordinates(1, vertices, weights);
+            surface.diffuse * sample_lightmap(image, uv) * unoccluded
+        });
+        Self {
+            object: meeting.crossing.object,
+            position,
+            distance,
+            geometric: towards(face, ray),
+            normal: facing_normal(normal, lit_as_front),
+            front,
+            surface,
+            emission,
+            coverage: coverage(object, f64::from(object.material.alpha) * tint.w),
+            baked,
+            extent,
+            triangle: meeting.triangle,
+        }
+    }
+
+    fn on_exact_surface(
+        object: &Object,
+        ray: &SpaceRay,
+        meeting: &Meeting,
+        position: DVec3,
+        normal: DVec3,
+    ) -> Self {
+        let front = meeting.crossing.front;
+        let lit_as_front = front || !backs_are_lit(object);
+        let surface = SurfaceSample::new(&object.material, lit_as_front);
+        Self {
+            object: meeting.crossing.object,
+            position,
+            distance: meeting.distance,
+            geometric: towards(normal, ray),
+            normal: facing_normal(normal, lit_as_front),
+            front,
+            surface,
+            emission: object.material.surface(lit_as_front).emission.as_dvec3(),
+            coverage: coverage(object, f64::from(object.material.alpha)),
+            baked: None,
+            // The point is as uncertain as the coordinates of what the ray began with.
+            extent: position.abs().max(ray.origin.abs()).max_element(),
+            triangle: None,
+        }
+    }
+
+    /// The normal that mirrors and refracts: the lit one, or the face's own where that would look through the surface.
+    pub fn optical_normal(&self, viewer: DVec3) -> DVec3 {
+        let facing = if self.normal.dot(self.geometric) < 0.0 { -self.normal } else { self.normal };
+        if facing.dot(viewer) > 0.0 { facing } else { self.geometric }
+    }
+}
+
+/// Whether a surface seen from behind is lit from there: where the scene says so, and inside of glass always.
+fn backs_are_lit(object: &Object) -> bool {
+    (object.material.double_sided && object.two_sided) || object.is_solid()
+}
+
+fn coverage(object: &Object, alpha: f64) -> f64 {
+    if object.material.alpha_mode == AlphaMode::Blend { alpha.clamp(0.0, 1.0) } else { 1.0 }
+}
+
+fn towards(normal: DVec3, ray: &SpaceRay) -> DVec3 {
+    if normal.dot(ray.direction) > 0.0 { -normal } else { normal }
+}
+
+/// Distance and weights of the second and third corner where a ray meets a triangle's plane, in f64; nothing where it grazes so that the
+/// distance could not be trusted.
+fn refined(ray: &SpaceRay, [a, b, c]: [DVec3; 3], cross: DVec3, near: f64) -> Option<(f64, [f64; 2])> {
+    let along = ray.direction.dot(cross);
+    let distance = (a - ray.origin).dot(cross) / along;
+    let fits = (distance - near).abs() <= TRUSTED * near.max(1e-6) && distance > 0.0;
+    if !fits {
+        return None;
+    }
+    let offset = ray.at(distance) - a;
+    let area = cross.length_squared();
+    let second = offset.cross(c - a).dot(cross) / area;
+    let third = (b - a).cross(offset).dot(cross) / area;
+    let (second, third) = (second.clamp(0.0, 1.0), third.clamp(0.0, 1.0));
+    // On the edge rather than beyond it.
+    let sum = (second + third).max(1.0);
+    (second.is_finite() && third.is_finite()).then_some((distance, [second / sum, third / sum]))
+}
