@@ -2,6 +2,7 @@
 //! faults by their place, and mutants. `encoded/make.mjs` makes the files.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
+#![allow(clippy::print_stdout, reason = "what became of the mutants is what one wants to see of them")]
 
 #[path = "support/allocation.rs"]
 mod allocation;
