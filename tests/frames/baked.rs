@@ -62,6 +62,50 @@ fn the_baked_cornell_box_shows_its_lightmaps() {
     assert!(compare(&dark, &interior).relative_l2 > 0.9);
 }
 
+/// wgpu-core 30 once left a lightmap out that the draw before had bound too, where that had textures and this has none.
+#[test]
+fn a_lightmap_is_shared_by_what_has_textures_and_what_has_none() {
+    let mut world = World::new();
+    let lightmap = Arc::new(LightmapImage {
+        name: "map".to_owned(),
+        width: 2,
+        height: 2,
+        texels: vec![Vec3::new(0.5, 1.0, 0.25); 4],
+        encoding: lumbre_scene::LightmapEncoding::default(),
+    });
+    let white = lumbre_tests::panes::sharp(&lumbre_tests::panes::image(1, &[[255; 4]]));
+    for number in 0..6 {
+        let mut ball = lumbre_mesh::shapes::uv_sphere(0.3, 24, 12);
+        ball.uv1 = vec![glam::Vec2::splat(0.5); ball.positions.len()];
+        // From the nearest to the farthest, as they are drawn.
+        let place =
+            lumbre_scene::Transform::from_xyz(0.7 * f64::from(number) - 1.75, 0.0, -0.1 * f64::from(number));
+        let ball = (lumbre_scene::Mesh::from(ball), Material::matt(Vec3::splat(0.5)), place);
+        let mut ball = world.spawn((ball, Lightmap { image: Arc::clone(&lightmap) }));
+        if number % 2 == 0 {
+            let base_color = Some(white.clone());
+            ball.insert(lumbre_scene::MaterialTextures { base_color, ..Default::default() });
+        }
+        if number == 4 {
+            ball.insert(lumbre_optics::Shading::Gouraud);
+        }
+    }
+    world.spawn((lumbre_scene::Camera::default(), lumbre_scene::Transform::from_xyz(0.0, 0.0, 4.0)));
+    // A light with a shadow, too faint to be seen: its group stands behind the lightmap's.
+    let faint = lumbre_optics::Light { shadow: true, ..lumbre_optics::Light::point(Vec3::splat(1e-12)) };
+    for shadows in [false, true] {
+        if shadows {
+            world.spawn((faint.clone(), lumbre_scene::Transform::from_xyz(0.0, 3.0, 3.0)));
+        }
+        let (pixels, _) = draw(&mut world, 240, 60, &linear());
+        let lit: Vec<_> = pixels.iter().filter(|pixel| **pixel != DVec3::ZERO).collect();
+        assert!(lit.len() > 1000, "{}", lit.len());
+        let expected = DVec3::new(0.25, 0.5, 0.125);
+        let worst = lit.iter().map(|pixel| (**pixel - expected).abs().max_element()).fold(0.0, f64::max);
+        assert!(worst < 1e-4, "{worst} beside the lightmap's light");
+    }
+}
+
 #[test]
 fn colour_bleeds_and_nothing_inside_is_black() {
     let Some(mut world) = baked_cornell_box() else { return };

@@ -118,14 +118,19 @@ impl<'a> FrameScene<'a> {
             if let Some(set) = &batch.texture_set {
                 pass.set_bind_group(1, &set.bind_group, &[]);
             }
+            // A group behind one that the pipeline before had and this one has not: wgpu-core 30 takes the same group for bound still and leaves it
+            // out, though the device has dropped it. Taken away first, it is bound again.
+            let mut bind_again = |index: u32, group: &wgpu::BindGroup| {
+                pass.set_bind_group(index, None::<&wgpu::BindGroup>, &[]);
+                pass.set_bind_group(index, group, &[]);
+            };
             if let Some(lightmap) = &batch.lightmap {
-                pass.set_bind_group(2, &**lightmap, &[]);
+                bind_again(2, lightmap);
             }
             if batch.pipeline.variant.has(Feature::Shadows) {
-                let Some(group) = self.shadows.device().and_then(|maps| maps.receiver_group.as_ref()) else {
-                    continue;
-                };
-                pass.set_bind_group(3, group, &[]);
+                let maps = self.shadows.device().and_then(|maps| maps.receiver_group.as_ref());
+                let Some(group) = maps else { continue };
+                bind_again(3, group);
             }
             for (slot, buffer) in (0..).zip(&slices.attributes) {
                 pass.set_vertex_buffer(slot, buffer.slice(..));
