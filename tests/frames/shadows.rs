@@ -277,6 +277,16 @@ fn a_lamp_does_not_shadow_its_own_light() {
     let lamp = light(&mut world, Light::point(Vec3::splat(30.0)), DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO);
     world.entity_mut(lamp).insert((bulb, Material::emissive(Vec3::ONE)));
     let Drawn { lit, .. } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
-    let bright = lit.iter().filter(|lit| (**lit - 1.0).abs() < 1e-6).count();
-    assert_eq!(bright, lit.len());
+    let bright = |lit: &[f64]| lit.iter().filter(|lit| (**lit - 1.0).abs() < 1e-6).count();
+    assert_eq!(bright(&lit), lit.len());
+    // The same bulb as an object of its own around the light.
+    let bulb = world.entity_mut(lamp).take::<Mesh>().unwrap();
+    let place = Transform::from_xyz(0.0, 3.0, 0.0);
+    let glowing = world.spawn((bulb, Material::emissive(Vec3::ONE), place)).id();
+    let Drawn { lit, .. } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
+    assert_eq!(bright(&lit), lit.len());
+    // One that does not glow hides it.
+    world.entity_mut(glowing).insert(Material::matt(Vec3::ONE));
+    let Drawn { lit, .. } = draw(&mut Renderer::new(gpu()), &mut world, Shading::Phong);
+    assert!(bright(&lit) < lit.len() / 10, "{}", bright(&lit));
 }

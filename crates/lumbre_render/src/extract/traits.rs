@@ -19,6 +19,8 @@ pub(crate) struct Traits {
     pub alpha_mode: AlphaMode,
     pub double_sided: bool,
     pub unlit: bool,
+    /// Whether its front glows.
+    pub glows: bool,
     /// Whether any light makes a highlight on it.
     pub specular: bool,
     /// Whether a highlight may be sharper than plain powers can tell.
@@ -56,6 +58,7 @@ impl Traits {
             alpha_mode: material.alpha_mode,
             double_sided: material.double_sided,
             unlit: material.unlit,
+            glows: material.front.emission != Vec3::ZERO,
             specular: material.front.specular != Vec3::ZERO
                 || back != Vec3::ZERO
                 || maps.is_some_and(|maps| maps.metallic_roughness.is_some()),

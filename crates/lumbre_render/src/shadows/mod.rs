@@ -4,14 +4,13 @@
 mod atlas;
 mod views;
 
-use bevy_ecs::entity::Entity;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, DVec4, Mat4};
 
 use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
-use crate::shadow_light::{MOST_VIEWS, ShadowLight};
+use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight};
 use crate::{Gpu, RenderError};
 
 /// Largest side of the atlas, in texels.
@@ -159,7 +158,7 @@ impl ShadowMaps {
                 parameters: parameters.map(|number| number as f32),
             });
             let (casters, shows) =
-                casters_of(objects, light.entity, view, clip_from_frame, [tile.x, tile.y, tile.side]);
+                casters_of(objects, light, view, clip_from_frame, [tile.x, tile.y, tile.side]);
             if *drawn != shows {
                 *drawn = shows;
                 // Less than MOST_VIEWS strides.
@@ -223,10 +222,11 @@ impl Object {
     }
 }
 
-/// Who casts into a view, and a number for all that its map shows. A lamp casts no shadow of its own light.
+/// Who casts into a view, and a number for all that its map shows. A lamp casts no shadow of its own light: neither its own mesh nor a bulb, which glows and has
+/// it inside.
 fn casters_of(
     objects: &Objects,
-    lamp: Entity,
+    lamp: &ShadowLight,
     view: &views::View,
     clip: Mat4,
     place: [u32; 3],
@@ -246,7 +246,10 @@ fn casters_of(
     place.iter().for_each(|number| hash.add(u64::from(*number)));
     let mut casters = Vec::new();
     for (slot, object) in objects.iter() {
-        if !object.casts_shadow() || object.entity == lamp {
+        let inside = || (lamp.position - object.center).abs().cmple(object.half_size).all();
+        let own = object.entity == lamp.entity
+            || object.traits.glows && lamp.kind != ShadowKind::Cascades && inside();
+        if !object.casts_shadow() || own {
             continue;
         }
         let center = (object.center - objects.origin).extend(1.0);
