@@ -49,9 +49,15 @@ struct Drawn {
 
 fn draw(renderer: &mut Renderer, world: &mut World, shading: Shading) -> Drawn {
     let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::LinearFloat).unwrap();
-    let options =
-        FrameOptions { display: Display::Linear, shading: Some(shading), ..FrameOptions::default() };
+    let options = FrameOptions {
+        display: Display::Linear,
+        shading: Some(shading),
+        probe: true,
+        ..FrameOptions::default()
+    };
     let report = renderer.render(world, &target.target(), &options).unwrap();
+    let measured = renderer.wait().unwrap().unwrap();
+    assert!(measured.probed && measured.non_finite.is_none(), "{:?}", measured.non_finite);
     let with = target.read_linear(gpu()).unwrap();
     renderer.render(world, &target.target(), &FrameOptions { shadows: false, ..options }).unwrap();
     let without = target.read_linear(gpu()).unwrap();
@@ -164,8 +170,9 @@ fn a_flat_floor_never_shadows_itself_and_a_box_has_its_shadow_at_its_feet() {
             if elevation < 71.0 {
                 let length = 0.5 * cosine / sine;
                 let touching = shadow(0.06);
+                // A map of a near light has texels of a tenth of a metre there, which at two degrees hold what is before the box too.
                 assert!(
-                    touching < 0.02,
+                    touching < 0.02 || !distant && elevation < 10.0,
                     "{name} at {elevation} degrees: {touching} of the light at the box's feet"
                 );
                 if distant && length < 1.5 {

@@ -324,9 +324,6 @@ pub struct Trace {
     /// Rays of the tree that count for less than this are not traced.
     #[arg(long, value_name = "X", default_value_t = DEFAULT_WEIGHT, value_parser = weight, allow_negative_numbers = true)]
     pub weight: f64,
-    /// Lets every light reach everything.
-    #[arg(long)]
-    pub no_shadows: bool,
     /// Samples of a pixel: so many of the ray tree (1 without this), at most so many paths (64, or as many as --error or --time take).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576), allow_negative_numbers = true)]
     pub samples: Option<u32>,
@@ -429,7 +426,7 @@ pub struct Frame {
     /// Leaves the lightmaps out.
     #[arg(long)]
     pub no_lightmaps: bool,
-    /// Leaves out the shadows of lights that ask for them.
+    /// Draws no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,
     /// Four samples per pixel.

@@ -78,7 +78,7 @@ fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions 
         reflection: asked.frame.reflection,
         depth: asked.depth,
         weight: asked.weight,
-        shadows: !asked.no_shadows,
+        shadows: !asked.frame.no_shadows,
         lightmaps: !asked.frame.no_lightmaps,
         samples: asked
             .samples

@@ -186,7 +186,10 @@ fn a_bake_is_loaded_explained_and_drawn() {
 
     let short = stdout(&lumbre(&["explain", text(&path)]));
     assert!(short.contains("+ meshes: 3 meshes to draw\n") && short.contains("--all"), "{short}");
-    assert!(short.lines().count() < 20 && short.contains("without lightmap"), "{short}");
+    assert!(
+        short.lines().count() < 20 && short.contains("without shadow maps, linear frame, lightmap"),
+        "{short}"
+    );
     let measured = stdout(&lumbre(&["explain", text(&path), "--measure=0.1", "--size", "64x48"]));
     let of_emission = measured.lines().find(|line| line.contains("+ emission: 1 mesh")).unwrap_or(&measured);
     assert!(of_emission.contains(" ms, ") && of_emission.ends_with(" % of the picture)"), "{measured}");

@@ -18,7 +18,7 @@ use crate::features::{self, FrameFeatures};
 use crate::frame_graph::declare;
 use crate::frame_plan::{Ending, FramePlan};
 use crate::shader::{DisplayVariant, Feature};
-use crate::{Display, FrameOptions, RenderError};
+use crate::{Display, FrameOptions, RenderError, Renderer};
 
 /// A scene's frame, explained.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -50,8 +50,24 @@ pub fn explain(
     explain_with(world, &mut effects::own(), options, width, height)
 }
 
+impl Renderer {
+    /// Explains the frame that these options would draw of `world` in a target of this size, this renderer's effects among its passes. Draws nothing.
+    ///
+    /// # Errors
+    /// As [`explain`].
+    pub fn explain(
+        &mut self,
+        world: &mut World,
+        options: &FrameOptions,
+        width: u32,
+        height: u32,
+    ) -> Result<SceneExplanation, RenderError> {
+        explain_with(world, self.effects_mut(), options, width, height)
+    }
+}
+
 /// As [`explain`], for a frame with these effects.
-pub(crate) fn explain_with(
+fn explain_with(
     world: &mut World,
     effects: &mut [Box<dyn Effect>],
     options: &FrameOptions,

@@ -11,7 +11,6 @@ use lumbre_scene::{SceneSettings, propagate_transforms};
 use crate::cluster_buffers::ClusterBuffers;
 use crate::draws::Draws;
 use crate::effects::{self, Effect, Stage};
-use crate::explain::{SceneExplanation, explain_with};
 use crate::extract::{CameraView, Emitters, LightSet, Objects, extract_lights, find_camera};
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
@@ -165,18 +164,9 @@ impl Renderer {
         variants
     }
 
-    /// Explains the frame that these options would draw of `world` in a target of this size, this renderer's effects among its passes. Draws nothing.
-    ///
-    /// # Errors
-    /// As [`explain`](crate::explain).
-    pub fn explain(
-        &mut self,
-        world: &mut World,
-        options: &FrameOptions,
-        width: u32,
-        height: u32,
-    ) -> Result<SceneExplanation, RenderError> {
-        explain_with(world, &mut self.effects, options, width, height)
+    /// Its effects, in the order of their stages.
+    pub(crate) fn effects_mut(&mut self) -> &mut [Box<dyn Effect>] {
+        &mut self.effects
     }
 
     fn draw(
