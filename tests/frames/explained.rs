@@ -88,12 +88,13 @@ fn random_material(random: &mut Random) -> Material {
 
 fn random_textures(random: &mut Random) -> MaterialTextures {
     let texture = || sharp(&image(2, &[[200, 128, 255, 255]; 4]));
-    let mut textures = MaterialTextures::default();
-    textures.base_color = random.once_in(2).then(texture);
-    textures.emissive = random.once_in(3).then(texture);
-    textures.normal = random.once_in(2).then(|| NormalTexture { texture: texture(), scale: 1.0 });
-    textures.occlusion = random.once_in(3).then(|| OcclusionTexture { texture: texture(), strength: 1.0 });
-    textures
+    MaterialTextures {
+        base_color: random.once_in(2).then(texture),
+        emissive: random.once_in(3).then(texture),
+        normal: random.once_in(2).then(|| NormalTexture { texture: texture(), scale: 1.0 }),
+        occlusion: random.once_in(3).then(|| OcclusionTexture { texture: texture(), strength: 1.0 }),
+        metallic_roughness: None,
+    }
 }
 
 /// A handful of balls in view, with whatever components may meet.
@@ -128,7 +129,7 @@ fn random_world(random: &mut Random) -> World {
             entity.insert(random.one_of(ReflectionModel::ALL));
         }
         if random.once_in(4) {
-            entity.insert(EmissiveLight::default());
+            entity.insert(EmissiveLight);
         }
         if random.once_in(8) {
             entity.insert(Hidden);
