@@ -15,8 +15,8 @@ use lumbre_graph::wgpu;
 use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material};
 use lumbre_render::{
-    Acquired, CurrentTarget, FrameOptions, Gpu, LastFrame, Offscreen, OffscreenFormat, Renderer, WindowSurface,
-    render_frame,
+    Acquired, CurrentTarget, FrameOptions, Gpu, LastFrame, Offscreen, OffscreenFormat, Renderer,
+    WindowSurface, render_frame,
 };
 use lumbre_scene::{Camera, Mesh, SceneSettings, Transform};
 use winit::application::ApplicationHandler;
@@ -53,16 +53,25 @@ fn scene() -> World {
     let floor = Mesh::from(shapes::plane(12.0, 12.0, 1, 1));
     world.spawn((floor, Material::matt(Vec3::splat(0.4)), Transform::from_xyz(0.0, 0.0, 0.0)));
     let ball = Mesh::from(shapes::uv_sphere(0.7, 48, 24));
-    for (index, color) in [Vec3::new(0.8, 0.2, 0.1), Vec3::new(0.2, 0.7, 0.2), Vec3::new(0.2, 0.3, 0.9)].into_iter().enumerate() {
+    for (index, color) in
+        [Vec3::new(0.8, 0.2, 0.1), Vec3::new(0.2, 0.7, 0.2), Vec3::new(0.2, 0.3, 0.9)].into_iter().enumerate()
+    {
         let place = Transform::from_xyz(1.7 * (index as f64 - 1.0), 0.7, 0.0);
-        let mut entity = world.spawn((ball.clone(), Material::from_metallic_roughness(color, 0.0, 0.35), place));
+        let mut entity =
+            world.spawn((ball.clone(), Material::from_metallic_roughness(color, 0.0, 0.35), place));
         if index == 1 {
             entity.insert(Outlined { color: Vec3::new(1.0, 0.8, 0.1) });
         }
     }
     let lamp = Mesh::from(shapes::uv_sphere(0.08, 16, 8));
     for color in [Vec3::new(3.0, 2.4, 1.8), Vec3::new(1.5, 2.4, 3.0), Vec3::new(3.0, 1.5, 2.4)] {
-        world.spawn((lamp.clone(), Material::emissive(8.0 * color), Light::point(color), Transform::IDENTITY, Orbits));
+        world.spawn((
+            lamp.clone(),
+            Material::emissive(8.0 * color),
+            Light { shadow: true, ..Light::point(color) },
+            Transform::IDENTITY,
+            Orbits,
+        ));
     }
     let view = Transform::from_xyz(0.0, 2.6, 6.0).looking_at(DVec3::new(0.0, 0.6, 0.0), DVec3::Y);
     world.spawn((Camera::default(), view, Bloom::default()));
@@ -86,7 +95,9 @@ fn device(instance: wgpu::Instance, surface: Option<&wgpu::Surface<'_>>) -> Resu
 /// The scene with a renderer that has both effects, and the schedule that draws it.
 fn game(gpu: Gpu) -> (World, Schedule) {
     let mut world = scene();
-    world.insert_resource(Renderer::builder().with(BloomEffect::default()).with(OutlineEffect::new(3.0)).build(&gpu));
+    world.insert_resource(
+        Renderer::builder().with(BloomEffect::default()).with(OutlineEffect::new(3.0)).build(&gpu),
+    );
     world.insert_resource(gpu);
     let mut schedule = Schedule::default();
     schedule.add_systems((orbit, render_frame).chain());
@@ -130,9 +141,11 @@ struct OpenGame {
 
 impl OpenGame {
     fn new(events: &ActiveEventLoop) -> Result<Self, Anything> {
-        let window = Arc::new(events.create_window(Window::default_attributes().with_title("A program of its own"))?);
+        let window =
+            Arc::new(events.create_window(Window::default_attributes().with_title("A program of its own"))?);
         let display = Box::new(events.owned_display_handle());
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle_from_env(display));
+        let instance =
+            wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle_from_env(display));
         let surface = instance.create_surface(Arc::clone(&window))?;
         let gpu = device(instance, Some(&surface))?;
         let size = window.inner_size();
