@@ -17,8 +17,8 @@ use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
 use crate::frame_graph::declare;
 use crate::frame_plan::{Ending, FramePlan};
-use crate::shader::{DisplayVariant, Feature};
-use crate::{Display, FrameOptions, RenderError, Renderer};
+use crate::shader::Feature;
+use crate::{FrameOptions, RenderError, Renderer};
 
 /// A scene's frame, explained.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -103,17 +103,8 @@ fn explain_with(
         radiance |= called_for && effect.stage() == Stage::Radiance;
     }
     let plan = FramePlan::new(&facts, options, target_format, radiance);
-    let common = FrameFeatures {
-        shading: options.shading,
-        reflection: options.reflection,
-        specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
-        lightmaps: options.lightmaps,
-        clamp: options.display == Display::Clamp,
-        half: plan.ending == Ending::DisplayPass && !options.full_precision,
-        lights,
-        clustered: lights.are_clustered(options.light_lists),
-        display: (plan.ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target_format)),
-    };
+    let half = plan.ending == Ending::DisplayPass && !options.full_precision;
+    let common = FrameFeatures::new(options, &settings, lights, (plan.ending, target_format, half));
     let mut variants = BTreeMap::new();
     let mut clustered = 0;
     for object in &traits {

@@ -15,7 +15,7 @@ use crate::extract::{CameraView, Emitters, LightSet, Objects, extract_lights, fi
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
 use crate::frame_graph::{Overlay, run_graph};
-use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
+use crate::frame_plan::{FramePlan, ShadowAtlas};
 use crate::frame_scene::FrameScene;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, InstanceData, LightData, radiance};
@@ -23,13 +23,13 @@ use crate::light_clusters::ClusteredView;
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
 use crate::pipelines::{Pipelines, attributes, is_flat};
-use crate::shader::{DisplayVariant, Variant};
+use crate::shader::Variant;
 use crate::shadows::{ShadowMaps, ShadowedView};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::{
-    CpuStages, Display, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, Measure,
-    RenderError, Statistics,
+    CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, Measure, RenderError,
+    Statistics,
 };
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
@@ -227,18 +227,8 @@ impl Renderer {
         let radiance = called().any(|(effect, _)| effect.stage() == Stage::Radiance);
         let draws_objects = called().any(|(effect, _)| effect.draws_objects());
         let plan = FramePlan::for_device(&facts, options, radiance, (&self.gpu, target, exposure));
-        let features = FrameFeatures {
-            shading: options.shading,
-            reflection: options.reflection,
-            specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
-            lightmaps: options.lightmaps,
-            clamp: options.display == Display::Clamp,
-            half: plan.lit_format == wgpu::TextureFormat::Rgba16Float,
-            lights: lights.set,
-            clustered: lights.set.are_clustered(options.light_lists),
-            display: (plan.ending == Ending::Folded)
-                .then(|| DisplayVariant::new(options.display, target.format)),
-        };
+        let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
+        let features = FrameFeatures::new(options, &settings, lights.set, (plan.ending, target.format, half));
         let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         let everything = options.light_lists == LightLists::Everything;

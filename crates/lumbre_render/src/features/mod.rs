@@ -15,7 +15,9 @@ use lumbre_optics::{ReflectionModel, Shading};
 use lumbre_scene::SceneSettings;
 
 use crate::extract::{LightSet, Traits};
+use crate::frame_plan::Ending;
 use crate::shader::{DisplayVariant, Feature, Variant};
+use crate::{Display, FrameOptions};
 
 /// What all variants of a frame have in common.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +34,28 @@ pub(crate) struct FrameFeatures {
     pub clustered: bool,
     /// Colours are made as the target holds them.
     pub display: Option<DisplayVariant>,
+}
+
+impl FrameFeatures {
+    /// What options and settings come to for a frame of these lights that ends so in a target of this format; `half` if its radiance is kept in half floats.
+    pub fn new(
+        options: &FrameOptions,
+        settings: &SceneSettings,
+        lights: LightSet,
+        (ending, target, half): (Ending, wgpu::TextureFormat, bool),
+    ) -> Self {
+        Self {
+            shading: options.shading,
+            reflection: options.reflection,
+            specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
+            lightmaps: options.lightmaps,
+            clamp: options.display == Display::Clamp,
+            half,
+            lights,
+            clustered: lights.are_clustered(options.light_lists),
+            display: (ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target)),
+        }
+    }
 }
 
 /// An object in a frame, as the subjects are asked about it.
