@@ -1,5 +1,5 @@
-//! The shaders of Lumbre: WESL modules, embedded so that a program carries them. Whoever compiles them chooses their features; no device is
-//! known here.
+//! The shaders of Lumbre: WESL modules, embedded so that a program carries them, and their way to WGSL. Whoever compiles them chooses
+//! their features; no device is known here.
 //!
 //! ```text
 //!   forward ──► lighting, light_clusters, lightmap, textures …   the passes of lumbre_render
@@ -11,7 +11,14 @@
 //! ```
 //! let (_, source) = lumbre_shaders::MODULES.iter().find(|(path, _)| *path == "optics/lambert").unwrap();
 //! assert!(source.contains("fn lambert(normal: vec3<f32>, light: vec3<f32>) -> f32"));
+//!
+//! let wgsl = lumbre_shaders::to_wgsl("optics/lambert", &[]).unwrap();
+//! assert!(wgsl.contains("max(dot(normal, light), 0.0)"));
 //! ```
+
+mod program;
+
+pub use program::{Kept, Program, UnnamedFeatures, WeslError, to_wgsl};
 
 macro_rules! modules {
     ($($path:literal),+ $(,)?) => {

@@ -17,6 +17,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use lumbre_render::Gpu;
+use lumbre_shaders::{Kept, Program, UnnamedFeatures};
 
 /// Invocations of a workgroup, and the most workgroups that every device takes in a row.
 const WORKGROUP: usize = 64;
@@ -234,37 +235,27 @@ impl Kernel {
 
 /// The program with the modules of `shaders/optics`, each as `edit` gives it by name and text.
 fn compile(source: &str, features: &[String], edit: impl Fn(&str, String) -> String) -> String {
-    let mut resolver = wesl::VirtualResolver::new();
     let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders/optics");
     let files = std::fs::read_dir(&shaders).unwrap_or_else(|error| panic!("{shaders:?}: {error}"));
+    let mut modules = vec![("kernel".to_owned(), source.to_owned())];
     for file in files {
         let path = file.unwrap_or_else(|error| panic!("{shaders:?}: {error}")).path();
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path:?}: {error}"));
         let text = edit(&name, text);
-        resolver.add_module(module_path(&format!("optics::{name}")), Cow::Owned(text));
+        modules.push((format!("optics/{name}"), text));
     }
-    resolver.add_module(module_path("kernel"), Cow::Borrowed(source));
-    let mut compiler = wesl::Wesl::new_barebones().set_custom_resolver(resolver);
-    compiler.set_mangler(wesl::ManglerKind::Escape).set_options(wesl::CompileOptions {
-        imports: true,
-        condcomp: true,
-        strip: true,
-        lazy: true,
-        ..Default::default()
-    });
-    for feature in features {
-        compiler.set_feature(feature.as_str(), true);
-    }
-    match compiler.compile(&module_path("kernel")) {
-        Ok(program) => program.to_string(),
-        Err(error) => panic!("{error}\n{source}"),
-    }
-}
-
-fn module_path(path: &str) -> wesl::syntax::ModulePath {
-    let path = format!("package::{path}");
-    path.parse().unwrap_or_else(|error| panic!("{path}: {error}"))
+    let modules: Vec<_> =
+        modules.iter().map(|(path, text)| (path.as_str(), Cow::Borrowed(text.as_str()))).collect();
+    let features: Vec<_> = features.iter().map(|feature| (feature.as_str(), true)).collect();
+    let program = Program {
+        modules: &modules,
+        root: "kernel",
+        features: &features,
+        unnamed: UnnamedFeatures::AreOff,
+        kept: Kept::EntryPoints,
+    };
+    program.to_wgsl().unwrap_or_else(|error| panic!("{error}\n{source}"))
 }
 
 #[cfg(test)]

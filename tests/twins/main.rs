@@ -11,6 +11,7 @@ mod completeness;
 mod highlights;
 mod inputs;
 mod judge;
+mod light_components;
 mod lights;
 mod materials;
 mod microfacets;

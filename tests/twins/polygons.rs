@@ -17,14 +17,14 @@ fn arc_excess(square: f64) -> f64 {
     (1.0 + square) * square.sqrt().atan() / square.sqrt() - 1.0
 }
 
-/// Corner, two edges, whether a triangle, point, normal: of aspects up to 30, from a tenth to a thousand sizes away.
+/// Corner, two edges, whether a triangle, point, normal: of aspects up to 100, from a tenth to a hundred thousand sizes away.
 fn polygon(sequence: &mut Sequence) -> Vec<f32> {
     let (along, other) = (sequence.unit(), sequence.unit());
     let size = sequence.decades(-1.0, 1.0);
-    let across = along.cross(other).normalize_or_zero() * sequence.decades(-1.5, 0.0);
+    let across = along.cross(other).normalize_or_zero() * sequence.decades(-2.0, 0.0);
     let (u, v) = (along * size, (across + along * sequence.between(-0.5, 0.5)) * size);
     let middle = (u + v) / 2.0;
-    let away = sequence.unit() * size * sequence.decades(-1.0, 3.0);
+    let away = sequence.unit() * size * sequence.decades(-1.0, 5.0);
     // Mostly in front.
     let front = u.cross(v);
     let away = if away.dot(front) < 0.0 && sequence.next() < 0.8 { -away } else { away };

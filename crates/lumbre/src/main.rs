@@ -18,6 +18,10 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
+use tracing::Level;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::arguments::{Arguments, Command};
 
@@ -25,15 +29,11 @@ fn main() -> ExitCode {
     silence_device_selection();
     // Bad usage ends in here, with exit status 2.
     let arguments = Arguments::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_env("LUMBRE_LOG").unwrap_or_else(|_| {
-        tracing_subscriber::EnvFilter::new("warn,lumbre_bake=info,wgpu_hal=error,wgpu_core=error")
-    });
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    let messages = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .init();
+        .without_time();
+    tracing_subscriber::registry().with(messages_shown()).with(messages).init();
     let outcome = match arguments.command {
         None => play::run(&arguments.play),
         Some(Command::Play(options)) => play::run(&options),
@@ -52,6 +52,17 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// What `LUMBRE_LOG` says (`debug`, or `lumbre_bake=debug,wgpu_core=info`), or warnings and the progress of a bake.
+fn messages_shown() -> Targets {
+    let stated = std::env::var("LUMBRE_LOG").ok().and_then(|stated| stated.parse().ok());
+    stated.unwrap_or_else(|| {
+        Targets::new()
+            .with_default(Level::WARN)
+            .with_target("lumbre_bake", Level::INFO)
+            .with_targets(["wgpu_hal", "wgpu_core"].map(|noisy| (noisy, Level::ERROR)))
+    })
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -16,16 +16,19 @@ use crate::progress::Shown;
 
 /// Runs the command.
 pub fn run(asked: &Play) -> anyhow::Result<()> {
+    let is_headless = asked.headless || !demo::has_display();
     let level = match &asked.level {
-        Some(level) => level.clone(),
-        None => demo_level()?,
+        Some(level) => Level { path: level.clone(), is_baked_beside_frames: false },
+        // Pictures that are kept, and walks that are compared, show the level's light as it is in the end.
+        None => demo_level(is_headless || asked.screenshot.is_some() || asked.input.is_some())?,
     };
+    let Level { path: level, is_baked_beside_frames } = level;
     let options = open_options(asked);
     let mut opened = Opened::open(&level, &options)?;
     for note in &opened.notes {
         eprintln!("lumbre: note: {}: {note}", level.display());
     }
-    if asked.headless || !demo::has_display() {
+    if is_headless {
         let exposure = exposure_of_tour(&mut opened, asked)?;
         let paths = demo::tour_of(opened.game, &asked.frames_dir, asked.frames, asked.size, exposure)?;
         let mut out = std::io::stdout().lock();
@@ -36,6 +39,7 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
     }
     let options = demo::PlayOptions {
         open: options,
+        bake: is_baked_beside_frames,
         input: asked.input.clone(),
         record: asked.record.clone(),
         screenshot: asked.screenshot.clone(),
@@ -71,16 +75,33 @@ fn exposure_of_tour(opened: &mut Opened, asked: &Play) -> anyhow::Result<Option<
     exposure(asked.exposure, photometric, &mut opened.game.world, &gpu, &options, aspect, &opened.path)
 }
 
-/// The baked demo level; baked now if it is not there or older than the level.
-fn demo_level() -> anyhow::Result<PathBuf> {
+/// A file to play.
+struct Level {
+    path: PathBuf,
+    /// Whether the window bakes it while it is played.
+    is_baked_beside_frames: bool,
+}
+
+/// The demo level, baked. If it is not there, or older than the level, it is baked now, or in the window where light need not be there from
+/// the first frame on.
+fn demo_level(needs_light: bool) -> anyhow::Result<Level> {
     let source = demo_source()?;
     let baked = source.with_file_name("demo.baked.glb");
     let time = |path: &Path| std::fs::metadata(path).and_then(|data| data.modified()).ok();
     if time(&baked).is_some_and(|baked| time(&source).is_none_or(|source| source <= baked)) {
-        return Ok(baked);
+        return Ok(Level { path: baked, is_baked_beside_frames: false });
     }
+    if !needs_light {
+        eprintln!("lumbre: {} is baked while it is played (once)", source.display());
+        return Ok(Level { path: source, is_baked_beside_frames: true });
+    }
+    bake_demo_level(&source, &baked)?;
+    Ok(Level { path: baked, is_baked_beside_frames: false })
+}
+
+fn bake_demo_level(source: &Path, baked: &Path) -> anyhow::Result<()> {
     eprintln!("lumbre: baking {} (once)", source.display());
-    let (file, Loaded { mut world, .. }) = load_source(&source, &Reading::default())?;
+    let (file, Loaded { mut world, .. }) = load_source(source, &Reading::default())?;
     let mut shown = Shown::new(false);
     // Frames do not read probes.
     let options = BakeOptions { error: 0.02, probes: Probes::Never, ..BakeOptions::default() };
@@ -89,8 +110,8 @@ fn demo_level() -> anyhow::Result<PathBuf> {
         ControlFlow::Continue(())
     })?;
     shown.finish();
-    scene::save_baked(&mut world, &file, &baked, &scene::SaveOptions::default())?;
-    Ok(baked)
+    scene::save_baked(&mut world, &file, baked, &scene::SaveOptions::default())?;
+    Ok(())
 }
 
 /// `assets/demo.glb` under the working folder, beside the program, or in the source tree it was built from.

@@ -96,7 +96,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::FrameReport>) -> FrameTimes {
+fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::GraphReport>) -> FrameTimes {
     let measured = measured.unwrap_or_default();
     let passes = measured.passes.iter().map(|pass| {
         let lit = ["lightmap", "forward", "transparent"].contains(&pass.name.as_ref());

@@ -1,12 +1,15 @@
 //! A level and other files in a window of a virtual X server: pictures with the overlay, a change of size, a lost device, recorded input,
-//! turning, files that are dropped, a bake beside the frames, an exposure that adapts.
+//! turning, files that are dropped (by the event loop, and by another program over X11), a bake beside the frames, an exposure that adapts.
 //!
 //! A window needs the main thread and an event loop of its own, so every scenario is a process: this program starts itself.
+
+mod drag_and_drop;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use anyhow::ensure;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, Density};
@@ -23,10 +26,15 @@ const PICTURE: &str = "LUMBRE_WINDOW_PICTURE";
 const KEEP: &str = "LUMBRE_WINDOW_KEEP";
 const SIZE: (u32, u32) = (640, 400);
 
+/// The scenario in which this program drops the file itself, on the window of the other process.
+const DROPPED_OVER_X11: &str = "dropped over X11";
+/// Frames that a window waits for that file.
+const FRAMES_FOR_A_DROP: u32 = 1000;
+
 /// Looks at a scenario's picture.
 type Judge = fn(&Path);
 /// Every scenario by name, and how its picture is judged.
-const SCENARIOS: [(&str, Judge); 15] = [
+const SCENARIOS: [(&str, Judge); 17] = [
     ("overlay", picture_with_overlay),
     ("no overlay", picture_without_overlay),
     ("resize", picture_of_other_size),
@@ -36,9 +44,11 @@ const SCENARIOS: [(&str, Judge); 15] = [
     ("turned", picture_of_the_green_side),
     ("its camera", picture_from_its_camera),
     ("dropped", picture_of_the_red_box),
+    (DROPPED_OVER_X11, picture_of_the_red_box),
     ("dropped and broken", picture_of_the_red_box_and_an_error),
     ("not baked", picture_without_baked_light),
     ("baked", picture_with_baked_light),
+    ("baked at once", picture_with_baked_light),
     ("bake cancelled", picture_without_baked_light),
     ("bake of nothing that shines", picture_under_a_sky),
     ("adapted", picture_with_an_exposure),
@@ -59,7 +69,7 @@ fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (scenario, judge) in SCENARIOS {
         let picture = folder.path().join("picture.png");
-        let status = Command::new(std::env::current_exe().expect("this program"))
+        let mut window = Command::new(std::env::current_exe().expect("this program"))
             .env(SCENARIO, scenario)
             .env(PICTURE, &picture)
             .env("DISPLAY", &server.display)
@@ -67,8 +77,15 @@ fn main() {
             .env("XDG_RUNTIME_DIR", folder.path())
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("WAYLAND_SOCKET")
-            .status()
+            .spawn()
             .expect("this program starts");
+        if scenario == DROPPED_OVER_X11 {
+            // Addresses write blanks and letters beyond ASCII in another way than paths.
+            let dropped = folder.path().join("a box, größer.glb");
+            write_box(&dropped);
+            drag_and_drop::drop_file(&server.display, &dropped).expect("the window takes the file");
+        }
+        let status = window.wait().expect("this program ends");
         assert!(status.success(), "{scenario}: {status}");
         judge(&picture);
         if let Some(folder) = std::env::var_os(KEEP) {
@@ -116,6 +133,11 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
             options.trials = vec![hide, (2, Trial::Drop(file("box.glb", write_box)))];
             file("room.glb", write_room)
         }
+        DROPPED_OVER_X11 => {
+            options.trials = vec![hide];
+            options.quit_after = Some(FRAMES_FOR_A_DROP);
+            file("room.glb", write_room)
+        }
         "dropped and broken" => {
             let broken = file("broken.glb", |path| std::fs::write(path, "glTF?").expect("there is room"));
             options.trials = vec![hide, (2, Trial::Drop(broken))];
@@ -127,6 +149,11 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
         }
         "baked" => {
             options.trials = vec![hide, (2, Trial::Act(Action::ToggleBake))];
+            file("room.glb", write_room)
+        }
+        "baked at once" => {
+            options.bake = true;
+            options.trials = vec![hide];
             file("room.glb", write_room)
         }
         "bake cancelled" => {
@@ -153,7 +180,11 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
         "lost device" => options.trials = vec![(3, Trial::LoseDevice), (5, Trial::LoseDevice)],
         _ => {}
     }
-    lumbre_demo::run(&level, options)
+    let is_kept = options.bake;
+    lumbre_demo::run(&level, options)?;
+    let baked = folder.path().join("room.baked.glb");
+    ensure!(baked.exists() == is_kept, "{} is written where that was asked for only", baked.display());
+    Ok(())
 }
 
 /// A box whose front is red and whose right side is green, without a light, and a camera that sees it from far above.

@@ -2,7 +2,7 @@
 
 use crate::access::{Access, Part};
 use crate::error::GraphError;
-use crate::resource::{Name, ResourceDeclaration};
+use crate::resource::{Label, ResourceDeclaration};
 use crate::site::Site;
 
 /// What a pass records.
@@ -55,14 +55,14 @@ impl AccessDeclaration {
 /// A declared pass, without what it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PassDeclaration {
-    pub name: Name,
+    pub name: Label,
     pub kind: PassKind,
     pub accesses: Vec<AccessDeclaration>,
     /// What the pass calls for, and whether it is there.
-    pub calls_for: Vec<(bool, Name)>,
-    pub side_effects: Vec<Name>,
+    pub calls_for: Vec<(bool, Label)>,
+    pub side_effects: Vec<Label>,
     pub fingerprint: Option<u64>,
-    pub after: Vec<Name>,
+    pub after: Vec<Label>,
     pub site: Site,
 }
 
@@ -75,7 +75,7 @@ impl PassDeclaration {
 /// A declared graph, without what its passes run.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Declarations {
-    pub label: Name,
+    pub label: Label,
     pub resources: Vec<ResourceDeclaration>,
     pub passes: Vec<PassDeclaration>,
     /// Faults seen while declaring, in order.

@@ -1,7 +1,7 @@
 //! What can be wrong with a declared graph. Each error names the pass, the resource and where both were declared. What
 //! can go wrong while a graph runs is [`RunError`](crate::RunError).
 
-use crate::resource::Name;
+use crate::resource::Label;
 use crate::site::Site;
 
 /// A fault of a declared graph, found without a device.
@@ -14,11 +14,11 @@ pub enum GraphError {
         "pass `{pass}` ({site}) uses a {kind} handle (resource {index}) that graph #{foreign} made, not this one: declare it here, or \
          import it"
     )]
-    ForeignHandle { pass: Name, site: Site, kind: &'static str, index: u32, foreign: u64 },
+    ForeignHandle { pass: Label, site: Site, kind: &'static str, index: u32, foreign: u64 },
 
     /// Two passes, or two resources, of one name.
     #[error("two {kind} are named `{name}`: one declared at {first}, one at {second}; names must be unique")]
-    DuplicateName { kind: &'static str, name: Name, first: Site, second: Site },
+    DuplicateName { kind: &'static str, name: Label, first: Site, second: Site },
 
     /// Two passes write on top of the same version.
     #[error(
@@ -26,11 +26,11 @@ pub enum GraphError {
          handle copied before the first wrote; pass it the handle that the first moved on"
     )]
     TwoWriters {
-        resource: Name,
+        resource: Label,
         version: u32,
-        first: Name,
+        first: Label,
         first_site: Site,
-        second: Name,
+        second: Label,
         second_site: Site,
     },
 
@@ -39,7 +39,7 @@ pub enum GraphError {
         "pass `{pass}` ({site}) reads `{resource}` (declared at {resource_site}) as {access}, but no pass writes it: add its producer, or \
          import it"
     )]
-    MissingProducer { pass: Name, site: Site, resource: Name, resource_site: Site, access: &'static str },
+    MissingProducer { pass: Label, site: Site, resource: Label, resource_site: Site, access: &'static str },
 
     /// A pass reads a version older than the first write.
     #[error(
@@ -47,11 +47,11 @@ pub enum GraphError {
          write; declare the pass after the writer, with the writer's handle"
     )]
     ReadBeforeWrite {
-        pass: Name,
+        pass: Label,
         site: Site,
-        resource: Name,
+        resource: Label,
         access: &'static str,
-        writer: Name,
+        writer: Label,
         writer_site: Site,
     },
 
@@ -60,7 +60,7 @@ pub enum GraphError {
         "pass `{pass}` ({site}) reads `{resource}` as {access}, but every pass that writes it is skipped ({skipped}): read it as optional, call \
          for the same in `{pass}`, or write it with LoadOp::ClearIfFirst in a pass that runs"
     )]
-    ProducersSkipped { pass: Name, site: Site, resource: Name, access: &'static str, skipped: String },
+    ProducersSkipped { pass: Label, site: Site, resource: Label, access: &'static str, skipped: String },
 
     /// Passes that wait for each other.
     #[error("passes wait for each other: {}", display_cycle(.path))]
@@ -71,22 +71,22 @@ pub enum GraphError {
 
     /// `.after()` names no pass.
     #[error("pass `{pass}` ({site}) is to run after `{name}`, which no pass is called{}", did_you_mean(.nearest))]
-    UnknownPass { pass: Name, site: Site, name: Name, nearest: Option<Name> },
+    UnknownPass { pass: Label, site: Site, name: Label, nearest: Option<Label> },
 
     /// A pass uses one resource in two ways that the GPU can not do at once.
     #[error(
         "pass `{pass}` ({site}) uses `{resource}` as {first} and as {second} at once: split the pass, or name separate parts"
     )]
-    AccessConflict { pass: Name, site: Site, resource: Name, first: &'static str, second: &'static str },
+    AccessConflict { pass: Label, site: Site, resource: Label, first: &'static str, second: &'static str },
 
     /// A format that can not be used in this way.
     #[error(
         "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access}, which needs {expected}, but its format is {format:?}"
     )]
     FormatMismatch {
-        pass: Name,
+        pass: Label,
         site: Site,
-        resource: Name,
+        resource: Label,
         resource_site: Site,
         access: &'static str,
         format: wgpu::TextureFormat,
@@ -100,12 +100,12 @@ pub enum GraphError {
         .first_size[0], .first_size[1], .second_size[0], .second_size[1]
     )]
     SizeMismatch {
-        pass: Name,
+        pass: Label,
         site: Site,
-        first: Name,
+        first: Label,
         first_site: Site,
         first_size: [u32; 2],
-        second: Name,
+        second: Label,
         second_site: Site,
         second_size: [u32; 2],
     },
@@ -115,9 +115,9 @@ pub enum GraphError {
         "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access} with {count} samples per texel, but needs {expected}"
     )]
     SampleCountMismatch {
-        pass: Name,
+        pass: Label,
         site: Site,
-        resource: Name,
+        resource: Label,
         resource_site: Site,
         access: &'static str,
         count: u32,
@@ -129,9 +129,9 @@ pub enum GraphError {
         "pass `{pass}` ({site}) uses `{resource}` (declared at {resource_site}) as {access}, which needs usage {needs}, but it was imported with {declared}"
     )]
     UsageMismatch {
-        pass: Name,
+        pass: Label,
         site: Site,
-        resource: Name,
+        resource: Label,
         resource_site: Site,
         access: &'static str,
         needs: String,
@@ -140,29 +140,29 @@ pub enum GraphError {
 
     /// A shape that no GPU object can have.
     #[error("resource `{resource}` (declared at {site}): {reason}")]
-    InvalidShape { resource: Name, site: Site, reason: String },
+    InvalidShape { resource: Label, site: Site, reason: String },
 
     /// A mip level or layer that the texture does not have.
     #[error(
         "pass `{pass}` ({site}) uses mip {mip}, layer {layer} of `{resource}`, which has {mips} mip level(s) and {layers} layer(s)"
     )]
-    PartOutOfRange { pass: Name, site: Site, resource: Name, mip: u32, layer: u32, mips: u32, layers: u32 },
+    PartOutOfRange { pass: Label, site: Site, resource: Label, mip: u32, layer: u32, mips: u32, layers: u32 },
 
     /// `.resolve()` or `.part()` with nothing before it that it could apply to.
     #[error(
         "pass `{pass}` ({site}): .{method}() applies to the {wanted} declared just before it, and there is none"
     )]
-    NothingToModify { pass: Name, site: Site, method: &'static str, wanted: &'static str },
+    NothingToModify { pass: Label, site: Site, method: &'static str, wanted: &'static str },
 
     /// A raster pass without an attachment.
     #[error("raster pass `{pass}` ({site}) draws into nothing: declare a colour or depth attachment")]
-    NoAttachment { pass: Name, site: Site },
+    NoAttachment { pass: Label, site: Site },
 
     /// An exported version that a later pass overwrites.
     #[error(
         "version {version} of `{resource}` is exported, but pass `{pass}` ({site}) writes over it: export the handle after that pass"
     )]
-    ExportOverwritten { resource: Name, version: u32, pass: Name, site: Site },
+    ExportOverwritten { resource: Label, version: u32, pass: Label, site: Site },
 }
 
 /// What declaring and compiling answer with. Boxed: the errors carry many names, the way without one should be short.
@@ -172,7 +172,7 @@ pub type GraphResult<T> = Result<T, Box<GraphError>>;
 #[derive(Clone, Debug, PartialEq)]
 pub struct CycleStep {
     /// The pass.
-    pub pass: Name,
+    pub pass: Label,
     /// Why the next pass of the circle runs after it.
     pub because: String,
 }
@@ -186,6 +186,6 @@ fn display_cycle(path: &[CycleStep]) -> String {
     text
 }
 
-pub(crate) fn did_you_mean(nearest: &Option<Name>) -> String {
+pub(crate) fn did_you_mean(nearest: &Option<Label>) -> String {
     nearest.as_ref().map_or(String::new(), |name| format!("; did you mean `{name}`?"))
 }

@@ -15,7 +15,7 @@ use crate::run::measure::Ring;
 use crate::run::pool::{GpuObject, Pool, PoolStatistics};
 use crate::run::probe::FiniteProbe;
 use crate::run::record::{FrameResources, Recorder, looks};
-use crate::run::report::{FrameReport, Measure};
+use crate::run::report::{GraphReport, Measurements};
 
 /// Runs graphs, one per frame, on one device. After a lost device make a new one.
 #[derive(Default)]
@@ -23,13 +23,13 @@ pub struct Executor {
     pool: Pool,
     history: History,
     plan: Option<Arc<Plan>>,
-    measure: Measure,
+    measure: Measurements,
     keep_apart: bool,
     probing: bool,
     probe: Option<FiniteProbe>,
     ring: Ring,
-    report: Option<FrameReport>,
-    exported: Vec<(crate::resource::Name, GpuObject)>,
+    report: Option<GraphReport>,
+    exported: Vec<(crate::resource::Label, GpuObject)>,
     frame: u64,
     begun: Option<Instant>,
 }
@@ -37,7 +37,7 @@ pub struct Executor {
 /// A frame that was handed to the GPU.
 #[derive(Debug)]
 pub struct Frame {
-    /// Its number, from 1; its [`FrameReport`] has the same.
+    /// Its number, from 1; its [`GraphReport`] has the same.
     pub number: u64,
     /// What ran and why.
     pub plan: Arc<Plan>,
@@ -46,18 +46,18 @@ pub struct Frame {
 }
 
 impl Executor {
-    /// An executor that has run nothing yet, with [`Measure::TIMES`].
+    /// An executor that has run nothing yet, with [`Measurements::TIMES`].
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// What to measure from the next frame on.
-    pub fn set_measure(&mut self, measure: Measure) {
+    pub fn set_measure(&mut self, measure: Measurements) {
         self.measure = measure;
     }
 
-    /// When work for the next frame began: its [`FrameReport::cpu_ms`] counts from then on and not from the call of
+    /// When work for the next frame began: its [`GraphReport::cpu_ms`] counts from then on and not from the call of
     /// [`execute`](Self::execute).
     pub fn begun_at(&mut self, begun: Instant) {
         self.begun = Some(begun);
@@ -104,11 +104,25 @@ impl Executor {
         Ok(plan)
     }
 
-    /// Compiles a graph, runs its passes and submits them. `user` is lent to one pass after the other.
+    /// Compiles a graph, runs its passes and submits them.
     ///
     /// # Errors
     /// Faults of the graph, imports that are missing or not as declared, errors of passes. Then nothing is submitted.
-    pub fn execute<User>(
+    pub fn execute(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        graph: Graph<'_>,
+        imports: &Imports,
+    ) -> Result<Frame, RunError> {
+        self.execute_with(device, queue, graph, imports, &mut ())
+    }
+
+    /// [`Executor::execute`] of a graph whose passes share something: `user` is lent to one after the other.
+    ///
+    /// # Errors
+    /// As [`Executor::execute`].
+    pub fn execute_with<User>(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -162,7 +176,7 @@ impl Executor {
 
     /// The newest report that has arrived; does not wait. In a window it is some frames old.
     #[must_use]
-    pub fn latest_report(&self) -> Option<&FrameReport> {
+    pub fn latest_report(&self) -> Option<&GraphReport> {
         self.report.as_ref()
     }
 
@@ -174,7 +188,7 @@ impl Executor {
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
-    ) -> Result<Option<&FrameReport>, RunError> {
+    ) -> Result<Option<&GraphReport>, RunError> {
         device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|error| RunError::Wait(error.to_string()))?;

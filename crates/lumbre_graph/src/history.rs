@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::access::Part;
-use crate::resource::{Name, Shape};
+use crate::resource::{Label, Shape};
 
 /// What each part of a resource holds, as numbers: equal numbers, equal content. The key `None` is what the parts that are not listed hold.
 pub(crate) type Content = BTreeMap<Option<Part>, Option<u64>>;
@@ -20,12 +20,12 @@ pub(crate) struct Retained {
 /// What earlier frames left in retained resources. The default is a first frame: nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
-    pub(crate) retained: BTreeMap<Name, Retained>,
+    pub(crate) retained: BTreeMap<Label, Retained>,
 }
 
 impl History {
     /// The record of a resource, if what it holds can serve a resource of `shape`.
-    pub(crate) fn find(&self, name: &Name, shape: &Shape) -> Option<&Retained> {
+    pub(crate) fn find(&self, name: &Label, shape: &Shape) -> Option<&Retained> {
         self.retained.get(name).filter(|kept| kept.shape.serves(shape))
     }
 }

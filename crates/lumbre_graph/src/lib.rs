@@ -4,7 +4,7 @@
 //!   Graph ── declare ──► compile ──────► Plan ──► explain: text, JSON, DOT
 //!   resources, passes,   pure, no device  │
 //!   what they call for                    ▼
-//!   and run                            Executor ──► wgpu ──► FrameReport
+//!   and run                            Executor ──► wgpu ──► GraphReport
 //!                                      pool, retained,       times, invocations,
 //!                                      queries, probe        first NaN
 //! ```
@@ -18,7 +18,7 @@
 //!
 //! ```
 //! use lumbre_graph::{Graph, LoadOp, TextureDescriptor, wgpu};
-//! let mut graph: Graph = Graph::new("frame");
+//! let mut graph = Graph::new("frame");
 //! let format = wgpu::TextureFormat::Rgba16Float;
 //! let mut hdr = graph.texture("hdr", TextureDescriptor::new_2d(640, 360, format));
 //! let mut screen = graph.import_texture("screen", TextureDescriptor::new_2d(640, 360, format));
@@ -34,6 +34,8 @@
 //! assert_eq!(plan.status("lightmap").unwrap().reason(), "the scene has no lightmapped mesh");
 //! # Ok::<(), Box<lumbre_graph::GraphError>>(())
 //! ```
+//!
+//! `examples/sobel.rs` runs a graph on a device, with a bind group over what a pass before has drawn.
 
 mod access;
 mod compile;
@@ -63,7 +65,7 @@ pub use explain::{Calling, Explanation, PassExplanation, ResourceExplanation, Us
 pub use handle::{Buffer, BufferHandle, Handle, Texture, TextureHandle};
 pub use history::History;
 pub use plan::{CompileOptions, Memory, Plan, Status};
-pub use resource::{BufferDescriptor, Name, Origin, Shape, TextureDescriptor};
+pub use resource::{BufferDescriptor, Label, Origin, Shape, TextureDescriptor};
 pub use run::context::{
     BodyError, BodyResult, ComputeContext, PassResources, RasterContext, TransferContext,
 };
@@ -71,5 +73,5 @@ pub use run::error::RunError;
 pub use run::imports::Imports;
 pub use run::pool::{KEEP_RETAINED_FRAMES, KEEP_TRANSIENT_FRAMES, PoolStatistics};
 pub use run::probe::FiniteProbe;
-pub use run::report::{FrameReport, GpuTime, Invocations, Measure, NonFinite, PassReport};
+pub use run::report::{GpuTime, GraphReport, Invocations, Measurements, NonFinite, PassReport};
 pub use site::Site;

@@ -4,7 +4,7 @@
 use crate::access::Part;
 use crate::declaration::Declarations;
 use crate::history::History;
-use crate::resource::{Name, Shape};
+use crate::resource::{Label, Shape};
 
 /// Choices of how to compile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -210,7 +210,7 @@ impl Plan {
         self.resource_index(resource).and_then(|index| self.resources[index].lifetime)
     }
 
-    pub(crate) fn pass_name(&self, pass: usize) -> &Name {
+    pub(crate) fn pass_name(&self, pass: usize) -> &Label {
         &self.declarations.passes[pass].name
     }
 

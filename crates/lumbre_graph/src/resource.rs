@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::site::Site;
 
 /// A name of a pass or a resource. A literal costs no allocation.
-pub type Name = Cow<'static, str>;
+pub type Label = Cow<'static, str>;
 
 /// The shape of a texture. How it is used is not said here: the graph infers that from the passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -202,7 +202,7 @@ impl Shape {
 /// A declared resource.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ResourceDeclaration {
-    pub name: Name,
+    pub name: Label,
     pub shape: Shape,
     pub origin: Origin,
     /// Pass that made version `i + 1`.

@@ -80,7 +80,7 @@ fn two_writers_of_one_version() {
 
 #[test]
 fn handle_of_another_graph() {
-    let mut other: Graph = Graph::new("other");
+    let mut other = Graph::new("other");
     let mut foreign = other.texture("target", hdr());
     let before = foreign;
     let text = fault(
@@ -241,7 +241,7 @@ fn size_mismatch() {
 
 #[test]
 fn mip_level_counts_for_the_size() {
-    let mut graph: Graph = Graph::new("test");
+    let mut graph = Graph::new("test");
     let mut chain = graph.texture("chain", hdr().mips(3));
     let mut half = graph.texture("half", TextureDescriptor::new_2d(32, 16, TextureFormat::Rgba16Float));
     graph
@@ -323,7 +323,7 @@ fn access_conflict() {
 
 #[test]
 fn other_mip_levels_do_not_conflict() {
-    let mut graph: Graph = Graph::new("test");
+    let mut graph = Graph::new("test");
     let mut chain = graph.texture("chain", hdr().mips(2));
     graph.raster_pass("draw").color(&mut chain, BLACK);
     let drawn = chain;

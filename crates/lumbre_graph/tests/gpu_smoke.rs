@@ -132,7 +132,7 @@ fn adding<'a>(
     first: &'a wgpu::RenderPipeline,
     second: &'a wgpu::RenderPipeline,
 ) -> Graph<'a, Vec<&'static str>> {
-    let mut graph: Graph<'a, Vec<&'static str>> = Graph::new("adding");
+    let mut graph = Graph::with_user("adding");
     let mut target = graph.texture("target", TextureDescriptor::new_2d(SIDE, SIDE, FORMAT));
     let clear = LoadOp::ClearIfFirst(Color { r: 0.0, g: 0.5, b: 0.0, a: 0.0 });
     for (name, pipeline) in [("first", first), ("second", second)] {
@@ -155,10 +155,10 @@ fn merged_passes_draw_and_are_measured() {
     let buffer = readback(&gpu.device);
     let imports = Imports::new().buffer("result", &buffer);
     let mut executor = Executor::new();
-    executor.set_measure(Measure::ALL);
+    executor.set_measure(Measurements::ALL);
     let mut ran = Vec::new();
     let frame = executor
-        .execute(&gpu.device, &gpu.queue, adding(&first, &second), &imports, &mut ran)
+        .execute_with(&gpu.device, &gpu.queue, adding(&first, &second), &imports, &mut ran)
         .expect("the frame runs");
     assert_eq!(ran, ["first", "second"]);
     assert_eq!(frame.plan.groups().collect::<Vec<_>>(), [vec!["first", "second"], vec!["read back"]]);
@@ -207,7 +207,7 @@ fn memory_and_plan_are_used_again() {
     let run = |executor: &mut Executor| {
         let graph = adding(&first, &second);
         executor
-            .execute(&gpu.device, &gpu.queue, graph, &imports, &mut Vec::new())
+            .execute_with(&gpu.device, &gpu.queue, graph, &imports, &mut Vec::new())
             .expect("the frame runs")
             .plan
     };
@@ -224,7 +224,7 @@ fn memory_and_plan_are_used_again() {
     assert!(report.gpu_ms.is_none() && report.notes[0].contains("TIMESTAMP_QUERY"), "{report:?}");
     assert!(report.passes.iter().all(|pass| pass.gpu == GpuTime::NotMeasured));
 
-    executor.set_measure(Measure::OFF);
+    executor.set_measure(Measurements::OFF);
     run(&mut executor);
     let report = executor.timings_blocking(&gpu.device, &gpu.queue).expect("not lost").expect("a frame ran");
     assert_eq!(report.frame, 7);
@@ -245,7 +245,7 @@ fn the_probe_finds_the_first_pass_and_texel() {
         let clean = pipeline(&gpu.device, "return vec4(1.0);", format, samples);
         let dirty = pipeline(&gpu.device, bad, format, samples);
         let build = |order: [&'static str; 3]| {
-            let mut graph: Graph = Graph::new("probe");
+            let mut graph = Graph::new("probe");
             let shape = TextureDescriptor::new_2d(SIDE, SIDE, format).samples(samples);
             let mut target = graph.texture("target", shape);
             for name in order {
@@ -264,9 +264,7 @@ fn the_probe_finds_the_first_pass_and_texel() {
         let mut executor = Executor::new();
         let mut look = |graph: Graph<'_>| {
             executor.enable_probe(true);
-            executor
-                .execute(&gpu.device, &gpu.queue, graph, &Imports::new(), &mut ())
-                .expect("the frame runs");
+            executor.execute(&gpu.device, &gpu.queue, graph, &Imports::new()).expect("the frame runs");
             let report = executor.timings_blocking(&gpu.device, &gpu.queue).expect("not lost");
             let report = report.expect("a frame ran");
             assert!(report.probed);
@@ -291,7 +289,7 @@ fn retained_content_is_kept_and_not_drawn_again() {
     let imports = Imports::new().buffer("result", &buffer);
     let mut executor = Executor::new();
     let mut run = |fingerprint: u64, pipeline: &wgpu::RenderPipeline| {
-        let mut graph: Graph = Graph::new("retained");
+        let mut graph = Graph::new("retained");
         let mut kept = graph.retained_texture("kept", TextureDescriptor::new_2d(SIDE, SIDE, FORMAT));
         graph
             .raster_pass("draw")
@@ -303,8 +301,7 @@ fn retained_content_is_kept_and_not_drawn_again() {
                 Ok(())
             });
         copy_out(&mut graph, &kept);
-        let frame =
-            executor.execute(&gpu.device, &gpu.queue, graph, &imports, &mut ()).expect("the frame runs");
+        let frame = executor.execute(&gpu.device, &gpu.queue, graph, &imports).expect("the frame runs");
         let ran = frame.plan.status("draw").expect("declared").runs();
         (ran, read(&gpu, &buffer)[0][0])
     };
@@ -337,7 +334,7 @@ fn a_multisampled_chain_resolves_at_its_end() {
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    let mut graph: Graph = Graph::new("resolve");
+    let mut graph = Graph::new("resolve");
     let shape = TextureDescriptor::new_2d(SIDE, SIDE, format);
     let mut many = graph.texture("many", shape.samples(4));
     let mut target = graph.import_texture("screen", shape);
@@ -356,7 +353,7 @@ fn a_multisampled_chain_resolves_at_its_end() {
     }
     let mut executor = Executor::new();
     let imports = Imports::new().texture("screen", &view);
-    let frame = executor.execute(&gpu.device, &gpu.queue, graph, &imports, &mut ()).expect("the frame runs");
+    let frame = executor.execute(&gpu.device, &gpu.queue, graph, &imports).expect("the frame runs");
     assert_eq!(frame.plan.groups().collect::<Vec<_>>(), [["two", "three"]]);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     encoder.copy_texture_to_buffer(
@@ -400,7 +397,7 @@ fn faults_at_run_time_are_named() {
     };
     let mut executor = Executor::new();
     let mut run = |imports: &Imports, body: bool, ask: bool| {
-        let mut graph: Graph = Graph::new("faulty");
+        let mut graph = Graph::new("faulty");
         let other = graph.texture("other", shape);
         let mut screen = graph.import_texture("screen", shape);
         let pass = graph.raster_pass("draw").color(&mut screen, LoadOp::Clear(Color::BLACK));
@@ -413,7 +410,7 @@ fn faults_at_run_time_are_named() {
             });
         }
         executor
-            .execute(&gpu.device, &gpu.queue, graph, imports, &mut ())
+            .execute(&gpu.device, &gpu.queue, graph, imports)
             .map(|_| ())
             .map_err(|error| error.to_string())
     };

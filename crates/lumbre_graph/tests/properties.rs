@@ -234,7 +234,7 @@ proptest! {
 
 #[test]
 fn a_chain_of_filters_takes_turns_in_two_slots() {
-    let mut graph: Graph = Graph::new("chain");
+    let mut graph = Graph::new("chain");
     let shape = TextureDescriptor::new_2d(100, 50, TextureFormat::Rgba16Float);
     let mut before: Option<TextureHandle> = None;
     for index in 0..10 {

@@ -65,7 +65,7 @@ fn number(parts: impl Hash) -> u64 {
 impl Machine {
     /// What the sink of each resource sees in this frame.
     fn frame(&mut self, retained: &[bool], passes: &[RandomPass], frame: &RandomFrame) -> Vec<Vec<u64>> {
-        let mut graph: Graph = Graph::new("random");
+        let mut graph = Graph::new("random");
         let shape = TextureDescriptor::new_2d(8, 8, TextureFormat::Rgba16Float).layers(LAYERS);
         let mut handles: Vec<TextureHandle> = (0..RESOURCES)
             .map(|index| match retained[index] {

@@ -80,7 +80,7 @@ fn skipped_says_what_the_scene_has_not() {
 
 #[test]
 fn culled_says_who_would_have_read() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut a = graph.texture("a", hdr());
     let mut b = graph.texture("b", hdr());
     let mut c = graph.texture("c", hdr());
@@ -100,7 +100,7 @@ fn culled_says_who_would_have_read() {
 
 #[test]
 fn what_a_full_clear_overwrites_is_culled() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut target = graph.texture("target", hdr());
     graph.raster_pass("lost").color(&mut target, BLACK);
     graph.raster_pass("kept").color(&mut target, BLACK);
@@ -112,7 +112,7 @@ fn what_a_full_clear_overwrites_is_culled() {
 
 #[test]
 fn clearing_one_layer_keeps_the_others() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut shadows = graph.texture("shadows", depth().layers(3));
     for (layer, name) in ["sun", "lamp", "torch"].into_iter().enumerate() {
         graph.raster_pass(name).depth(&mut shadows, LoadOp::Clear(0.0)).part(Part::layer(layer as u32));
@@ -125,7 +125,7 @@ fn clearing_one_layer_keeps_the_others() {
 
 #[test]
 fn clear_if_first_goes_by_part() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut shadows = graph.texture("shadows", depth().layers(2));
     let clear = LoadOp::ClearIfFirst(0.0);
     graph.raster_pass("a").depth(&mut shadows, clear).part(Part::layer(0));
@@ -139,7 +139,7 @@ fn clear_if_first_goes_by_part() {
 
 #[test]
 fn optional_reads_do_without() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut mirror = graph.texture("mirror", hdr());
     graph.raster_pass("draw mirror").calls_for(false, "a mirror").color(&mut mirror, BLACK);
     graph.compute_pass("shade").reads_optional(&mirror, TextureRead::Sampled).side_effect("test");
@@ -150,7 +150,7 @@ fn optional_reads_do_without() {
 
 #[test]
 fn side_effects_run_and_say_so() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     graph.transfer_pass("present").side_effect("presents the frame");
     let plan = graph.compile().expect("valid");
     assert_eq!(reason(&plan, "present"), ("runs", "presents the frame"));
@@ -158,7 +158,7 @@ fn side_effects_run_and_say_so() {
 
 #[test]
 fn a_pass_that_samples_the_attachment_is_not_merged() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut color = graph.texture("color", hdr());
     let mut z = graph.texture("depth", depth());
     graph.raster_pass("opaque").color(&mut color, BLACK).depth(&mut z, LoadOp::Clear(0.0));
@@ -176,7 +176,7 @@ fn a_pass_that_samples_the_attachment_is_not_merged() {
     graph.export(&color);
     assert_eq!(groups(&graph), [vec!["opaque"], vec!["cleared", "hold"]]);
 
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut color = graph.texture("color", hdr());
     let mut z = graph.texture("depth", depth());
     graph.raster_pass("opaque").color(&mut color, BLACK).depth(&mut z, LoadOp::Clear(0.0));
@@ -188,7 +188,7 @@ fn a_pass_that_samples_the_attachment_is_not_merged() {
 
 #[test]
 fn a_buffer_written_in_the_group_keeps_its_reader_apart() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut color = graph.texture("color", hdr());
     let mut counts = graph.buffer("counts", BufferDescriptor::new(64));
     graph.raster_pass("count").color(&mut color, BLACK).writes(&mut counts, BufferWrite::Storage);
@@ -207,7 +207,7 @@ fn merging_can_be_switched_off() {
 
 #[test]
 fn after_orders_what_no_resource_does() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     graph.compute_pass("second").after("first").side_effect("test");
     graph.compute_pass("first").side_effect("test");
     graph.compute_pass("third").side_effect("test");
@@ -217,7 +217,7 @@ fn after_orders_what_no_resource_does() {
 
 #[test]
 fn a_reader_of_the_old_version_goes_before_the_writer() {
-    let mut graph: Graph = Graph::new("frame");
+    let mut graph = Graph::new("frame");
     let mut a = graph.texture("a", hdr());
     graph.raster_pass("draw").color(&mut a, BLACK);
     let drawn = a;
@@ -271,7 +271,7 @@ fn unchanged_follows_parts_and_fingerprints() {
 #[test]
 fn unchanged_follows_inputs() {
     let build = |mesh: Option<u64>, inner: u64| {
-        let mut graph: Graph = Graph::new("frame");
+        let mut graph = Graph::new("frame");
         let vertices = graph.import_buffer("vertices", BufferDescriptor::new(64));
         if let Some(content) = mesh {
             graph.fingerprint(&vertices, content);
@@ -305,7 +305,7 @@ fn unchanged_follows_inputs() {
 #[test]
 fn a_chain_on_a_retained_resource_runs_whole() {
     let build = |below: u64, above: u64| {
-        let mut graph: Graph = Graph::new("frame");
+        let mut graph = Graph::new("frame");
         let mut kept = graph.retained_texture("kept", hdr());
         graph.raster_pass("below").fingerprint(below).color(&mut kept, BLACK);
         graph.raster_pass("above").fingerprint(above).color(&mut kept, LoadOp::Load);
@@ -323,7 +323,7 @@ fn a_chain_on_a_retained_resource_runs_whole() {
 #[test]
 fn last_frames_content_can_be_read() {
     let build = || {
-        let mut graph: Graph = Graph::new("frame");
+        let mut graph = Graph::new("frame");
         let mut accumulated = graph.retained_texture("accumulated", hdr());
         let mut mixed = graph.texture("mixed", hdr());
         graph.raster_pass("mix").reads_optional(&accumulated, TextureRead::Sampled).color(&mut mixed, BLACK);

@@ -1,11 +1,12 @@
 //! Every file of `shaders/optics` compiles under every feature it knows, passes naga's validator, holds
 //! nothing that its features did not call for, and takes its arguments in the order of its Rust twin.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lumbre_optics::{FogMode, ReflectionModel};
-use wesl::Wesl;
+use lumbre_shaders::{Kept, Program, UnnamedFeatures};
 
 fn shaders() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders")
@@ -27,13 +28,16 @@ fn stems() -> Vec<String> {
 
 /// One file and all that it imports, as WGSL.
 fn compile(stem: &str, features: &[&str]) -> String {
-    let mut compiler = Wesl::new(shaders());
-    compiler.use_stripping(false);
-    for feature in features {
-        compiler.set_feature(feature, true);
-    }
-    let path = format!("package::optics::{stem}").parse().expect("a module path");
-    compiler.compile(&path).unwrap_or_else(|error| panic!("{stem} with {features:?}: {error}")).to_string()
+    kept(stem, features, Kept::RootModule)
+}
+
+fn kept(stem: &str, features: &[&str], kept: Kept<'_>) -> String {
+    let modules: Vec<_> =
+        lumbre_shaders::MODULES.iter().map(|(path, source)| (*path, Cow::Borrowed(*source))).collect();
+    let on: Vec<_> = features.iter().map(|feature| (*feature, true)).collect();
+    let root = &format!("optics/{stem}");
+    let program = Program { modules: &modules, root, features: &on, unnamed: UnnamedFeatures::AreOff, kept };
+    program.to_wgsl().unwrap_or_else(|error| panic!("{stem} with {features:?}: {error}"))
 }
 
 fn validate(name: &str, source: &str) {
@@ -111,10 +115,7 @@ fn a_shade_variant_holds_no_other_models_functions() {
         ("REFLECTION_TORRANCE_SPARROW", &["fresnel_dielectric", "geometric_attenuation"][..]),
     ]);
     for feature in reflection_features() {
-        let mut compiler = Wesl::new(shaders());
-        compiler.set_feature(feature, true).keep_declarations(vec!["light_contribution".to_owned()]);
-        let path = "package::optics::shade".parse().expect("a module path");
-        let source = compiler.compile(&path).expect("compiled above too").to_string();
+        let source = stripped_shade(&[feature]);
         for own in functions[feature] {
             assert!(source.contains(own), "{feature} lacks {own}");
         }
@@ -131,13 +132,7 @@ fn a_shade_variant_holds_no_other_models_functions() {
 
 /// A compiled shade with these features, and what is not reached from it stripped.
 fn stripped_shade(features: &[&str]) -> String {
-    let mut compiler = Wesl::new(shaders());
-    compiler.keep_declarations(vec!["light_contribution".to_owned()]);
-    for feature in features {
-        compiler.set_feature(feature, true);
-    }
-    let path = "package::optics::shade".parse().expect("a module path");
-    compiler.compile(&path).unwrap_or_else(|error| panic!("{features:?}: {error}")).to_string()
+    kept("shade", features, Kept::Declarations(&["light_contribution"]))
 }
 
 #[test]

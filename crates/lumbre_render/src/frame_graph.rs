@@ -23,7 +23,7 @@ pub(crate) fn run_graph<'a>(
     let graph = declare(effects, plan, described.usage(target.texture.usage()), overlay);
     let imports = Imports::new().texture("target", &target.view);
     let imports = effects.iter().fold(imports, |imports, effect| effect.imports(imports));
-    Ok(executor.execute(&gpu.device, &gpu.queue, graph, &imports, scene)?)
+    Ok(executor.execute_with(&gpu.device, &gpu.queue, graph, &imports, scene)?)
 }
 
 /// The passes of a frame.
@@ -33,7 +33,7 @@ pub(crate) fn declare<'a>(
     target: TextureDescriptor,
     overlay: Option<Overlay<'a>>,
 ) -> FrameGraph<'a> {
-    let mut graph = FrameGraph::new("frame");
+    let mut graph = FrameGraph::with_user("frame");
     let mut board = Board::new(&mut graph, plan, target);
     for effect in effects {
         effect.declare(&mut graph, &mut board);

@@ -85,5 +85,5 @@ pub struct FrameReport {
     /// sentence that names it: the frame is drawn without them, and a warning is logged when one appears.
     pub left_out: Vec<String>,
     /// The newest measurements that arrived, often of an earlier frame; `Renderer::wait` has this frame's.
-    pub measured: Option<lumbre_graph::FrameReport>,
+    pub measured: Option<lumbre_graph::GraphReport>,
 }

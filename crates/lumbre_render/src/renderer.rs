@@ -149,7 +149,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`RenderError::Run`] if the device was lost.
-    pub fn wait(&mut self) -> Result<Option<&lumbre_graph::FrameReport>, RenderError> {
+    pub fn wait(&mut self) -> Result<Option<&lumbre_graph::GraphReport>, RenderError> {
         let measured = self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?;
         self.gpu.check()?;
         Ok(measured)
@@ -311,9 +311,9 @@ impl Renderer {
             uploaded_bytes,
         };
         self.executor.set_measure(match options.measure {
-            Measure::Nothing => lumbre_graph::Measure::OFF,
-            Measure::Time => lumbre_graph::Measure::TIMES,
-            Measure::TimeAndInvocations => lumbre_graph::Measure::ALL,
+            Measure::Nothing => lumbre_graph::Measurements::OFF,
+            Measure::Time => lumbre_graph::Measurements::TIMES,
+            Measure::TimeAndInvocations => lumbre_graph::Measurements::ALL,
         });
         self.executor.enable_probe(options.probe);
         self.executor.begun_at(begun);

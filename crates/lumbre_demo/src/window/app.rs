@@ -57,7 +57,10 @@ impl App {
     pub fn new(opened: Opened, options: PlayOptions, replay: Option<&Recording>) -> Self {
         let replay = replay.map(|recording| recording.player().collect::<Vec<_>>().into_iter());
         Self {
-            viewing: Viewing::new(opened, options.open.clone()),
+            viewing: match options.bake {
+                true => Viewing::baking(opened, options.open.clone()),
+                false => Viewing::new(opened, options.open.clone()),
+            },
             options,
             replay,
             window: None,

@@ -23,6 +23,8 @@ pub struct PlayOptions {
     pub size: (u32, u32),
     /// How the file, and those that are dropped on the window, are opened.
     pub open: OpenOptions,
+    /// Bakes the file at once, beside the frames, and writes the baked file when that has ended.
+    pub bake: bool,
     /// Plays this recording instead of listening to the keyboard; the window closes at its end.
     pub input: Option<PathBuf>,
     /// Records what is played to this file.
@@ -59,6 +61,7 @@ impl Default for PlayOptions {
         Self {
             size: (1280, 720),
             open: OpenOptions::default(),
+            bake: false,
             input: None,
             record: None,
             screenshot: None,

@@ -73,6 +73,8 @@ pub struct Viewing {
     options: OpenOptions,
     opening: Option<(PathBuf, Receiver<Result<Opened, GameError>>)>,
     bake: Option<BackgroundBake>,
+    /// Whether it is written as soon as it has ended.
+    keeps_bake: bool,
     light: Option<LightFacts>,
     metered: Metered,
     since_metered: Option<Duration>,
@@ -90,12 +92,21 @@ impl Viewing {
             options,
             opening: None,
             bake: None,
+            keeps_bake: false,
             light: None,
             metered,
             since_metered: None,
             message: None,
             recording: None,
         }
+    }
+
+    /// [`Viewing::new`], and the file is baked at once and written when that has ended.
+    pub fn baking(opened: Opened, options: OpenOptions) -> Self {
+        let mut viewing = Self::new(opened, options);
+        viewing.toggle_bake();
+        viewing.keeps_bake = true;
+        viewing
     }
 
     /// What was played in the first file that was recorded.
@@ -258,6 +269,7 @@ impl Viewing {
         if self.bake.as_ref().is_some_and(BackgroundBake::is_running) {
             return self.say("the baked file is being written".to_owned());
         }
+        self.keeps_bake = false;
         match BackgroundBake::start(&self.opened.path, &self.options.load, &self.options.bake) {
             Ok(bake) => {
                 self.bake = Some(bake);
@@ -302,6 +314,11 @@ impl Viewing {
                     self.since_metered = None;
                     self.sync_default_lights();
                 }
+                BakeNews::Done if self.keeps_bake => {
+                    self.keeps_bake = false;
+                    self.save_bake();
+                }
+                BakeNews::Done => {}
                 BakeNews::Saved(path) => self.say(format!("written: {}", path.display())),
                 BakeNews::Cancelled => self.say("the bake was cancelled; B begins again".to_owned()),
                 BakeNews::Failed(error) => self.complain(error.to_string()),

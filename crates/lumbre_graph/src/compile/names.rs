@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::declaration::Declarations;
 use crate::error::{GraphError, GraphResult};
-use crate::resource::Name;
+use crate::resource::Label;
 use crate::site::Site;
 
 pub(super) fn check(declarations: &Declarations) -> GraphResult<()> {
@@ -12,7 +12,7 @@ pub(super) fn check(declarations: &Declarations) -> GraphResult<()> {
     unique("resources", declarations.resources.iter().map(|resource| (&resource.name, resource.site)))
 }
 
-fn unique<'n>(kind: &'static str, names: impl Iterator<Item = (&'n Name, Site)>) -> GraphResult<()> {
+fn unique<'n>(kind: &'static str, names: impl Iterator<Item = (&'n Label, Site)>) -> GraphResult<()> {
     let mut seen: HashMap<&str, Site> = HashMap::new();
     for (name, second) in names {
         if let Some(first) = seen.insert(name, second) {

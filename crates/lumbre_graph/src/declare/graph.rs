@@ -11,7 +11,7 @@ use crate::handle::{BufferHandle, Handle, TextureHandle};
 use crate::history::History;
 use crate::plan::CompileOptions;
 use crate::plan::Plan;
-use crate::resource::{BufferDescriptor, Name, Origin, ResourceDeclaration, Shape, TextureDescriptor};
+use crate::resource::{BufferDescriptor, Label, Origin, ResourceDeclaration, Shape, TextureDescriptor};
 use crate::run::context::Body;
 use crate::site::Site;
 
@@ -19,7 +19,7 @@ static NEXT_GRAPH: AtomicU64 = AtomicU64::new(1);
 
 /// A graph of passes over textures and buffers.
 ///
-/// `'a` is how long what the passes borrow lives; `User` is what [`Executor::execute`](crate::Executor::execute) lends
+/// `'a` is how long what the passes borrow lives; `User` is what [`Executor::execute_with`](crate::Executor::execute_with) lends
 /// to one pass after the other as `context.user`, for state that more than one of them changes.
 pub struct Graph<'a, User = ()> {
     pub(crate) id: u64,
@@ -27,10 +27,18 @@ pub struct Graph<'a, User = ()> {
     pub(crate) bodies: Vec<Option<Body<'a, User>>>,
 }
 
-impl<'a, User> Graph<'a, User> {
+impl Graph<'_> {
     /// An empty graph. The label is for messages and debuggers.
     #[must_use]
-    pub fn new(label: impl Into<Name>) -> Self {
+    pub fn new(label: impl Into<Label>) -> Self {
+        Self::with_user(label)
+    }
+}
+
+impl<'a, User> Graph<'a, User> {
+    /// An empty graph whose passes share what [`Executor::execute_with`](crate::Executor::execute_with) lends to them.
+    #[must_use]
+    pub fn with_user(label: impl Into<Label>) -> Self {
         Self {
             id: NEXT_GRAPH.fetch_add(1, Ordering::Relaxed),
             declarations: Declarations {
@@ -45,13 +53,13 @@ impl<'a, User> Graph<'a, User> {
 
     /// A texture that lives for a part of this frame only.
     #[track_caller]
-    pub fn texture(&mut self, name: impl Into<Name>, descriptor: TextureDescriptor) -> TextureHandle {
+    pub fn texture(&mut self, name: impl Into<Label>, descriptor: TextureDescriptor) -> TextureHandle {
         self.resource(name.into(), Shape::Texture(descriptor), Origin::Transient, Site::caller())
     }
 
     /// A buffer that lives for a part of this frame only.
     #[track_caller]
-    pub fn buffer(&mut self, name: impl Into<Name>, descriptor: BufferDescriptor) -> BufferHandle {
+    pub fn buffer(&mut self, name: impl Into<Label>, descriptor: BufferDescriptor) -> BufferHandle {
         self.resource(name.into(), Shape::Buffer(descriptor), Origin::Transient, Site::caller())
     }
 
@@ -59,7 +67,7 @@ impl<'a, User> Graph<'a, User> {
     #[track_caller]
     pub fn retained_texture(
         &mut self,
-        name: impl Into<Name>,
+        name: impl Into<Label>,
         descriptor: TextureDescriptor,
     ) -> TextureHandle {
         self.resource(name.into(), Shape::Texture(descriptor), Origin::Retained, Site::caller())
@@ -67,20 +75,20 @@ impl<'a, User> Graph<'a, User> {
 
     /// A buffer that the executor keeps from frame to frame under its name. Version 0 is what last frame left.
     #[track_caller]
-    pub fn retained_buffer(&mut self, name: impl Into<Name>, descriptor: BufferDescriptor) -> BufferHandle {
+    pub fn retained_buffer(&mut self, name: impl Into<Label>, descriptor: BufferDescriptor) -> BufferHandle {
         self.resource(name.into(), Shape::Buffer(descriptor), Origin::Retained, Site::caller())
     }
 
     /// A texture from outside, bound by its name in [`Imports`](crate::Imports) when the graph runs.
     #[track_caller]
-    pub fn import_texture(&mut self, name: impl Into<Name>, descriptor: TextureDescriptor) -> TextureHandle {
+    pub fn import_texture(&mut self, name: impl Into<Label>, descriptor: TextureDescriptor) -> TextureHandle {
         self.resource(name.into(), Shape::Texture(descriptor), Origin::Imported, Site::caller())
     }
 
     /// A buffer from outside, bound by its name in [`Imports`](crate::Imports) when the graph runs. It may be larger
     /// than described.
     #[track_caller]
-    pub fn import_buffer(&mut self, name: impl Into<Name>, descriptor: BufferDescriptor) -> BufferHandle {
+    pub fn import_buffer(&mut self, name: impl Into<Label>, descriptor: BufferDescriptor) -> BufferHandle {
         self.resource(name.into(), Shape::Buffer(descriptor), Origin::Imported, Site::caller())
     }
 
@@ -105,19 +113,19 @@ impl<'a, User> Graph<'a, User> {
 
     /// Begins a pass that draws.
     #[track_caller]
-    pub fn raster_pass(&mut self, name: impl Into<Name>) -> PassBuilder<'_, 'a, Raster, User> {
+    pub fn raster_pass(&mut self, name: impl Into<Label>) -> PassBuilder<'_, 'a, Raster, User> {
         self.pass(name.into(), Site::caller())
     }
 
     /// Begins a pass that dispatches compute shaders.
     #[track_caller]
-    pub fn compute_pass(&mut self, name: impl Into<Name>) -> PassBuilder<'_, 'a, Compute, User> {
+    pub fn compute_pass(&mut self, name: impl Into<Label>) -> PassBuilder<'_, 'a, Compute, User> {
         self.pass(name.into(), Site::caller())
     }
 
     /// Begins a pass that records onto the command encoder itself.
     #[track_caller]
-    pub fn transfer_pass(&mut self, name: impl Into<Name>) -> PassBuilder<'_, 'a, Transfer, User> {
+    pub fn transfer_pass(&mut self, name: impl Into<Label>) -> PassBuilder<'_, 'a, Transfer, User> {
         self.pass(name.into(), Site::caller())
     }
 
@@ -140,7 +148,7 @@ impl<'a, User> Graph<'a, User> {
     /// The index of a handle's resource, or a fault recorded if it is another graph's.
     pub(crate) fn own<K: ResourceKind>(
         &mut self,
-        pass: Name,
+        pass: Label,
         site: Site,
         handle: &Handle<K>,
     ) -> Option<usize> {
@@ -157,7 +165,7 @@ impl<'a, User> Graph<'a, User> {
         None
     }
 
-    fn resource<K>(&mut self, name: Name, shape: Shape, origin: Origin, site: Site) -> Handle<K> {
+    fn resource<K>(&mut self, name: Label, shape: Shape, origin: Origin, site: Site) -> Handle<K> {
         // More than 2^32 resources would not fit into memory long before this.
         let index = u32::try_from(self.declarations.resources.len()).unwrap_or(u32::MAX);
         self.declarations.resources.push(ResourceDeclaration {
@@ -172,7 +180,7 @@ impl<'a, User> Graph<'a, User> {
         Handle::new(self.id, index)
     }
 
-    fn pass<K: PassType>(&mut self, name: Name, site: Site) -> PassBuilder<'_, 'a, K, User> {
+    fn pass<K: PassType>(&mut self, name: Label, site: Site) -> PassBuilder<'_, 'a, K, User> {
         self.declarations.passes.push(PassDeclaration {
             name,
             kind: K::KIND,

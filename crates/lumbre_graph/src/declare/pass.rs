@@ -8,7 +8,7 @@ use crate::declare::graph::Graph;
 use crate::declare::kind::{AnyAccess, Compute, PassType, Raster, ResourceKind, Transfer};
 use crate::error::GraphError;
 use crate::handle::{Handle, TextureHandle};
-use crate::resource::Name;
+use crate::resource::Label;
 use crate::run::context::{Body, BodyResult, ComputeContext, RasterContext, TransferContext};
 
 /// A pass being declared. The pass is in the graph from the start; each call adds to it.
@@ -27,13 +27,13 @@ impl<'g, 'a, K: PassType, User> PassBuilder<'g, 'a, K, User> {
 
     /// What the pass calls for, and whether it is there ("point lights", "a lightmapped mesh"). If anything that a pass
     /// calls for is not there, the pass is skipped: each version it would have written is the one before.
-    pub fn calls_for(mut self, there: bool, what: impl Into<Name>) -> Self {
+    pub fn calls_for(mut self, there: bool, what: impl Into<Label>) -> Self {
         self.pass().calls_for.push((there, what.into()));
         self
     }
 
     /// An effect outside the graph ("presents the frame"): a pass that has one is never culled.
-    pub fn side_effect(mut self, what: impl Into<Name>) -> Self {
+    pub fn side_effect(mut self, what: impl Into<Label>) -> Self {
         self.pass().side_effects.push(what.into());
         self
     }
@@ -46,7 +46,7 @@ impl<'g, 'a, K: PassType, User> PassBuilder<'g, 'a, K, User> {
     }
 
     /// Runs after the pass of this name, for an order that no resource tells of.
-    pub fn after(mut self, pass: impl Into<Name>) -> Self {
+    pub fn after(mut self, pass: impl Into<Label>) -> Self {
         self.pass().after.push(pass.into());
         self
     }

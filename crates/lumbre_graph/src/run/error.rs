@@ -1,7 +1,7 @@
 //! What can go wrong while a compiled graph runs. Faults of the declaration itself are [`GraphError`]s.
 
 use crate::error::{GraphError, did_you_mean};
-use crate::resource::Name;
+use crate::resource::Label;
 use crate::run::context::BodyError;
 
 /// A frame that could not be run.
@@ -15,41 +15,41 @@ pub enum RunError {
 
     /// A pass returned an error.
     #[error("pass `{pass}`: {source}")]
-    Pass { pass: Name, source: BodyError },
+    Pass { pass: Label, source: BodyError },
 
     /// A pass was declared without `.run()`.
     #[error("pass `{pass}` has nothing to run: end its declaration with .run()")]
-    NoBody { pass: Name },
+    NoBody { pass: Label },
 
     /// An import that nothing was bound to.
     #[error("`{resource}` is imported, but nothing is bound to that name{}", did_you_mean(.nearest))]
-    ImportNotBound { resource: Name, nearest: Option<Name> },
+    ImportNotBound { resource: Label, nearest: Option<Label> },
 
     /// What is bound is not what was declared.
     #[error("`{resource}` was imported with {what} {declared}, but what is bound has {bound}")]
-    ImportMismatch { resource: Name, what: &'static str, declared: String, bound: String },
+    ImportMismatch { resource: Label, what: &'static str, declared: String, bound: String },
 
     /// What is bound may not be used as the passes use it.
     #[error(
         "`{resource}` needs usage {needs} in this graph, but what is bound allows {bound}: create it with the former"
     )]
-    ImportUsage { resource: Name, needs: String, bound: String },
+    ImportUsage { resource: Label, needs: String, bound: String },
 
     /// A pass asks for a resource, or a version, that it did not declare.
     #[error(
         "pass `{pass}` asks for version {version} of `{resource}`, which it did not declare (it declared {declared}): add the read or the write"
     )]
-    Undeclared { pass: Name, resource: Name, version: u32, declared: String },
+    Undeclared { pass: Label, resource: Label, version: u32, declared: String },
 
     /// A pass asks for an optional resource that no pass wrote.
     #[error(
         "pass `{pass}` asks for `{resource}`, which no pass wrote in this frame: its read is optional, use optional_view() or optional_buffer()"
     )]
-    Absent { pass: Name, resource: Name },
+    Absent { pass: Label, resource: Label },
 
     /// A resource larger than the device allows.
     #[error("`{resource}`: {what} of {asked} is more than this device's limit of {limit}")]
-    Limit { resource: Name, what: &'static str, asked: u64, limit: u64 },
+    Limit { resource: Label, what: &'static str, asked: u64, limit: u64 },
 
     /// The device was lost, or took too long, while results were awaited.
     #[error("waiting for the GPU's measurements failed: {0}")]

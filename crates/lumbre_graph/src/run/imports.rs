@@ -3,14 +3,14 @@
 use crate::declaration::Declarations;
 use crate::nearest::nearest;
 use crate::resource::flags;
-use crate::resource::{Name, Shape, TextureDescriptor};
+use crate::resource::{Label, Shape, TextureDescriptor};
 use crate::run::error::RunError;
 use crate::run::pool::{GpuObject, GpuTexture};
 
 /// Textures and buffers by the names they are imported under.
 #[derive(Clone, Default)]
 pub struct Imports {
-    bound: Vec<(Name, GpuObject)>,
+    bound: Vec<(Label, GpuObject)>,
 }
 
 impl Imports {
@@ -22,7 +22,7 @@ impl Imports {
 
     /// Binds the texture of a view. Passes get this very view; other parts of the texture get views of their own.
     #[must_use]
-    pub fn texture(mut self, name: impl Into<Name>, view: &wgpu::TextureView) -> Self {
+    pub fn texture(mut self, name: impl Into<Label>, view: &wgpu::TextureView) -> Self {
         let texture = GpuTexture { texture: view.texture().clone(), view: view.clone(), parts: Vec::new() };
         self.bound.push((name.into(), GpuObject::Texture(texture)));
         self
@@ -30,7 +30,7 @@ impl Imports {
 
     /// Binds a buffer.
     #[must_use]
-    pub fn buffer(mut self, name: impl Into<Name>, buffer: &wgpu::Buffer) -> Self {
+    pub fn buffer(mut self, name: impl Into<Label>, buffer: &wgpu::Buffer) -> Self {
         self.bound.push((name.into(), GpuObject::Buffer(buffer.clone())));
         self
     }
@@ -73,7 +73,7 @@ impl Imports {
     }
 }
 
-fn texture(name: &Name, bound: &wgpu::Texture, declared: &TextureDescriptor) -> Result<(), RunError> {
+fn texture(name: &Label, bound: &wgpu::Texture, declared: &TextureDescriptor) -> Result<(), RunError> {
     // A view may show an sRGB texture as linear and the other way round; the texels are the same.
     if bound.format().remove_srgb_suffix() != declared.format.remove_srgb_suffix() {
         let (declared, bound) = (format!("{:?}", declared.format), format!("{:?}", bound.format()));
@@ -108,7 +108,7 @@ fn texture(name: &Name, bound: &wgpu::Texture, declared: &TextureDescriptor) -> 
 }
 
 fn mismatch(
-    name: &Name,
+    name: &Label,
     what: &'static str,
     declared: impl std::fmt::Display,
     bound: impl std::fmt::Display,

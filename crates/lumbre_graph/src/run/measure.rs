@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::run::probe::{self, Probed};
-use crate::run::report::{FrameReport, GpuTime, Invocations, Measure};
+use crate::run::report::{GpuTime, GraphReport, Invocations, Measurements};
 
 /// Frames whose results may be on their way at once. A frame beyond that is not measured on the GPU.
 const RING: usize = 4;
@@ -33,7 +33,7 @@ pub(crate) struct FrameQueries {
     /// Per pass of the report: its statistics query.
     pub counts: Vec<Option<u32>>,
     pub probed: Vec<Probed>,
-    pub report: FrameReport,
+    pub report: GraphReport,
     state: Arc<AtomicU8>,
 }
 
@@ -63,7 +63,7 @@ impl FrameQueries {
             spans: Vec::new(),
             counts: Vec::new(),
             probed: Vec::new(),
-            report: FrameReport::default(),
+            report: GraphReport::default(),
             state: Arc::new(AtomicU8::new(WAITING)),
         }
     }
@@ -78,7 +78,7 @@ impl FrameQueries {
         take(&mut self.used[1], self.capacity[1])
     }
 
-    fn prepare(&mut self, device: &wgpu::Device, measure: Measure, passes: u32, steps: u32) {
+    fn prepare(&mut self, device: &wgpu::Device, measure: Measurements, passes: u32, steps: u32) {
         let features = device.features();
         let has = |feature: wgpu::Features| features.contains(feature);
         // Each step needs one more timestamp than it has passes.
@@ -94,7 +94,7 @@ impl FrameQueries {
         self.spans.clear();
         self.counts.clear();
         self.probed.clear();
-        self.report = FrameReport::default();
+        self.report = GraphReport::default();
         if measure.gpu && want[0] == 0 && passes > 0 {
             self.report.notes.push("no GPU times: the device was made without TIMESTAMP_QUERY".into());
         }
@@ -188,7 +188,7 @@ impl FrameQueries {
     }
 
     /// The report with what arrived.
-    fn read(&mut self, period: f64) -> FrameReport {
+    fn read(&mut self, period: f64) -> GraphReport {
         let mut report = std::mem::take(&mut self.report);
         let layout = self.layout();
         let Some(readback) = &self.readback else { return report };
@@ -219,7 +219,7 @@ impl FrameQueries {
         report
     }
 
-    fn times(&self, report: &mut FrameReport, stamps: &[u64], period: f64) {
+    fn times(&self, report: &mut GraphReport, stamps: &[u64], period: f64) {
         // A clock that was reset between two stamps gives no time rather than a huge one.
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * period * 1e-6;
         for (pass, span) in report.passes.iter_mut().zip(&self.spans) {
@@ -263,14 +263,14 @@ impl Ring {
     pub fn begin(
         &mut self,
         device: &wgpu::Device,
-        measure: Measure,
+        measure: Measurements,
         passes: usize,
         steps: usize,
     ) -> FrameQueries {
         let mut queries = self.free.pop().unwrap_or_else(FrameQueries::empty);
         let full = self.waiting.len() >= RING;
         let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-        let measure = if full { Measure { cpu: measure.cpu, ..Measure::OFF } } else { measure };
+        let measure = if full { Measurements { cpu: measure.cpu, ..Measurements::OFF } } else { measure };
         queries.prepare(device, measure, count(passes), count(steps));
         if full {
             queries.report.notes.push(format!("not measured: {RING} earlier frames are still on the GPU"));
@@ -279,7 +279,7 @@ impl Ring {
     }
 
     /// Sends for a frame's results after its submission, or answers with the report at once if it has none to wait for.
-    pub fn end(&mut self, mut queries: FrameQueries, to_wait_for: bool) -> Option<FrameReport> {
+    pub fn end(&mut self, mut queries: FrameQueries, to_wait_for: bool) -> Option<GraphReport> {
         if to_wait_for {
             queries.send_for();
             self.waiting.push(queries);
@@ -301,7 +301,7 @@ impl Ring {
     }
 
     /// The newest report that arrived.
-    pub fn collect(&mut self, period: f64) -> Option<FrameReport> {
+    pub fn collect(&mut self, period: f64) -> Option<GraphReport> {
         let mut newest = None;
         while let Some(first) = self.waiting.first()
             && first.state.load(Ordering::Acquire) != WAITING

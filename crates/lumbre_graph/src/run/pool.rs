@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::access::Part;
-use crate::resource::{Name, Shape, TextureDescriptor};
+use crate::resource::{Label, Shape, TextureDescriptor};
 use crate::run::error::RunError;
 
 /// Frames after which memory that no graph asked for is given back. A few, so that a pass that comes and goes every
@@ -88,7 +88,7 @@ pub struct PoolStatistics {
 #[derive(Default)]
 pub(crate) struct Pool {
     transients: Vec<Entry>,
-    retained: HashMap<Name, Entry>,
+    retained: HashMap<Label, Entry>,
     created: u64,
 }
 
@@ -97,7 +97,7 @@ impl Pool {
     pub fn transient(
         &mut self,
         device: &wgpu::Device,
-        label: &Name,
+        label: &Label,
         shape: &Shape,
         frame: u64,
     ) -> Result<&mut GpuObject, RunError> {
@@ -119,7 +119,7 @@ impl Pool {
     pub fn retained(
         &mut self,
         device: &wgpu::Device,
-        name: &Name,
+        name: &Label,
         shape: &Shape,
         frame: u64,
     ) -> Result<(&mut GpuObject, bool), RunError> {
@@ -134,10 +134,10 @@ impl Pool {
     }
 
     /// Gives back what was not used for long. Answers with the names of dropped retained resources.
-    pub fn trim(&mut self, frame: u64) -> Vec<Name> {
+    pub fn trim(&mut self, frame: u64) -> Vec<Label> {
         self.transients.retain(|entry| frame - entry.used_in < KEEP_TRANSIENT_FRAMES);
         let old = |entry: &Entry| frame - entry.used_in >= KEEP_RETAINED_FRAMES;
-        let dropped: Vec<Name> =
+        let dropped: Vec<Label> =
             self.retained.iter().filter(|(_, entry)| old(entry)).map(|(name, _)| name.clone()).collect();
         for name in &dropped {
             self.retained.remove(name);
@@ -155,7 +155,7 @@ impl Pool {
         }
     }
 
-    fn create(&mut self, device: &wgpu::Device, name: &Name, shape: &Shape) -> Result<GpuObject, RunError> {
+    fn create(&mut self, device: &wgpu::Device, name: &Label, shape: &Shape) -> Result<GpuObject, RunError> {
         check_limits(&device.limits(), name, shape)?;
         self.created += 1;
         Ok(match shape {
@@ -171,7 +171,7 @@ impl Pool {
 }
 
 /// wgpu ends the program at a resource beyond the device's limits; this names it instead.
-fn check_limits(limits: &wgpu::Limits, name: &Name, shape: &Shape) -> Result<(), RunError> {
+fn check_limits(limits: &wgpu::Limits, name: &Label, shape: &Shape) -> Result<(), RunError> {
     let check = |what: &'static str, asked: u64, limit: u64| {
         if asked <= limit {
             return Ok(());
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn names_what_is_beyond_the_limits() {
         let limits = wgpu::Limits::default();
-        let name: Name = "shadow map".into();
+        let name: Label = "shadow map".into();
         let side = limits.max_texture_dimension_2d;
         let format = wgpu::TextureFormat::Depth32Float;
         let shape = |side| Shape::Texture(TextureDescriptor::new_2d(side, 1, format));

@@ -3,7 +3,7 @@
 //! (normalized, integer, depth, shared exponent) are not looked at.
 
 use crate::access::Part;
-use crate::resource::Name;
+use crate::resource::Label;
 use crate::run::report::NonFinite;
 
 /// Bytes from one result to the next: the largest alignment that a device may ask of a storage buffer's offset.
@@ -18,8 +18,8 @@ const NONE: u32 = u32::MAX;
 /// One look at one part of a texture after one pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Probed {
-    pub pass: Name,
-    pub resource: Name,
+    pub pass: Label,
+    pub resource: Label,
     pub part: Part,
     /// In texels, to make a column and a row of the index.
     pub width: u32,

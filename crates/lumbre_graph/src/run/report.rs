@@ -1,10 +1,10 @@
 //! What a frame measured: times, invocations, and the first value that is not finite. Data only.
 
-use crate::resource::Name;
+use crate::resource::Label;
 
-/// What to measure. Each has a cost; [`Measure::OFF`] has none.
+/// What to measure. Each has a cost; [`Measurements::OFF`] has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Measure {
+pub struct Measurements {
     /// Time that recording each pass takes on the CPU.
     pub cpu: bool,
     /// Time that each pass takes on the GPU, where the device has `TIMESTAMP_QUERY`.
@@ -13,7 +13,7 @@ pub struct Measure {
     pub statistics: bool,
 }
 
-impl Measure {
+impl Measurements {
     /// Nothing.
     pub const OFF: Self = Self { cpu: false, gpu: false, statistics: false };
     /// Times only.
@@ -22,7 +22,7 @@ impl Measure {
     pub const ALL: Self = Self { cpu: true, gpu: true, statistics: true };
 }
 
-impl Default for Measure {
+impl Default for Measurements {
     fn default() -> Self {
         Self::TIMES
     }
@@ -80,7 +80,7 @@ pub struct Invocations {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassReport {
     /// The pass.
-    pub name: Name,
+    pub name: Label,
     /// The wgpu pass of the frame it was in, from 0. Passes of the same group were merged.
     pub group: usize,
     /// Milliseconds that recording it took on the CPU.
@@ -95,9 +95,9 @@ pub struct PassReport {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct NonFinite {
     /// The first pass after which it was there.
-    pub pass: Name,
+    pub pass: Label,
     /// The texture that it is in.
-    pub resource: Name,
+    pub resource: Label,
     /// Mip level.
     pub mip: u32,
     /// Array layer.
@@ -114,7 +114,7 @@ pub struct NonFinite {
 
 /// What a frame measured, all of the same frame.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub struct FrameReport {
+pub struct GraphReport {
     /// The frame, counted from 1 by the executor.
     pub frame: u64,
     /// Milliseconds on the CPU until the frame was submitted: of the whole of `execute`, and of what came before it since

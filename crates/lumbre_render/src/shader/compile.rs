@@ -1,34 +1,8 @@
 //! From WESL modules and feature flags to a wgpu shader module, errors included.
 
-use std::borrow::Cow;
+use lumbre_shaders::to_wgsl;
 
 use crate::RenderError;
-use lumbre_shaders::MODULES;
-
-/// Resolves imports and conditions of `root` with exactly these flags.
-pub(crate) fn to_wgsl(root: &str, flags: &[(&str, bool)]) -> Result<String, String> {
-    let mut resolver = wesl::VirtualResolver::new();
-    for (path, source) in MODULES {
-        let path = format!("package::{}", path.replace('/', "::"));
-        let path = path.parse().map_err(|error| format!("{path}: {error}"))?;
-        resolver.add_module(path, Cow::Borrowed(*source));
-    }
-    let mut compiler = wesl::Wesl::new_barebones().set_custom_resolver(resolver);
-    compiler.set_mangler(wesl::ManglerKind::Escape).set_options(wesl::CompileOptions {
-        imports: true,
-        condcomp: true,
-        strip: true,
-        lazy: true,
-        ..Default::default()
-    });
-    // A flag that nobody set is a slip of ours, not a feature that is off.
-    compiler.set_missing_feature_behavior(wesl::Feature::Error);
-    for (name, on) in flags {
-        compiler.set_feature(name, *on);
-    }
-    let root = format!("package::{root}").parse().map_err(|error| format!("{root}: {error}"))?;
-    compiler.compile(&root).map(|result| result.to_string()).map_err(|error| error.to_string())
-}
 
 /// Compiles one variant for the device.
 pub(crate) fn compile(
@@ -37,8 +11,8 @@ pub(crate) fn compile(
     flags: &[(&str, bool)],
 ) -> Result<wgpu::ShaderModule, RenderError> {
     let variant = || flags.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect::<Vec<_>>().join(" ");
-    let source =
-        to_wgsl(root, flags).map_err(|message| RenderError::Shader { variant: variant(), message })?;
+    let source = to_wgsl(root, flags)
+        .map_err(|error| RenderError::Shader { variant: variant(), message: error.to_string() })?;
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(root),
