@@ -29,7 +29,7 @@ const SIZE: (u32, u32) = (640, 400);
 /// The scenario in which this program drops the file itself, on the window of the other process.
 const DROPPED_OVER_X11: &str = "dropped over X11";
 /// Frames that a window waits for that file.
-const FRAMES_FOR_A_DROP: u32 = 1000;
+const FRAMES_FOR_A_DROP: u32 = 200;
 
 /// Looks at a scenario's picture.
 type Judge = fn(&Path);

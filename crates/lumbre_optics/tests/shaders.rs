@@ -72,13 +72,7 @@ fn every_set_of_light_kinds_compiles_and_holds_nothing_else() {
             .filter(|bit| set >> bit & 1 == 1)
             .map(|bit| LIGHT_FEATURES[bit])
             .collect();
-        let mut compiler = Wesl::new(shaders());
-        compiler.keep_declarations(vec!["evaluate_light".to_owned()]);
-        for feature in &features {
-            compiler.set_feature(feature, true);
-        }
-        let path = "package::optics::evaluate_light".parse().expect("a module path");
-        let source = compiler.compile(&path).unwrap_or_else(|e| panic!("{features:?}: {e}")).to_string();
+        let source = kept("evaluate_light", &features, Kept::Declarations(&["evaluate_light"]));
         validate(&format!("evaluate_light {features:?}"), &source);
         for (function, feature) in [("attenuate", "POINT_LIGHTS"), ("spot_factor", "SPOT_LIGHTS")] {
             assert_eq!(source.contains(function), features.contains(&feature), "{features:?}\n{source}");
