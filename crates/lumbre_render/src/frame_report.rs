@@ -24,6 +24,11 @@ pub struct Statistics {
     pub draws: usize,
     /// Forward shader variants compiled so far.
     pub variants: usize,
+    /// Pipelines made so far.
+    pub pipelines_made: usize,
+    /// Pipelines, and effects, that this frame called for and that are still being made: it went on as one before it
+    /// ([`MissingPipelines::Background`](crate::MissingPipelines)).
+    pub pipelines_awaited: usize,
     /// How fragments and vertices find their lights.
     pub light_lists: LightListing,
     /// What the CPU did, stage by stage.
