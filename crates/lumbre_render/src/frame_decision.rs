@@ -1,5 +1,6 @@
 //! What a frame is decided to be, and what it was asked for: plain data, so that a frame can go on as the one before, or be that one.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
@@ -8,12 +9,13 @@ use lumbre_graph::Plan;
 use lumbre_optics::FlatRule;
 use lumbre_scene::SceneSettings;
 
-use crate::draws::Draws;
+use crate::draws::{Batch, Draws};
 use crate::extract::{CameraView, SceneLights};
 use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
-use crate::{FrameOptions, FrameTarget, Measure, MissingPipelines, Statistics};
+use crate::shader::Feature;
+use crate::{FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics};
 
 /// What the variants and passes of a frame follow from.
 #[derive(Clone, Debug)]
@@ -113,6 +115,45 @@ impl Decision {
 }
 
 impl Decided {
+    /// What each of its lit passes draws and tests.
+    pub fn lit_passes(&self) -> LitPasses {
+        LitPasses {
+            lightmap: self.pass_lights(&self.draws.lightmapped),
+            forward: self.pass_lights(&self.draws.opaque),
+            transparent: self.pass_lights(&self.draws.transparent),
+        }
+    }
+
+    fn pass_lights(&self, batches: &[Batch]) -> PassLights {
+        let (mut objects, mut entries) = (0, 0);
+        let (mut lists, mut lights) = (HashSet::new(), HashSet::<u32>::new());
+        let (mut inverse_square, mut ranged) = (false, false);
+        for batch in batches {
+            inverse_square |= batch.pipeline.variant.has(Feature::InverseSquareClusters);
+            ranged |= batch.pipeline.variant.has(Feature::RangedClusters);
+            for instance in
+                &self.draws.instances[batch.instances.start as usize..batch.instances.end as usize]
+            {
+                let list = instance.first_light as usize..instance.static_end as usize;
+                (objects, entries) = (objects + 1, entries + list.len());
+                // Objects share lists.
+                if lists.insert(list.clone()) {
+                    lights.extend(&self.light_list[list]);
+                }
+            }
+        }
+        let set = &self.lights.set;
+        let of_clusters = [(inverse_square, set.inverse_square.all), (ranged, set.ranged.all)];
+        let clustered: u32 = of_clusters.iter().filter(|(read, _)| *read).map(|(_, count)| count).sum();
+        PassLights {
+            objects,
+            draws: batches.len(),
+            // Fewer than 2^32 lights have room; one may be in the lists of vertices and of clusters both.
+            lights: (lights.len() as u32 + clustered).min(set.every.all),
+            lights_per_object: entries as f32 / objects.max(1) as f32,
+        }
+    }
+
     /// The buffers of group 0 that any of its draws reads.
     pub fn bindings(&self) -> FrameBindings {
         let of = self.draws.batches().map(|batch| FrameBindings::of(&batch.pipeline.variant));

@@ -9,6 +9,7 @@ use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, MaterialTextures};
 use crate::frame_bindings::{FrameBindings, FrameBuffer};
 use crate::pipelines::{Afterwards, Pipeline, PipelineKey, Pipelines};
 use crate::shader::Feature;
+use crate::shadows::CasterPipelines;
 use crate::target::DEPTH_FORMAT;
 use crate::texture_sets::{TextureSet, TextureSets};
 use crate::textures::Textures;
@@ -37,17 +38,29 @@ pub(crate) struct Rehearsals(Arc<Mutex<Option<Rehearsal>>>);
 impl Rehearsals {
     /// A first draw with a pipeline and the textures of a material, if the adapter compiles when it draws.
     pub fn of(&self, gpu: &Gpu, key: PipelineKey, textures: Option<&TextureSet>) -> Option<Afterwards> {
+        let textures = textures.map(|set| set.stand_ins.clone());
+        self.job(gpu, move |rehearsal| rehearsal.draw(key, textures.as_ref()))
+    }
+
+    /// A first draw of a shadow map.
+    pub fn of_casters(&self, gpu: &Gpu) -> Option<Afterwards> {
+        self.job(gpu, Rehearsal::draw_casters)
+    }
+
+    fn job(
+        &self,
+        gpu: &Gpu,
+        draw: impl FnOnce(&mut Rehearsal) -> Result<(), RenderError> + Send + 'static,
+    ) -> Option<Afterwards> {
         if gpu.adapter.get_info().device_type != wgpu::DeviceType::Cpu {
             return None;
         }
         let (place, instance, adapter) = (Arc::clone(&self.0), gpu.instance.clone(), gpu.adapter.clone());
-        let textures = textures.map(|set| set.stand_ins.clone());
         Some(Box::new(move || {
             let Ok(mut rehearsal) = place.lock() else { return };
             let drawn = match &mut *rehearsal {
-                Some(rehearsal) => rehearsal.draw(key, textures.as_ref()),
-                None => Rehearsal::new(instance, adapter)
-                    .and_then(|new| rehearsal.insert(new).draw(key, textures.as_ref())),
+                Some(rehearsal) => draw(rehearsal),
+                None => Rehearsal::new(instance, adapter).and_then(|new| draw(rehearsal.insert(new))),
             };
             if let Err(error) = drawn {
                 // The frame that draws with it first takes longer; all else is as it would be.
@@ -98,29 +111,67 @@ impl Rehearsal {
         let Some(pipeline) = self.pipelines.get(&key) else { return Ok(()) };
         let groups =
             [Some(&frame), set.as_ref().map(|set| &set.bind_group), lightmap.as_deref(), shadows.as_ref()];
-        self.submit(key, pipeline, groups);
+        let drawn = self.submit(key, pipeline, groups);
         self.sets.sweep();
         self.textures.sweep();
+        drawn
+    }
+
+    /// Draws a caster into a map.
+    fn draw_casters(&mut self) -> Result<(), RenderError> {
+        let device = &self.gpu.device;
+        let pipelines = CasterPipelines::new(device)?;
+        let group = pipelines.group(device, &self.zeros, &self.zeros);
+        let map = self.texture(DEPTH_FORMAT, 1);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("rehearsal"),
+            depth_stencil_attachment: Some(depth_attachment(&map)),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &group, &[0]);
+        pass.set_pipeline(&pipelines.clear);
+        pass.draw(0..3, 0..1);
+        pass.set_pipeline(&pipelines.caster);
+        pass.set_vertex_buffer(0, self.zeros.slice(..));
+        pass.set_index_buffer(self.zeros.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..3, 0, 0..1);
+        drop(pass);
+        self.finish(encoder)
+    }
+
+    /// Hands commands over, and waits for them.
+    fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<(), RenderError> {
+        self.gpu.queue.submit([encoder.finish()]);
+        // A device that is lost shows in the check.
+        let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
         self.gpu.check()
     }
 
-    fn submit(&self, key: PipelineKey, pipeline: &Pipeline, groups: [Option<&wgpu::BindGroup>; 4]) {
-        let texture = |format, sample_count, usage| {
-            let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("rehearsal"),
-                size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
-            });
-            texture.create_view(&Default::default())
-        };
-        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let color = texture(key.format, key.samples, attachment);
-        let depth = texture(DEPTH_FORMAT, key.samples, attachment);
+    fn texture(&self, format: wgpu::TextureFormat, sample_count: u32) -> wgpu::TextureView {
+        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("rehearsal"),
+            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: match format == DEPTH_FORMAT && sample_count == 1 {
+                true => wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                false => wgpu::TextureUsages::RENDER_ATTACHMENT,
+            },
+            view_formats: &[],
+        });
+        texture.create_view(&Default::default())
+    }
+
+    fn submit(
+        &self,
+        key: PipelineKey,
+        pipeline: &Pipeline,
+        groups: [Option<&wgpu::BindGroup>; 4],
+    ) -> Result<(), RenderError> {
+        let (color, depth) = (self.texture(key.format, key.samples), self.texture(DEPTH_FORMAT, key.samples));
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("rehearsal"),
@@ -133,14 +184,7 @@ impl Rehearsal {
                     store: wgpu::StoreOp::Store,
                 },
             })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
+            depth_stencil_attachment: Some(depth_attachment(&depth)),
             ..Default::default()
         });
         pass.set_pipeline(&pipeline.pipeline);
@@ -157,9 +201,7 @@ impl Rehearsal {
             pass.draw_indexed(0..3, 0, 0..1);
         }
         drop(pass);
-        self.gpu.queue.submit([encoder.finish()]);
-        // A device that is lost shows in the check that follows.
-        let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+        self.finish(encoder)
     }
 
     /// Group 0.
@@ -178,17 +220,7 @@ impl Rehearsal {
 
     /// Group 3.
     fn shadow_group(&self) -> wgpu::BindGroup {
-        let atlas = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("rehearsal"),
-            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: DEPTH_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let atlas = atlas.create_view(&Default::default());
+        let atlas = self.texture(DEPTH_FORMAT, 1);
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("rehearsal"),
             layout: self.pipelines.shadow_layout(),
@@ -197,5 +229,13 @@ impl Rehearsal {
                 wgpu::BindGroupEntry { binding: 1, resource: self.zeros.as_entire_binding() },
             ],
         })
+    }
+}
+
+fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
     }
 }

@@ -393,7 +393,8 @@ impl Renderer {
         }
         let mut count = awaited.len();
         if !decided.lights.shadows.is_empty() {
-            count += usize::from(!self.shadows.prepare(&self.gpu, wait)?);
+            let rehearse = || self.rehearsals.of_casters(&self.gpu);
+            count += usize::from(!self.shadows.prepare(&self.gpu, wait, rehearse)?);
         }
         if !wait {
             count += self.ready_effects(decided, seen)?.iter().filter(|ready| !**ready).count();
@@ -486,6 +487,7 @@ impl Renderer {
         };
         Ok(Statistics {
             light_lists,
+            lit_passes: decided.lit_passes(),
             cpu: *cpu,
             lights: lights.set.every.all,
             static_lights: lights.set.every.all - lights.set.every.dynamic,

@@ -103,14 +103,25 @@ impl ShadowMaps {
         }
     }
 
-    /// Begins to make the pipelines that draw casters, unless they are there or on their way; whether they are there. With `wait` they are.
+    /// Begins to make the pipelines that draw casters, unless they are there or on their way; whether they are there. With `wait` they are; else what `afterwards`
+    /// answers with is done before they count as there.
     ///
     /// # Errors
     /// [`RenderError::Shader`], a fault of ours.
-    pub fn prepare(&mut self, gpu: &Gpu, wait: bool) -> Result<bool, RenderError> {
+    pub fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        wait: bool,
+        afterwards: impl FnOnce() -> Option<Box<dyn FnOnce() + Send>>,
+    ) -> Result<bool, RenderError> {
         let casters = self.casters.get_or_insert_with(|| {
             let device = gpu.device.clone();
-            let make = move || Ok(CasterPipelines::new(&device)?);
+            let afterwards = if wait { None } else { afterwards() };
+            let make = move || {
+                let casters = CasterPipelines::new(&device)?;
+                afterwards.into_iter().for_each(|afterwards| afterwards());
+                Ok(casters)
+            };
             if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
         });
         let variant = || "shadow_caster".to_owned();
@@ -223,7 +234,8 @@ impl ShadowMaps {
             device.receiver_group = self.views.buffer().map(|views| device.receivers(gpu, views, layout));
         }
         let pipelines = self.casters.as_ref().and_then(|casters| casters.get()?.ok());
-        device.caster_group = pipelines.map(|pipelines| device.casters(gpu, objects, &pipelines.layout));
+        device.caster_group =
+            pipelines.map(|pipelines| pipelines.group(&gpu.device, objects, &device.matrices));
         for caster in self.stale.iter().flat_map(|map| &map.casters) {
             if let Some(mesh) = meshes.get_mut(caster.mesh) {
                 mesh.prepare(gpu, &[Attribute::Position], None);
@@ -338,7 +350,7 @@ pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
 }
 
 impl CasterPipelines {
-    fn new(device: &wgpu::Device) -> Result<Self, RenderError> {
+    pub fn new(device: &wgpu::Device) -> Result<Self, RenderError> {
         let entry = |binding, ty, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::VERTEX,
@@ -392,6 +404,24 @@ impl CasterPipelines {
             layout,
         })
     }
+
+    /// What they read: the table of objects, and a matrix at an offset.
+    pub fn group(
+        &self,
+        device: &wgpu::Device,
+        objects: &wgpu::Buffer,
+        matrices: &wgpu::Buffer,
+    ) -> wgpu::BindGroup {
+        let matrix = wgpu::BufferBinding { buffer: matrices, offset: 0, size: wgpu::BufferSize::new(64) };
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow casters"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: objects.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(matrix) },
+            ],
+        })
+    }
 }
 
 impl OnDevice {
@@ -420,19 +450,6 @@ impl OnDevice {
             caster_group: None,
             receiver_group: None,
         }
-    }
-
-    fn casters(&self, gpu: &Gpu, objects: &wgpu::Buffer, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
-        let matrix =
-            wgpu::BufferBinding { buffer: &self.matrices, offset: 0, size: wgpu::BufferSize::new(64) };
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shadow casters"),
-            layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: objects.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(matrix) },
-            ],
-        })
     }
 
     fn receivers(&self, gpu: &Gpu, views: &wgpu::Buffer, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
