@@ -17,6 +17,9 @@ use lumbre_optics::{Light, Material, SpotCone};
 use lumbre_render::{FrameOptions, Gpu, MissingPipelines, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Camera, Image, MaterialTextures, Mesh, Sampler, TextureReference, Transform};
 
+/// Its name, and what it does.
+type Change<'a> = (&'static str, &'a dyn Fn(&mut World));
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut frames, mut size, mut wait) = (60, (640, 360), false);
     let mut arguments = std::env::args().skip(1);
@@ -53,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for _ in 0..5 {
         frame(&mut world)?;
     }
-    let changes: [(&str, &dyn Fn(&mut World)); 4] = [
+    let changes: [Change<'_>; 4] = [
         ("nothing", &|_| {}),
         ("first spot light", &|world| {
             if let Some(mut lamp) = world.get_mut::<Light>(lamp) {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use bevy_ecs::resource::Resource;
 
 use crate::RenderError;
-use crate::deferred::Background;
+use crate::background::Background;
 
 /// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
 #[derive(Resource, Clone, Debug)]

@@ -34,6 +34,7 @@
 //! # Ok::<(), lumbre_render::RenderError>(())
 //! ```
 
+mod background;
 mod cluster_buffers;
 mod deferred;
 mod draws;
