@@ -266,3 +266,31 @@ fn explain_says_how_lights_are_found_and_why() {
     assert_eq!((listing.clustered, listing.inverse_square_lights, listing.unbounded_lights), (true, 11, 1));
     assert!(report.statistics.cpu.total_ms > 0.0);
 }
+
+#[test]
+fn lamps_with_a_range_that_reach_nothing_in_view_lend_no_light_of_others() {
+    let projection = Projection::Perspective {
+        vertical_fov: std::f64::consts::FRAC_PI_4,
+        aspect: None,
+        near: 0.1,
+        far: None,
+    };
+    let mut world = room(&mut Random(5), projection, DVec3::new(0.0, 4.0, 9.0));
+    // The first light of all has no range; those with one are behind the camera.
+    world.spawn((
+        Light::directional(Vec3::ONE),
+        Transform::from_xyz(0.0, 5.0, 1.0).looking_at(DVec3::ZERO, DVec3::Y),
+    ));
+    for x in [-2.0, 0.0, 2.0] {
+        let lamp = Light::spot(Vec3::splat(5.0), SpotCone::Smooth { inner: 0.3, outer: 0.8 }).with_range(3.0);
+        world.spawn((lamp, Transform::from_xyz(x, 4.0, 40.0)));
+    }
+    let [clusters, everything] = [LightLists::Clusters, LightLists::Everything].map(|light_lists| {
+        let options = FrameOptions { light_lists, shading: Some(Shading::Phong), ..linear() };
+        draw(&mut world, 48, 32, &options)
+    });
+    assert!(clusters.1.statistics.light_lists.clustered && clusters.1.statistics.light_lists.entries == 0);
+    for (clustered, all) in clusters.0.iter().zip(&everything.0) {
+        assert!((*clustered - *all).abs().max_element() <= ROUNDING * all.max_element().max(0.01));
+    }
+}

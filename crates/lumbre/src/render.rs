@@ -99,7 +99,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
 fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::GraphReport>) -> FrameTimes {
     let measured = measured.unwrap_or_default();
     let passes = measured.passes.iter().map(|pass| {
-        let lit = ["lightmap", "forward", "transparent"].contains(&pass.name.as_ref());
+        let lights = statistics.lit_passes.of(&pass.name).copied().unwrap_or_default();
         PassTimes {
             name: pass.name.to_string(),
             group: pass.group,
@@ -107,8 +107,8 @@ fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::Gra
             gpu_ms: pass.gpu.ms(),
             vertex_invocations: pass.invocations.map(|counts| counts.vertex),
             fragment_invocations: pass.invocations.map(|counts| counts.fragment),
-            lights_tested: if lit { statistics.lights } else { 0 },
-            lights_shaded: if lit { statistics.lights_per_object } else { 0.0 },
+            lights_tested: lights.lights,
+            lights_shaded: lights.lights_per_object,
         }
     });
     FrameTimes {

@@ -1,4 +1,4 @@
-//! The executor: what outlives a frame. Memory, last frame's plan, what retained resources hold, measurements.
+//! The executor: what outlives a frame. Memory, the last frames' plans, what retained resources hold, measurements.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -17,12 +17,17 @@ use crate::run::probe::FiniteProbe;
 use crate::run::record::{FrameResources, Recorder, looks};
 use crate::run::report::{GraphReport, Measurements};
 
+/// Plans that are kept.
+const KEPT_PLANS: usize = 8;
+
 /// Runs graphs, one per frame, on one device. After a lost device make a new one.
 #[derive(Default)]
 pub struct Executor {
     pool: Pool,
     history: History,
-    plan: Option<Arc<Plan>>,
+    /// Of the last frames, the newest last: what alternates (a shadow that moves now and then) is compiled once.
+    plans: Vec<Arc<Plan>>,
+    compiled: u64,
     measure: Measurements,
     keep_apart: bool,
     probing: bool,
@@ -86,22 +91,33 @@ impl Executor {
         self.pool.statistics()
     }
 
-    /// The plan of a graph; last frame's if nothing in the declaration changed.
+    /// The plan of a graph; that of one of the last frames if it was declared the same, with the same results of earlier frames at hand.
     ///
     /// # Errors
     /// The first fault of the declaration.
     pub fn plan<User>(&mut self, graph: &Graph<'_, User>) -> GraphResult<Arc<Plan>> {
         let options = CompileOptions { merge: !self.keep_apart, probe: self.probing };
-        if let Some(plan) = &self.plan
-            && plan.options == options
-            && plan.declarations == graph.declarations
-            && plan.before == self.history
-        {
-            return Ok(Arc::clone(plan));
+        let fits = |plan: &Arc<Plan>| {
+            plan.options == options && plan.declarations == graph.declarations && plan.before == self.history
+        };
+        let plan = match self.plans.iter().rposition(fits) {
+            Some(known) => self.plans.remove(known),
+            None => {
+                self.compiled += 1;
+                Arc::new(graph.compile_with(&self.history, options)?)
+            }
+        };
+        if self.plans.len() == KEPT_PLANS {
+            self.plans.remove(0);
         }
-        let plan = Arc::new(graph.compile_with(&self.history, options)?);
-        self.plan = Some(Arc::clone(&plan));
+        self.plans.push(Arc::clone(&plan));
         Ok(plan)
+    }
+
+    /// Plans compiled so far.
+    #[must_use]
+    pub fn compiled_plans(&self) -> u64 {
+        self.compiled
     }
 
     /// Compiles a graph, runs its passes and submits them.
@@ -297,5 +313,38 @@ impl Executor {
                 self.exported.push((declared.name.clone(), object));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{LoadOp, TextureDescriptor};
+
+    fn graph(there: bool, side: u32) -> Graph<'static, ()> {
+        let mut graph = Graph::new("test");
+        let described = TextureDescriptor::new_2d(side, side, wgpu::TextureFormat::Rgba8Unorm);
+        let mut target = graph.import_texture("target", described);
+        let clear = LoadOp::Clear(wgpu::Color::BLACK);
+        graph.raster_pass("always").color(&mut target, clear).run(|_| Ok(()));
+        let pass = graph.raster_pass("sometimes").calls_for(there, "light");
+        pass.color(&mut target, LoadOp::Load).run(|_| Ok(()));
+        graph
+    }
+
+    #[test]
+    fn what_comes_and_goes_is_compiled_once() {
+        let mut executor = Executor::new();
+        for frame in 0..20 {
+            let plan = executor.plan(&graph(frame % 2 == 0, 8)).unwrap();
+            assert_eq!(plan.running().count(), if frame % 2 == 0 { 2 } else { 1 });
+        }
+        assert_eq!(executor.compiled_plans(), 2);
+        // More than are kept, again and again: none of them is, and no more than that are held.
+        for frame in 0..30 {
+            executor.plan(&graph(true, 10 + frame % 10)).unwrap();
+        }
+        assert_eq!(executor.compiled_plans(), 32);
+        assert_eq!(executor.plans.len(), KEPT_PLANS);
     }
 }

@@ -210,6 +210,19 @@ impl Plan {
         self.resource_index(resource).and_then(|index| self.resources[index].lifetime)
     }
 
+    /// This plan, if none of it is carried out again: each pass that would run is [`Unchanged`](Status::Unchanged) for this reason.
+    #[must_use]
+    pub fn unchanged(&self, reason: &str) -> Self {
+        let mut plan = self.clone();
+        for status in plan.status.iter_mut().filter(|status| status.runs()) {
+            *status = Status::Unchanged { reason: reason.into() };
+        }
+        plan.steps.clear();
+        plan.slots.clear();
+        plan.resources.iter_mut().for_each(|resource| (resource.lifetime, resource.slot) = (None, None));
+        plan
+    }
+
     pub(crate) fn pass_name(&self, pass: usize) -> &Label {
         &self.declarations.passes[pass].name
     }

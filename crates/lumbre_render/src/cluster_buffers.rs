@@ -2,12 +2,13 @@
 //! is decided in `light_clusters`.
 
 use crate::extract::{LightClass, SceneLights, UNIFORM_LIGHTS};
+use crate::frame_bindings::FrameBuffer;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{ClusterGridData, InverseSquareLightData};
 use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
 use crate::{Gpu, RenderError};
 
-/// Bindings 6 to 9 of group 0.
+/// Those buffers of group 0 that belong to clusters.
 #[derive(Debug)]
 pub(crate) struct ClusterBuffers {
     pub clusters: LightClusters,
@@ -45,7 +46,9 @@ impl ClusterBuffers {
                 LightClass::Ranged => self.ranged.push(sphere(index)),
             }
         }
-        self.clusters.build(view, [&self.inverse_square, &self.ranged]);
+        // Where no light of the class is left, its shaders read the black one behind all lights.
+        let black = u32::try_from(lights.reaches.len()).unwrap_or(u32::MAX);
+        self.clusters.build(view, [&self.inverse_square, &self.ranged], black);
         // Baked lights stand last.
         let grid = &mut self.clusters.grid;
         grid.first_baked_inverse_square = lights.set.inverse_square.dynamic;
@@ -92,17 +95,18 @@ impl ClusterBuffers {
         Ok(renewed)
     }
 
-    /// What is bound, by binding; none before the first `upload`.
-    pub fn bindings(&self) -> Option<[(u32, wgpu::BindingResource<'_>); 4]> {
-        let lights = self.lights.buffer()?;
-        let uniform_bytes = u64::from(UNIFORM_LIGHTS + 1) * size_of::<InverseSquareLightData>() as u64;
-        let uniform =
-            wgpu::BufferBinding { buffer: lights, offset: 0, size: wgpu::BufferSize::new(uniform_bytes) };
-        Some([
-            (6, self.grid.buffer()?.as_entire_binding()),
-            (7, self.lists.as_ref()?.as_entire_binding()),
-            (8, wgpu::BindingResource::Buffer(uniform)),
-            (9, lights.as_entire_binding()),
-        ])
+    /// What is bound of them, once `upload` has made it.
+    pub fn buffer(&self, buffer: FrameBuffer) -> Option<wgpu::BufferBinding<'_>> {
+        let whole = |buffer| wgpu::BufferBinding { buffer, offset: 0, size: None };
+        match buffer {
+            FrameBuffer::ClusterGrid => self.grid.buffer().map(whole),
+            FrameBuffer::ClusterLists => self.lists.as_ref().map(whole),
+            FrameBuffer::InverseSquareLights => self.lights.buffer().map(whole),
+            FrameBuffer::UniformLights => self.lights.buffer().map(|buffer| {
+                let bytes = u64::from(UNIFORM_LIGHTS + 1) * size_of::<InverseSquareLightData>() as u64;
+                wgpu::BufferBinding { buffer, offset: 0, size: wgpu::BufferSize::new(bytes) }
+            }),
+            _ => None,
+        }
     }
 }

@@ -36,6 +36,8 @@ pub(crate) struct Draws {
     pub instances: Vec<InstanceData>,
     /// Objects outside the view.
     pub outside: usize,
+    /// Objects in view that wait for a pipeline.
+    pub waiting: usize,
     /// From the nearest to the farthest point of what is in view, along the line of sight, in metres.
     pub depths: Option<[f64; 2]>,
     /// From the nearest to the farthest point of what is lit by clusters, along the line of sight, in metres.
@@ -52,7 +54,7 @@ struct Visible<'a> {
 }
 
 impl Draws {
-    /// The draws of what `view` sees.
+    /// The draws of what `view` sees, each with the pipeline that `choose` answers with for the one that it calls for.
     pub fn new(
         objects: &Objects,
         view: &CameraView,
@@ -60,6 +62,7 @@ impl Draws {
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
         lights: &mut ObjectLightLists,
+        choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
     ) -> Self {
         let mut draws = Self::default();
         let planes = view.frustum(objects.origin);
@@ -70,6 +73,7 @@ impl Draws {
         let mut visible: Vec<Visible> = Vec::new();
         // Most objects are as the one before.
         let mut known: Option<(Traits, Variant)> = None;
+        let mut known_key: Option<(PipelineKey, Option<PipelineKey>)> = None;
         for (slot, object) in objects.iter() {
             if !inside(object) {
                 draws.outside += 1;
@@ -90,6 +94,15 @@ impl Draws {
                 double_sided: traits.double_sided,
                 blend: pass == LitPass::Transparent,
                 texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
+            };
+            let chosen = match known_key {
+                Some((of, chosen)) if of == pipeline => chosen,
+                _ => choose(pipeline),
+            };
+            known_key = Some((pipeline, chosen));
+            let Some(pipeline) = chosen else {
+                draws.waiting += 1;
+                continue;
             };
             let depth = (view.eye - object.center).dot(view.basis.z_axis);
             let widened = |depths: Option<[f64; 2]>| {
@@ -131,10 +144,12 @@ impl Draws {
             LitPass::Transparent => &mut self.transparent,
         };
         let lightmap = seen.object.lightmap.as_ref().filter(|_| seen.pipeline.variant.has(Feature::Lightmap));
+        // A pipeline that stands in for another may have no textures.
+        let texture_set = seen.object.texture_set.as_ref().filter(|_| seen.pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {
             batch.pipeline == seen.pipeline
                 && batch.mesh == seen.object.mesh
-                && same(batch.texture_set.as_ref(), seen.object.texture_set.as_ref())
+                && same(batch.texture_set.as_ref(), texture_set)
                 && same(batch.lightmap.as_ref(), lightmap)
                 && batch.instances.end == instance
         };
@@ -143,7 +158,7 @@ impl Draws {
             _ => batches.push(Batch {
                 pipeline: seen.pipeline,
                 mesh: seen.object.mesh,
-                texture_set: seen.object.texture_set.clone(),
+                texture_set: texture_set.cloned(),
                 lightmap: lightmap.cloned(),
                 instances: instance..instance + 1,
             }),

@@ -15,6 +15,7 @@ use crate::effects::{self, Effect, Stage};
 use crate::extract::{LightSet, Traits};
 use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
+use crate::frame_bindings::FrameBindings;
 use crate::frame_graph::declare;
 use crate::frame_plan::{Ending, FramePlan};
 use crate::shader::Feature;
@@ -106,15 +107,18 @@ fn explain_with(
     let half = plan.ending == Ending::DisplayPass && !options.full_precision;
     let common = FrameFeatures::new(options, &settings, lights, (plan.ending, target_format, half));
     let mut variants = BTreeMap::new();
-    let mut clustered = 0;
+    let (mut clustered, mut bindings) = (0, FrameBindings::default());
     for object in &traits {
         let variant = features::variant(object, &settings, &common);
         clustered += usize::from(variant.has(Feature::Clusters));
+        bindings = bindings.and(FrameBindings::of(&variant));
         *variants.entry(variant.to_string()).or_insert(0) += 1;
     }
     let light_lists = lights.listing(options.light_lists, clustered, traits.len());
     let target = TextureDescriptor::new_2d(width, height, target_format);
-    let frame = declare(effects, &plan, target, None).compile()?.explain();
+    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
+    let light = bindings.light_resources().map(|(name, buffer)| (name, buffer, usage));
+    let frame = declare(effects.iter(), &plan, (target, &mut { light }), None).compile()?.explain();
     let hidden_cones = match options.shading {
         // Whatever the objects ask for.
         Some(Shading::Phong) => Vec::new(),

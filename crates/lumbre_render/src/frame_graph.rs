@@ -1,8 +1,9 @@
 //! The graph of a frame: the effects' passes in the order of their stages, and the overlay.
 
-use lumbre_graph::{Executor, Frame, Imports, LoadOp, TextureDescriptor};
+use lumbre_graph::{BufferDescriptor, BufferRead, Executor, Frame, Imports, LoadOp, TextureDescriptor};
 
 use crate::effects::{Board, Effect, FrameGraph};
+use crate::frame_bindings::FrameBuffer;
 use crate::frame_plan::FramePlan;
 use crate::frame_scene::FrameScene;
 use crate::{FrameTarget, Gpu, RenderError};
@@ -10,31 +11,44 @@ use crate::{FrameTarget, Gpu, RenderError};
 /// What draws over the finished frame.
 pub(crate) type Overlay<'a> = Box<dyn FnOnce(&mut wgpu::RenderPass<'static>) + 'a>;
 
+/// A buffer that surfaces take light from, by its name in the graph.
+pub(crate) type LightBuffer = (&'static str, FrameBuffer, wgpu::BufferUsages);
+
 /// Declares the frame's graph and runs it.
 pub(crate) fn run_graph<'a>(
     executor: &mut Executor,
     gpu: &Gpu,
-    (effects, plan): (&'a [Box<dyn Effect>], &FramePlan),
-    target: &FrameTarget,
+    (effects, declared, plan): (&'a [Box<dyn Effect>], &[bool], &FramePlan),
+    (target, light): (&FrameTarget, &[(&'static str, FrameBuffer, wgpu::Buffer)]),
     scene: &mut FrameScene<'a>,
     overlay: Option<Overlay<'a>>,
 ) -> Result<Frame, RenderError> {
     let described = TextureDescriptor::new_2d(target.width, target.height, target.format);
-    let graph = declare(effects, plan, described.usage(target.texture.usage()), overlay);
+    let effects =
+        || effects.iter().zip(declared).filter(|(_, declared)| **declared).map(|(effect, _)| effect);
+    let buffers = light.iter().map(|(name, buffer, bound)| (*name, *buffer, bound.usage()));
+    let target_usage = described.usage(target.texture.usage());
+    let graph = declare(effects(), plan, (target_usage, &mut { buffers }), overlay);
     let imports = Imports::new().texture("target", &target.view);
-    let imports = effects.iter().fold(imports, |imports, effect| effect.imports(imports));
+    let imports = light.iter().fold(imports, |imports, (name, _, bound)| imports.buffer(*name, bound));
+    let imports = effects().fold(imports, |imports, effect| effect.imports(imports));
     Ok(executor.execute_with(&gpu.device, &gpu.queue, graph, &imports, scene)?)
 }
 
 /// The passes of a frame.
 pub(crate) fn declare<'a>(
-    effects: &'a [Box<dyn Effect>],
+    effects: impl IntoIterator<Item = &'a Box<dyn Effect>>,
     plan: &FramePlan,
-    target: TextureDescriptor,
+    (target, light): (TextureDescriptor, &mut dyn Iterator<Item = LightBuffer>),
     overlay: Option<Overlay<'a>>,
 ) -> FrameGraph<'a> {
     let mut graph = FrameGraph::with_user("frame");
     let mut board = Board::new(&mut graph, plan, target);
+    for (name, buffer, usage) in light {
+        let handle = graph.import_buffer(name, BufferDescriptor::new(4).usage(usage));
+        let read = if buffer.is_uniform() { BufferRead::Uniform } else { BufferRead::Storage };
+        board.lit_by_buffer(handle, read);
+    }
     for effect in effects {
         effect.declare(&mut graph, &mut board);
     }

@@ -15,7 +15,7 @@ pub(crate) enum Ending {
 }
 
 /// Decisions about a frame: formats, samples, and its end.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FramePlan {
     /// Of the linear frame.
     pub linear_format: wgpu::TextureFormat,

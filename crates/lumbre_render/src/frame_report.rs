@@ -24,12 +24,55 @@ pub struct Statistics {
     pub draws: usize,
     /// Forward shader variants compiled so far.
     pub variants: usize,
+    /// Pipelines made so far.
+    pub pipelines_made: usize,
+    /// Pipelines, and effects, that this frame called for and that are still being made: it went on as one before it
+    /// ([`MissingPipelines::Background`](crate::MissingPipelines)).
+    pub pipelines_awaited: usize,
     /// How fragments and vertices find their lights.
     pub light_lists: LightListing,
+    /// What the passes that draw lit surfaces draw and test, each its own.
+    pub lit_passes: LitPasses,
     /// What the CPU did, stage by stage.
     pub cpu: CpuStages,
     /// Bytes of components uploaded for this frame because they changed.
     pub uploaded_bytes: u64,
+}
+
+/// The passes that draw lit surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct LitPasses {
+    /// Opaque surfaces with a lightmap.
+    pub lightmap: PassLights,
+    /// Opaque surfaces without one.
+    pub forward: PassLights,
+    /// Surfaces that are blended.
+    pub transparent: PassLights,
+}
+
+impl LitPasses {
+    /// Those of the pass of this name, if it draws lit surfaces.
+    pub fn of(&self, pass: &str) -> Option<&PassLights> {
+        match pass {
+            "lightmap" => Some(&self.lightmap),
+            "forward" => Some(&self.forward),
+            "transparent" => Some(&self.transparent),
+            _ => None,
+        }
+    }
+}
+
+/// What a pass draws, and the lights that its vertices or fragments test.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct PassLights {
+    /// Objects in view.
+    pub objects: usize,
+    /// Draw calls.
+    pub draws: usize,
+    /// Different lights in the lists of its objects, and in those of clusters where its fragments read them.
+    pub lights: u32,
+    /// Lights in the list of one of its objects, on average; without those that its fragments find by clusters.
+    pub lights_per_object: f32,
 }
 
 /// By which lists lights are found, with their sizes.

@@ -1,11 +1,14 @@
 //! What the passes of a frame draw with: its draws, their pipelines and buffers, and the view. Every pass is lent it; what is drawn was decided before.
 
+use std::collections::HashMap;
+
 use bevy_ecs::entity::Entity;
 use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
 use lumbre_optics::FlatRule;
 
 use crate::draws::{Batch, Draws};
 use crate::extract::{CameraView, Objects};
+use crate::frame_bindings::FrameBindings;
 use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
 use crate::pipelines::Pipelines;
 use crate::shader::Feature;
@@ -18,8 +21,8 @@ pub struct FrameScene<'a> {
     pub(crate) pipelines: &'a Pipelines,
     pub(crate) meshes: &'a MeshBuffers,
     pub(crate) flat_rule: FlatRule,
-    /// Of group 0, for variants without clusters and with them.
-    pub(crate) frame_groups: [Option<&'a wgpu::BindGroup>; 2],
+    /// Of group 0.
+    pub(crate) frame_groups: &'a HashMap<FrameBindings, wgpu::BindGroup>,
     pub(crate) view: CameraView,
     pub(crate) shadows: &'a ShadowMaps,
 }
@@ -72,15 +75,15 @@ impl<'a> FrameScene<'a> {
     /// Draws the shadow maps that changed, each into its part of the atlas.
     pub(crate) fn draw_shadow_maps(&self, pass: &mut wgpu::RenderPass<'static>) {
         let Some(maps) = self.shadows.device() else { return };
-        let Some(group) = &maps.caster_group else { return };
+        let (Some(group), Some(pipelines)) = (&maps.caster_group, self.shadows.pipelines()) else { return };
         for map in &self.shadows.stale {
             let [x, y, side] = map.place;
             pass.set_viewport(x as f32, y as f32, side as f32, side as f32, 0.0, 1.0);
             pass.set_scissor_rect(x, y, side, side);
             pass.set_bind_group(0, group, &[map.matrix_offset]);
-            pass.set_pipeline(&maps.clear_pipeline);
+            pass.set_pipeline(&pipelines.clear);
             pass.draw(0..3, 0..1);
-            pass.set_pipeline(&maps.caster_pipeline);
+            pass.set_pipeline(&pipelines.caster);
             for run in map.casters.chunk_by(|a, b| a.mesh == b.mesh && a.slot + 1 == b.slot) {
                 let Some(mesh) = self.meshes.get(run[0].mesh) else { continue };
                 let slices = mesh.slices(&[Attribute::Position], None);
@@ -109,11 +112,11 @@ impl<'a> FrameScene<'a> {
                 continue;
             }
             pass.set_pipeline(&pipeline.pipeline);
-            let clustered = batch.pipeline.variant.has(Feature::Clusters);
-            if bound != Some(clustered) {
-                let Some(group) = self.frame_groups[usize::from(clustered)] else { continue };
+            let bindings = FrameBindings::of(&batch.pipeline.variant);
+            if bound != Some(bindings) {
+                let Some(group) = self.frame_groups.get(&bindings) else { continue };
                 pass.set_bind_group(0, group, &[]);
-                bound = Some(clustered);
+                bound = Some(bindings);
             }
             if let Some(set) = &batch.texture_set {
                 pass.set_bind_group(1, &set.bind_group, &[]);

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use bevy_ecs::resource::Resource;
 
 use crate::RenderError;
+use crate::background::Background;
 
 /// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
 #[derive(Resource, Clone, Debug)]
@@ -20,6 +21,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     lost: Arc<AtomicBool>,
     fault: Arc<Mutex<Option<String>>>,
+    background: Arc<Background>,
 }
 
 /// A field of `wgpu::Limits` by name, how it is read, and the least that will do.
@@ -72,7 +74,8 @@ impl Gpu {
                 return Err(RenderError::DeviceTooSmall { limit, least, found });
             }
         }
-        let gpu = Self { instance, adapter, device, queue, lost: Arc::default(), fault: Arc::default() };
+        let (lost, fault, background) = Default::default();
+        let gpu = Self { instance, adapter, device, queue, lost, fault, background };
         let noted = gpu.notes();
         gpu.device.set_device_lost_callback(move |reason, message| {
             tracing::warn!("the GPU device is lost ({reason:?}): {message}");
@@ -135,6 +138,14 @@ impl Gpu {
         surface: Option<&wgpu::Surface<'_>>,
     ) -> Result<Self, RenderError> {
         let adapter = find_adapter(&instance, surface)?;
+        Self::from_adapter(instance, adapter)
+    }
+
+    /// A device of an adapter that is known.
+    pub(crate) fn from_adapter(
+        instance: wgpu::Instance,
+        adapter: wgpu::Adapter,
+    ) -> Result<Self, RenderError> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lumbre"),
             required_features: adapter.features() & Self::OPTIONAL_FEATURES,
@@ -144,6 +155,11 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;
         Self::from_parts(instance, adapter, device, queue)
+    }
+
+    /// Where pipelines are made that no frame waits for.
+    pub(crate) fn background(&self) -> &Background {
+        &self.background
     }
 
     /// Whether the device is gone: make another `Gpu` and another renderer.

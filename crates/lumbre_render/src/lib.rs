@@ -34,7 +34,9 @@
 //! # Ok::<(), lumbre_render::RenderError>(())
 //! ```
 
+mod background;
 mod cluster_buffers;
+mod deferred;
 mod draws;
 mod effect_costs;
 pub mod effects;
@@ -43,6 +45,8 @@ mod explain;
 mod extract;
 mod facts;
 mod features;
+mod frame_bindings;
+mod frame_decision;
 mod frame_graph;
 mod frame_plan;
 mod frame_report;
@@ -60,6 +64,7 @@ mod normal_map;
 mod offscreen;
 mod options;
 mod pipelines;
+mod rehearsal;
 mod renderer;
 mod schedule;
 mod shader;
@@ -69,20 +74,22 @@ mod target;
 mod texture_sets;
 mod textures;
 mod window_surface;
+mod world_watch;
 
 pub use {bevy_ecs, glam, wgpu};
 
+pub use deferred::Deferred;
 pub use effect_costs::{EffectCost, FrameCost, Removable, effect_costs, removable_effects};
 pub use error::{EffectError, RenderError};
 pub use explain::{SceneExplanation, explain};
 pub use facts::SceneFacts;
 pub use frame_plan::FrameShape;
-pub use frame_report::{CpuStages, FrameReport, LightListing, Statistics};
+pub use frame_report::{CpuStages, FrameReport, LightListing, LitPasses, PassLights, Statistics};
 pub use frame_scene::{DrawnObject, FrameScene, FrameView};
 pub use gpu::Gpu;
 pub use metering::{LightMeter, Metering, meter};
 pub use offscreen::{Offscreen, OffscreenFormat, read_texture};
-pub use options::{Display, FrameOptions, LightLists, Measure};
+pub use options::{Display, FrameOptions, LightLists, Measure, MissingPipelines};
 pub use renderer::{Renderer, RendererBuilder};
 pub use schedule::{CurrentTarget, LastFrame, RenderSet, render_frame};
 pub use target::{DEPTH_FORMAT, FrameTarget};

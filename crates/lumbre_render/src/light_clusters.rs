@@ -112,8 +112,9 @@ struct Depths {
 }
 
 impl LightClusters {
-    /// Makes the lists of both classes of lights. Those of the first are numbered from 0, and the number after the last is a black one's.
-    pub fn build(&mut self, view: &ClusteredView, classes: [&[BoundingSphere]; 2]) {
+    /// Makes the lists of both classes of lights. Those of the first are numbered from 0, and the number after the last is a black one's; `none` is evaluated where
+    /// there is none of the second.
+    pub fn build(&mut self, view: &ClusteredView, classes: [&[BoundingSphere]; 2], none: u32) {
         self.spheres.clear();
         for sphere in classes.into_iter().flatten() {
             self.spheres.push(ViewSphere::new(view, sphere));
@@ -135,8 +136,9 @@ impl LightClusters {
         self.values.resize(2 * (clusters + 1), 0);
         self.grid.ranged_offsets = u32::try_from(clusters + 1).unwrap_or(u32::MAX);
         self.black = saturated(first);
-        self.class(0..first, 0, clusters, [&columns, &rows], &depths, true);
-        self.class(first..self.spheres.len(), clusters + 1, clusters, [&columns, &rows], &depths, false);
+        self.class(0..first, 0, clusters, [&columns, &rows], &depths, None);
+        let any = self.spheres.get(first).map_or(none, |sphere| sphere.light);
+        self.class(first..self.spheres.len(), clusters + 1, clusters, [&columns, &rows], &depths, Some(any));
     }
 
     /// The finest grid whose lists are not too long.
@@ -181,7 +183,7 @@ impl LightClusters {
         cells.sum()
     }
 
-    /// Appends the lists of one class, whose offsets stand at `table`.
+    /// Appends the lists of one class, whose offsets stand at `table`: in pairs, or one by one with `any` of the class behind them, for a list that is empty.
     fn class(
         &mut self,
         lights: std::ops::Range<usize>,
@@ -189,7 +191,7 @@ impl LightClusters {
         clusters: usize,
         [columns, rows]: [&Axis; 2],
         depths: &Depths,
-        packed: bool,
+        any: Option<u32>,
     ) {
         self.spans.clear();
         for sphere in &self.spheres[lights] {
@@ -217,14 +219,10 @@ impl LightClusters {
             }
         }
         let begin = self.values.len();
-        if packed {
-            self.fill_pairs(table, clusters, begin);
-        } else {
-            self.fill(table, clusters, begin);
-            // Any light of the class may be evaluated anywhere: it adds nothing where it does not reach.
-            let any = self.spans.first().map_or(0, |span| span.light);
-            self.values.push(any);
-        }
+        let Some(any) = any else { return self.fill_pairs(table, clusters, begin) };
+        self.fill(table, clusters, begin);
+        // Any light of the class may be evaluated anywhere: it adds nothing where it does not reach.
+        self.values.push(any);
     }
 
     /// Writes the lists of the spans: from lengths to ends, and backwards from there, which turns ends into beginnings.
@@ -523,8 +521,8 @@ mod tests {
             let second: Vec<BoundingSphere> = (500..600).map(&mut sphere).collect();
             let mut clusters = LightClusters::default();
             // Twice: what was there before leaves no trace.
-            clusters.build(&view, [&second, &first]);
-            clusters.build(&view, [&first, &second]);
+            clusters.build(&view, [&second, &first], 0);
+            clusters.build(&view, [&first, &second], 0);
             let (mut seen, mut listed, mut reaching) = (0, 0, 0);
             for _ in 0..20_000 {
                 let chosen = &first[random.within(0.0, 301.0) as usize];
@@ -564,17 +562,17 @@ mod tests {
         let view = view(wide, [1920, 1080], [0.1, 100.0]);
         let sphere = |light| BoundingSphere { light, center: DVec3::ZERO, radius: 6.0 };
         let mut clusters = LightClusters::default();
-        clusters.build(&view, [&[sphere(0)], &[]]);
+        clusters.build(&view, [&[sphere(0)], &[]], 0);
         assert_eq!(clusters.tile_side, 32);
         let many: Vec<BoundingSphere> = (0..60_000).map(sphere).collect();
-        clusters.build(&view, [&many, &[]]);
+        clusters.build(&view, [&many, &[]], 0);
         assert!(
             clusters.tile_side > 32 && clusters.entries as f64 <= 2.0 * MANY_ENTRIES,
             "{}",
             clusters.entries
         );
         // None at all: every list is empty, and there is a word to read.
-        clusters.build(&view, [&[], &[]]);
+        clusters.build(&view, [&[], &[]], 0);
         assert_eq!((clusters.entries, list(&clusters, 0, true)), (0, vec![]));
         assert!((clusters.values[0] as usize) < clusters.values.len());
     }

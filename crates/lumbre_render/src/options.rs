@@ -47,6 +47,17 @@ pub enum Measure {
     TimeAndInvocations,
 }
 
+/// What becomes of a frame that calls for pipelines that are not there yet: the scene's first spot light, shadow or texture, say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum MissingPipelines {
+    /// The frame waits for them, and shows all that it should: for pictures that are kept.
+    #[default]
+    Wait,
+    /// They are made on another thread, and until they are there frames go on with those that are: a light of a kind that no earlier frame had stays dark, its
+    /// shadow out, a texture plain; and so do options that were changed. For windows. The first frame of a World or of a target's format waits all the same.
+    Background,
+}
+
 /// By which lists a fragment finds its lights. What is drawn is the same to rounding: a light that is in no list adds nothing there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum LightLists {
@@ -88,6 +99,11 @@ pub struct FrameOptions {
     pub exposure: Option<f32>,
     /// f32 instead of f16 per channel until the display pass: for measuring, not for games.
     pub full_precision: bool,
+    /// What becomes of the frame where pipelines are missing.
+    pub missing_pipelines: MissingPipelines,
+    /// Leaves the target alone, and the GPU, where nothing has changed since this renderer's last frame and that one went into the same texture: the plan says
+    /// `Unchanged` of each pass. For targets that nobody else writes to.
+    pub keep_unchanged: bool,
     /// What is measured.
     pub measure: Measure,
     /// Looks for NaN and infinities after every pass.
@@ -109,6 +125,8 @@ impl Default for FrameOptions {
             display: Display::Srgb,
             exposure: None,
             full_precision: false,
+            missing_pipelines: MissingPipelines::Wait,
+            keep_unchanged: false,
             measure: Measure::Nothing,
             probe: false,
         }

@@ -1,10 +1,13 @@
-//! Render pipelines of the forward shader's variants, made when a draw first asks for one. Which draw asks for which: `draws`.
+//! Render pipelines of the forward shader's variants, made when a draw first asks for one, at once or on the device's thread. Which draw asks for which: `draws`.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
+use std::sync::{Arc, Mutex};
 
 use lumbre_optics::Shading;
 
+use crate::deferred::Deferred;
+use crate::frame_bindings::FrameBindings;
 use crate::mesh_buffers::Attribute;
 use crate::shader::{self, Feature, Variant};
 use crate::shadows;
@@ -38,29 +41,31 @@ pub(crate) struct Pipeline {
 /// All pipelines made so far.
 #[derive(Debug)]
 pub(crate) struct Pipelines {
-    frame_layout: wgpu::BindGroupLayout,
-    clustered_layout: wgpu::BindGroupLayout,
+    frame_layouts: HashMap<FrameBindings, wgpu::BindGroupLayout>,
     shadow_layout: wgpu::BindGroupLayout,
-    modules: HashMap<Variant, wgpu::ShaderModule>,
-    pipelines: HashMap<PipelineKey, Pipeline>,
+    modules: Modules,
+    pipelines: HashMap<PipelineKey, Deferred<Pipeline>>,
 }
+
+/// What is done on the same thread after a pipeline was made.
+pub(crate) type Afterwards = Box<dyn FnOnce() + Send>;
+
+/// The modules compiled so far.
+type Modules = Arc<Mutex<HashMap<Variant, wgpu::ShaderModule>>>;
 
 impl Pipelines {
     pub fn new(gpu: &Gpu) -> Self {
-        let [frame_layout, clustered_layout] = [false, true].map(|clustered| frame_layout(gpu, clustered));
-        let shadow_layout = shadows::receiver_layout(gpu);
         Self {
-            frame_layout,
-            clustered_layout,
-            shadow_layout,
-            modules: HashMap::new(),
+            frame_layouts: HashMap::new(),
+            shadow_layout: shadows::receiver_layout(gpu),
+            modules: Modules::default(),
             pipelines: HashMap::new(),
         }
     }
 
-    /// The layout of group 0, of variants that read clusters' lists or of those that do not.
-    pub fn frame_layout(&self, clustered: bool) -> &wgpu::BindGroupLayout {
-        if clustered { &self.clustered_layout } else { &self.frame_layout }
+    /// The layout of group 0 with these buffers.
+    pub fn frame_layout(&mut self, gpu: &Gpu, bindings: FrameBindings) -> &wgpu::BindGroupLayout {
+        self.frame_layouts.entry(bindings).or_insert_with(|| bindings.layout(gpu))
     }
 
     /// The layout of group 3, of variants that read shadow maps.
@@ -70,40 +75,71 @@ impl Pipelines {
 
     /// Number of shader variants compiled so far.
     pub fn variants(&self) -> usize {
-        self.modules.len()
+        self.modules.lock().map_or(0, |modules| modules.len())
     }
 
-    /// Makes the pipeline of a key unless it is there.
+    /// Number of pipelines made so far.
+    pub fn made(&self) -> usize {
+        self.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
+    }
+
+    /// Begins to make the pipeline of a key unless it is there or on its way; whether it is there. With `wait` it is; else what `afterwards` answers with is done
+    /// before it counts as there.
+    ///
+    /// # Errors
+    /// [`RenderError::Shader`], a fault of ours.
     pub fn prepare(
         &mut self,
         gpu: &Gpu,
         sets: &mut TextureSets,
         key: PipelineKey,
-    ) -> Result<(), RenderError> {
-        if self.pipelines.contains_key(&key) {
-            return Ok(());
+        wait: bool,
+        afterwards: impl FnOnce() -> Option<Afterwards>,
+    ) -> Result<bool, RenderError> {
+        if !self.pipelines.contains_key(&key) {
+            let textures = sets.layout(gpu, key.texture_mask);
+            let lightmap = key.variant.has(Feature::Lightmap).then(|| sets.lightmap_layout(gpu));
+            let frame = self.frame_layout(gpu, FrameBindings::of(&key.variant)).clone();
+            let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_layout.clone());
+            let groups = [Some(frame), textures, lightmap, shadows];
+            let (device, modules) = (gpu.device.clone(), Arc::clone(&self.modules));
+            let afterwards = if wait { None } else { afterwards() };
+            let make = move || match make(&device, &modules, &groups, key) {
+                Ok(pipeline) => {
+                    afterwards.into_iter().for_each(|afterwards| afterwards());
+                    Ok(pipeline)
+                }
+                Err(RenderError::Shader { message, .. }) => Err(message.into()),
+                Err(other) => Err(other.into()),
+            };
+            let pipeline = if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) };
+            self.pipelines.insert(key, pipeline);
         }
-        let module = match self.modules.entry(key.variant) {
-            Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(new) => new.insert(shader::compile(&gpu.device, "forward", &key.variant.flags())?),
-        };
-        let textures = sets.layout(gpu, key.texture_mask);
-        let lightmap = key.variant.has(Feature::Lightmap).then(|| sets.lightmap_layout(gpu));
-        let frame = match key.variant.has(Feature::Clusters) {
-            true => &self.clustered_layout,
-            false => &self.frame_layout,
-        };
-        let shadows = key.variant.has(Feature::Shadows).then_some(&self.shadow_layout);
-        let groups = [Some(frame), textures.as_ref(), lightmap.as_ref(), shadows];
-        let used = groups.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
-        let pipeline = make(gpu, module, &groups[..used], key)?;
-        self.pipelines.insert(key, pipeline);
-        Ok(())
+        let Some(pipeline) = self.pipelines.get(&key) else { return Ok(false) };
+        pipeline
+            .is_there(wait)
+            .map_err(|message| RenderError::Shader { variant: key.variant.to_string(), message })
     }
 
     /// A pipeline that `prepare` made.
     pub fn get(&self, key: &PipelineKey) -> Option<&Pipeline> {
-        self.pipelines.get(key)
+        self.pipelines.get(key)?.get()?.ok()
+    }
+
+    /// The pipeline that comes nearest to one that is not there yet: of those that are there, for the same frame and light, the one that shows most of
+    /// the material.
+    pub fn nearest(&self, wanted: &PipelineKey) -> Option<PipelineKey> {
+        let fits = |key: &&PipelineKey| {
+            let plain = PipelineKey { variant: wanted.variant, texture_mask: wanted.texture_mask, ..**key };
+            plain == *wanted
+                && (key.texture_mask == wanted.texture_mask || key.texture_mask == 0)
+                && key.variant.is_lit_as(&wanted.variant)
+        };
+        let there = self.pipelines.keys().filter(|key| self.get(key).is_some());
+        // Of several as near always the same.
+        there.filter(fits).copied().max_by_key(|key| {
+            (key.texture_mask == wanted.texture_mask, Reverse(key.variant.differences(&wanted.variant)))
+        })
     }
 }
 
@@ -129,37 +165,15 @@ pub(crate) fn is_flat(variant: &Variant) -> bool {
     variant.has(Feature::Lit) && variant.shading == Shading::Flat
 }
 
-fn frame_layout(gpu: &Gpu, clustered: bool) -> wgpu::BindGroupLayout {
-    let entry = |visibility, binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-        count: None,
-    };
-    let (storage, uniform) =
-        (wgpu::BufferBindingType::Storage { read_only: true }, wgpu::BufferBindingType::Uniform);
-    let both = wgpu::ShaderStages::VERTEX_FRAGMENT;
-    let mut entries = vec![entry(both, 0, uniform)];
-    entries.extend((1..=5).map(|binding| entry(both, binding, storage)));
-    if clustered {
-        let fragment = wgpu::ShaderStages::FRAGMENT;
-        entries.extend(
-            [(6, uniform), (7, storage), (8, uniform), (9, storage)]
-                .map(|(binding, ty)| entry(fragment, binding, ty)),
-        );
-    }
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some(if clustered { "frame with clusters" } else { "frame" }),
-        entries: &entries,
-    })
-}
-
 fn make(
-    gpu: &Gpu,
-    module: &wgpu::ShaderModule,
-    groups: &[Option<&wgpu::BindGroupLayout>],
+    device: &wgpu::Device,
+    modules: &Modules,
+    groups: &[Option<wgpu::BindGroupLayout>; 4],
     key: PipelineKey,
 ) -> Result<Pipeline, RenderError> {
+    let module = &module(device, modules, key.variant)?;
+    let groups = groups.each_ref().map(Option::as_ref);
+    let used = groups.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     let attributes = attributes(&key.variant);
     let formats: Vec<[wgpu::VertexAttribute; 1]> = attributes
         .iter()
@@ -179,13 +193,13 @@ fn make(
         })
         .collect();
     let label = key.variant.to_string();
-    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("forward"),
-        bind_group_layouts: groups,
+        bind_group_layouts: &groups[..used],
         immediate_size: 0,
     });
-    let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(&label),
         layout: Some(&layout),
         vertex: wgpu::VertexState {
@@ -225,4 +239,21 @@ fn make(
         None => Ok(Pipeline { pipeline, attributes, flat: is_flat(&key.variant) }),
         Some(error) => Err(RenderError::Shader { variant: label, message: error.to_string() }),
     }
+}
+
+/// The module of a variant, compiled if nobody has asked for it before.
+fn module(
+    device: &wgpu::Device,
+    modules: &Modules,
+    variant: Variant,
+) -> Result<wgpu::ShaderModule, RenderError> {
+    let known = modules.lock().ok().and_then(|modules| modules.get(&variant).cloned());
+    if let Some(known) = known {
+        return Ok(known);
+    }
+    let module = shader::compile(device, "forward", &variant.flags())?;
+    if let Ok(mut modules) = modules.lock() {
+        modules.insert(variant, module.clone());
+    }
+    Ok(module)
 }

@@ -1,32 +1,37 @@
 //! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
 //! these has its own file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
 use std::time::Instant;
 
 use bevy_ecs::prelude::*;
-use lumbre_graph::Executor;
+use lumbre_graph::{Executor, Plan};
 use lumbre_scene::{SceneSettings, propagate_transforms};
 
 use crate::cluster_buffers::ClusterBuffers;
 use crate::draws::Draws;
 use crate::effects::{self, Effect, Stage};
-use crate::extract::{CameraView, Emitters, LightSet, Objects, extract_lights, find_camera};
+use crate::extract::{CameraView, Emitters, KnownLights, LightSet, Objects, extract_lights, find_camera};
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
+use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::frame_decision::{AskedFrame, Decided, Decision, Decisions, LastFrame, Seen, with_camera};
 use crate::frame_graph::{Overlay, run_graph};
-use crate::frame_plan::{FramePlan, ShadowAtlas};
+use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
 use crate::frame_scene::FrameScene;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{FrameData, InstanceData, LightData, radiance};
 use crate::light_clusters::ClusteredView;
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
-use crate::pipelines::{Pipelines, attributes, is_flat};
+use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
+use crate::rehearsal::Rehearsals;
 use crate::shader::Variant;
 use crate::shadows::{ShadowMaps, ShadowedView};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
+use crate::world_watch::WorldWatch;
 use crate::{
     CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, Measure, RenderError,
     Statistics,
@@ -48,10 +53,14 @@ pub struct Renderer {
     textures: Textures,
     sets: TextureSets,
     pipelines: Pipelines,
+    rehearsals: Rehearsals,
     effects: Vec<Box<dyn Effect>>,
+    watch: WorldWatch,
+    decisions: Decisions,
+    /// None after a frame that failed.
+    last: Option<LastFrame>,
     frame_uniform: wgpu::Buffer,
-    frame_group: Option<wgpu::BindGroup>,
-    clustered_group: Option<wgpu::BindGroup>,
+    frame_groups: HashMap<FrameBindings, wgpu::BindGroup>,
     /// Of the last frame.
     left_out: Vec<String>,
     /// Of the last frame: variants with the objects that each drew, in the order of the draws.
@@ -104,15 +113,18 @@ impl Renderer {
             textures: Textures::default(),
             sets: TextureSets::default(),
             pipelines: Pipelines::new(gpu),
+            rehearsals: Rehearsals::default(),
             effects: effects::own(),
+            watch: WorldWatch::default(),
+            decisions: Decisions::default(),
+            last: None,
             frame_uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("frame"),
                 size: size_of::<FrameData>() as u64,
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
-            frame_group: None,
-            clustered_group: None,
+            frame_groups: HashMap::new(),
             left_out: Vec::new(),
             drawn: Vec::new(),
         }
@@ -176,9 +188,72 @@ impl Renderer {
         options: &FrameOptions,
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
+        let drawn = self.draw_frame(world, target, options, overlay);
+        if drawn.is_err() {
+            // What was to be drawn into the shadow maps may not have been.
+            self.shadows.forget();
+        }
+        drawn
+    }
+
+    fn draw_frame(
+        &mut self,
+        world: &mut World,
+        target: &FrameTarget,
+        options: &FrameOptions,
+        overlay: Option<Overlay<'_>>,
+    ) -> Result<FrameReport, RenderError> {
         self.gpu.check()?;
-        let begun = Instant::now();
-        let mut clock = Clock { last: begun };
+        let mut clock = Clock::start();
+        let asked = AskedFrame::new(world, target, options);
+        let still = self.is_still(world);
+        let frame = match self.last.take().filter(|last| still && last.is(&asked)) {
+            Some(last) => {
+                let may_stay =
+                    options.keep_unchanged && overlay.is_none() && options.measure == Measure::Nothing;
+                if let Some(plan) = last.plan_in(target).filter(|_| may_stay) {
+                    let plan = plan.unchanged("nothing has changed, and the target holds it");
+                    return Ok(self.report_unchanged(last, plan, &clock));
+                }
+                self.shadows.stale.clear();
+                let statistics =
+                    Statistics { uploaded_bytes: 0, cpu: CpuStages::default(), ..last.statistics };
+                LastFrame { statistics, ..last }
+            }
+            None => self.prepare(world, target, options, asked, &mut clock)?,
+        };
+        self.encode(frame, target, options, overlay, &mut clock)
+    }
+
+    /// Whether nothing has changed since the last frame that this renderer or an effect of it would see.
+    fn is_still(&mut self, world: &mut World) -> bool {
+        // Each is asked: each looks from now on.
+        let still = self.watch.is_still(world);
+        self.effects.iter_mut().fold(still, |still, effect| effect.is_still(world) && still)
+    }
+
+    /// What there is to say of a frame that is not drawn, since the target holds it.
+    fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &Clock) -> FrameReport {
+        let cpu = CpuStages { total_ms: milliseconds(clock.begun), ..CpuStages::default() };
+        let statistics = Statistics { uploaded_bytes: 0, cpu, ..last.statistics };
+        self.last = Some(last);
+        FrameReport {
+            statistics,
+            plan: Arc::new(plan),
+            measured: self.executor.latest_report().cloned(),
+            left_out: self.left_out.clone(),
+        }
+    }
+
+    /// All that comes before the passes of a frame: what changed in the World, what follows from it, and its way to the GPU.
+    fn prepare(
+        &mut self,
+        world: &mut World,
+        target: &FrameTarget,
+        options: &FrameOptions,
+        asked: AskedFrame,
+        clock: &mut Clock,
+    ) -> Result<LastFrame, RenderError> {
         let mut cpu = CpuStages::default();
         // The system cannot fail: it has no parameter that may be missing.
         let _ = world.run_system_cached(propagate_transforms);
@@ -192,6 +267,11 @@ impl Renderer {
         }
         let camera = find_camera(world, options.camera)?;
         let view = CameraView::new(world, camera, target.aspect())?;
+        let exposure = options.exposure.unwrap_or(view.exposure);
+        if !(exposure > 0.0 && exposure.is_finite()) {
+            let (field, value, wanted) = ("exposure", f64::from(exposure), "greater than 0 and finite");
+            return Err(RenderError::BadCamera { entity: camera, field, value, wanted });
+        }
         self.objects.extract(
             world,
             &self.gpu,
@@ -200,10 +280,45 @@ impl Renderer {
             &mut left_out,
         )?;
         cpu.objects_ms = clock.lap();
-        let mut lights =
-            extract_lights(world, &mut self.emitters, &mut self.lights, self.objects.origin, &mut left_out)?;
+        let seen = Seen { target, view, exposure };
+        let mut timed = Timed { cpu: &mut cpu, clock };
+        let mut decided = self.decide(world, &seen, (options, &settings), None, &mut left_out, &mut timed)?;
         self.warn_once(&left_out);
-        cpu.lights_ms = clock.lap();
+        let former = self.decisions.former(world, target, options);
+        let awaited = self.make_pipelines(&mut decided, &seen, former.is_none())?;
+        match former.filter(|_| awaited > 0) {
+            Some(former) => {
+                let options = with_camera(&former.options, options.camera);
+                let (asked, mut said) = ((&options, &former.settings), Vec::new());
+                decided = self.decide(world, &seen, asked, Some(&former), &mut said, &mut timed)?;
+                self.leave_out_effects(&mut decided, &seen)?;
+            }
+            None => self.decisions.keep(target, &decided.decision),
+        }
+        let statistics = self.upload(&decided, &seen, timed)?;
+        let statistics = Statistics { pipelines_awaited: awaited, ..statistics };
+        Ok(LastFrame { asked, decided, statistics, view, exposure, waits: awaited > 0, drawn: None })
+    }
+
+    /// Decides what the frame is, from the World as these options and settings show it; or, with a former decision, as that one can show it with the pipelines that
+    /// are there.
+    fn decide(
+        &mut self,
+        world: &mut World,
+        seen: &Seen<'_>,
+        (options, settings): (&FrameOptions, &SceneSettings),
+        former: Option<&Decision>,
+        left_out: &mut Vec<String>,
+        timed: &mut Timed<'_>,
+    ) -> Result<Decided, RenderError> {
+        let known = former.map(|former| KnownLights {
+            set: &former.features.lights,
+            clustered: former.features.clustered,
+            lightmaps: options.lightmaps,
+            shadows: options.shadows,
+        });
+        let place = (self.objects.origin, known);
+        let mut lights = extract_lights(world, &mut self.emitters, &mut self.lights, place, left_out)?;
         if !options.lightmaps {
             lights.set = lights.set.without_lightmaps();
             lights.reaches.iter_mut().for_each(|reach| reach.baked = false);
@@ -212,50 +327,135 @@ impl Renderer {
             lights.set = lights.set.without_shadows();
             lights.shadows.clear();
         }
-        let exposure = options.exposure.unwrap_or(view.exposure);
-        if !(exposure > 0.0 && exposure.is_finite()) {
-            let (field, value, wanted) = ("exposure", f64::from(exposure), "greater than 0 and finite");
-            return Err(RenderError::BadCamera { entity: camera, field, value, wanted });
-        }
+        timed.cpu.lights_ms += timed.clock.lap();
         let traits = self.objects.iter().map(|(_, object)| &object.traits);
-        let facts = SceneFacts::new(traits, &lights.set, &settings, options);
-        let mut called_for = Vec::with_capacity(self.effects.len());
-        for effect in &mut self.effects {
-            called_for.push(effect.extract(world, &facts, options));
-        }
+        let facts = SceneFacts::new(traits, &lights.set, settings, options);
+        let called_for: Vec<bool> =
+            self.effects.iter_mut().map(|effect| effect.extract(world, &facts, options)).collect();
         let called = || self.effects.iter().zip(&called_for).filter(|(_, called)| **called);
         let radiance = called().any(|(effect, _)| effect.stage() == Stage::Radiance);
         let draws_objects = called().any(|(effect, _)| effect.draws_objects());
-        let plan = FramePlan::for_device(&facts, options, radiance, (&self.gpu, target, exposure));
-        let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
-        let features = FrameFeatures::new(options, &settings, lights.set, (plan.ending, target.format, half));
-        let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
+        let decision = former.cloned().unwrap_or_else(|| {
+            let plan =
+                FramePlan::for_device(&facts, options, radiance, (&self.gpu, seen.target, seen.exposure));
+            let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
+            let ending = (plan.ending, seen.target.format, half);
+            let features = FrameFeatures::new(options, settings, lights.set, ending);
+            Decision { options: options.clone(), settings: *settings, plan, features }
+        });
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
-        let target_kind = (plan.lit_format, plan.samples);
-        let draws = Draws::new(&self.objects, &view, &settings, &features, target_kind, &mut lists);
+        let pipelines = &self.pipelines;
+        let choose = |wanted: PipelineKey| match former {
+            Some(_) if pipelines.get(&wanted).is_none() => pipelines.nearest(&wanted),
+            _ => Some(wanted),
+        };
+        let draws = Draws::new(
+            &self.objects,
+            &seen.view,
+            settings,
+            &decision.features,
+            (decision.plan.lit_format, decision.plan.samples),
+            &mut lists,
+            &choose,
+        );
         lists.check()?;
-        cpu.draws_ms = clock.lap();
-        self.instances.replace(draws.instances.iter().copied());
-        self.light_list.replace(lists.indices.iter().copied());
-        if let Some(depths) = draws.clustered_depths {
-            let (origin, size) = (self.objects.origin, [target.width, target.height]);
-            self.clusters.build(&ClusteredView { view, origin, size, depths }, &lights);
+        timed.cpu.draws_ms += timed.clock.lap();
+        let (lights_per_object, light_list) = (lists.mean_length(), lists.indices);
+        let declared = vec![true; called_for.len()];
+        Ok(Decided {
+            decision,
+            declared,
+            called_for,
+            lights,
+            draws,
+            light_list,
+            lights_per_object,
+            draws_objects,
+        })
+    }
+
+    /// Makes the pipelines of a frame that are not there yet, or begins to; how many are on their way. With `wait` none is.
+    fn make_pipelines(
+        &mut self,
+        decided: &mut Decided,
+        seen: &Seen<'_>,
+        wait: bool,
+    ) -> Result<usize, RenderError> {
+        let mut awaited = HashSet::new();
+        for batch in decided.draws.batches() {
+            let (key, set) = (batch.pipeline, batch.texture_set.as_deref());
+            let rehearse = || self.rehearsals.of(&self.gpu, key, set);
+            if !self.pipelines.prepare(&self.gpu, &mut self.sets, key, wait, rehearse)? {
+                awaited.insert(key);
+            }
         }
+        let mut count = awaited.len();
+        if !decided.lights.shadows.is_empty() {
+            let rehearse = || self.rehearsals.of_casters(&self.gpu);
+            count += usize::from(!self.shadows.prepare(&self.gpu, wait, rehearse)?);
+        }
+        if !wait {
+            count += self.ready_effects(decided, seen)?.iter().filter(|ready| !**ready).count();
+        }
+        Ok(count)
+    }
+
+    /// By effect, whether it can be drawn without waiting for it.
+    fn ready_effects(&mut self, decided: &Decided, seen: &Seen<'_>) -> Result<Vec<bool>, RenderError> {
+        let shape = decided.decision.shape(seen);
+        let effects = self.effects.iter_mut().zip(&decided.called_for);
+        let ready = effects.map(|(effect, called)| {
+            let (called, name) = (*called, effect.name());
+            let ready = if called { effect.ready(&self.gpu, &shape) } else { Ok(true) };
+            ready.map_err(|source| RenderError::Effect { effect: name, source })
+        });
+        ready.collect()
+    }
+
+    /// Leaves effects out of a frame that goes on as a former one, if that one could not show them.
+    fn leave_out_effects(&mut self, decided: &mut Decided, seen: &Seen<'_>) -> Result<(), RenderError> {
+        decided.declared = self.ready_effects(decided, seen)?;
+        let linear = decided.decision.plan.ending == Ending::DisplayPass;
+        for (effect, declared) in self.effects.iter().zip(&mut decided.declared) {
+            *declared &= effect.stage() != Stage::Radiance || linear;
+        }
+        for (called, declared) in decided.called_for.iter_mut().zip(&decided.declared) {
+            *called &= declared;
+        }
+        Ok(())
+    }
+
+    /// Brings what a frame reads to the GPU.
+    fn upload(
+        &mut self,
+        decided: &Decided,
+        seen: &Seen<'_>,
+        timed: Timed<'_>,
+    ) -> Result<Statistics, RenderError> {
+        let Timed { cpu, clock } = timed;
+        let Decided { draws, lights, light_list, .. } = decided;
+        self.instances.replace(draws.instances.iter().copied());
+        self.light_list.replace(light_list.iter().copied());
         let clustered = draws.clustered_depths.is_some();
+        if let Some(depths) = draws.clustered_depths {
+            let (origin, size) = (self.objects.origin, [seen.target.width, seen.target.height]);
+            self.clusters.build(&ClusteredView { view: seen.view, origin, size, depths }, lights);
+        }
         cpu.clusters_ms = clock.lap();
         let shadowed = !lights.shadows.is_empty();
         if shadowed {
             let depths = draws.depths.unwrap_or([0.0, 1.0]);
-            self.shadows.plan(
-                &lights.shadows,
-                &self.objects,
-                &ShadowedView { view, height: target.height, depths },
-            );
+            let view = ShadowedView { view: seen.view, height: seen.target.height, depths };
+            self.shadows.plan(&lights.shadows, &self.objects, &view);
         }
         cpu.shadows_ms = clock.lap();
-        let uploaded_bytes = self.upload(&view, &settings, &lights.set, exposure, [clustered, shadowed])?;
+        let settings = &decided.decision.settings;
+        let uploaded_bytes =
+            self.upload_buffers(&seen.view, settings, &lights.set, seen.exposure, [clustered, shadowed])?;
+        self.make_frame_groups(draws);
+        let flat_rule = decided.decision.flat_rule();
         let mut triangles = 0;
         self.drawn.clear();
         for batch in draws.batches() {
@@ -265,26 +465,14 @@ impl Renderer {
                 }
                 _ => self.drawn.push((batch.pipeline.variant, batch.instances.len())),
             }
-            self.pipelines.prepare(&self.gpu, &mut self.sets, batch.pipeline)?;
             let variant = &batch.pipeline.variant;
             if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
                 mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant).then_some(flat_rule));
-                if draws_objects {
+                if decided.draws_objects {
                     mesh.prepare(&self.gpu, &[Attribute::Position], None);
                 }
                 triangles += mesh.triangles() * batch.instances.len();
             }
-        }
-        let mut shape = plan.shape(target, options.display, exposure);
-        if let Some(maps) = self.shadows.device().filter(|_| shadowed) {
-            let stale = !self.shadows.stale.is_empty();
-            shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale });
-        }
-        for (effect, _) in self.effects.iter_mut().zip(&called_for).filter(|(_, called)| **called) {
-            let name = effect.name();
-            effect
-                .prepare(&self.gpu, &shape)
-                .map_err(|source| RenderError::Effect { effect: name, source })?;
         }
         cpu.upload_ms = clock.lap();
         let clusters = &self.clusters.clusters;
@@ -297,48 +485,80 @@ impl Renderer {
             other_ranged_lights: lights.set.ranged.all,
             unbounded_lights: lights.set.unbounded.all,
         };
-        let mut statistics = Statistics {
+        Ok(Statistics {
             light_lists,
-            cpu,
+            lit_passes: decided.lit_passes(),
+            cpu: *cpu,
             lights: lights.set.every.all,
             static_lights: lights.set.every.all - lights.set.every.dynamic,
-            lights_per_object: lists.mean_length(),
+            lights_per_object: decided.lights_per_object,
             objects: draws.instances.len(),
             objects_outside: draws.outside,
             triangles,
             draws: draws.batches().count(),
             variants: self.pipelines.variants(),
+            pipelines_made: self.pipelines.made(),
+            pipelines_awaited: 0,
             uploaded_bytes,
-        };
+        })
+    }
+
+    /// Declares a frame's passes, records them and hands them to the GPU.
+    fn encode(
+        &mut self,
+        mut frame: LastFrame,
+        target: &FrameTarget,
+        options: &FrameOptions,
+        overlay: Option<Overlay<'_>>,
+        clock: &mut Clock,
+    ) -> Result<FrameReport, RenderError> {
+        let decided = &frame.decided;
+        let mut shape = decided.decision.shape(&Seen { target, view: frame.view, exposure: frame.exposure });
+        if let Some(maps) = self.shadows.device().filter(|_| !decided.lights.shadows.is_empty()) {
+            let stale = !self.shadows.stale.is_empty();
+            shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale });
+        }
+        for (effect, _) in self.effects.iter_mut().zip(&decided.called_for).filter(|(_, called)| **called) {
+            let name = effect.name();
+            effect
+                .prepare(&self.gpu, &shape)
+                .map_err(|source| RenderError::Effect { effect: name, source })?;
+        }
+        frame.statistics.cpu.upload_ms += clock.lap();
         self.executor.set_measure(match options.measure {
             Measure::Nothing => lumbre_graph::Measurements::OFF,
             Measure::Time => lumbre_graph::Measurements::TIMES,
             Measure::TimeAndInvocations => lumbre_graph::Measurements::ALL,
         });
         self.executor.enable_probe(options.probe);
-        self.executor.begun_at(begun);
+        self.executor.begun_at(clock.begun);
         let mut scene = FrameScene {
-            draws: &draws,
+            draws: &decided.draws,
             objects: &self.objects,
             pipelines: &self.pipelines,
             meshes: &self.meshes,
-            flat_rule,
-            frame_groups: [self.frame_group.as_ref(), self.clustered_group.as_ref()],
-            view,
+            flat_rule: decided.decision.flat_rule(),
+            frame_groups: &self.frame_groups,
+            view: frame.view,
             shadows: &self.shadows,
         };
-        let frame =
-            run_graph(&mut self.executor, &self.gpu, (&self.effects, &plan), target, &mut scene, overlay);
-        if frame.is_err() {
-            // What was to be drawn may not have been.
-            self.shadows.forget();
-        }
-        let frame = frame?;
+        let effects = (self.effects.as_slice(), decided.declared.as_slice(), &decided.decision.plan);
+        let light = decided.bindings().light_resources();
+        let bound = |buffer| self.frame_buffer(buffer).map(|bound| bound.buffer.clone());
+        let light: Vec<_> = light.filter_map(|(name, of)| Some((name, of, bound(of)?))).collect();
+        let drawn = run_graph(&mut self.executor, &self.gpu, effects, (target, &light), &mut scene, overlay)?;
         self.gpu.check()?;
-        statistics.cpu.encoding_ms = clock.lap();
-        statistics.cpu.total_ms = milliseconds(begun);
-        let measured = self.executor.latest_report().cloned();
-        Ok(FrameReport { statistics, plan: frame.plan, measured, left_out })
+        frame.statistics.cpu.encoding_ms = clock.lap();
+        frame.statistics.cpu.total_ms = milliseconds(clock.begun);
+        frame.drawn = Some((Arc::clone(&drawn.plan), target.texture.clone()));
+        let report = FrameReport {
+            statistics: frame.statistics,
+            plan: drawn.plan,
+            measured: self.executor.latest_report().cloned(),
+            left_out: self.left_out.clone(),
+        };
+        self.last = Some(frame);
+        Ok(report)
     }
 
     /// Logs what is left out now and was not in the frame before.
@@ -350,7 +570,7 @@ impl Renderer {
     }
 
     /// Uploads what changed; answers with its bytes.
-    fn upload(
+    fn upload_buffers(
         &mut self,
         view: &CameraView,
         settings: &SceneSettings,
@@ -391,54 +611,71 @@ impl Renderer {
         }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
             // Whatever fails below, the old groups name buffers that are gone.
-            self.frame_group = None;
-            self.clustered_group = None;
+            self.frame_groups.clear();
         }
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
         if let Some(transforms) = self.objects.transforms.buffer().filter(|_| shadowed) {
             let layout = self.pipelines.shadow_layout();
             bytes += self.shadows.upload(&self.gpu, transforms, &mut self.meshes, layout)?;
         }
-        if self.frame_group.is_none() {
-            self.frame_group = Some(self.group(false));
-        }
-        if clustered && self.clustered_group.is_none() {
-            self.clustered_group = Some(self.group(true));
-        }
         Ok(bytes)
     }
 
-    /// Group 0, of variants that read clusters' lists or of those that do not.
-    fn group(&self, clustered: bool) -> wgpu::BindGroup {
-        let buffers = [
-            Some(&self.frame_uniform),
-            self.objects.transforms.buffer(),
-            self.objects.materials.buffer(),
-            self.instances.buffer(),
-            self.lights.buffer(),
-            self.light_list.buffer(),
-        ];
-        let bindings =
-            (0..).zip(buffers).filter_map(|(binding, buffer)| Some((binding, buffer?.as_entire_binding())));
-        let of_clusters = self.clusters.bindings().filter(|_| clustered).into_iter().flatten();
-        let entries: Vec<_> = bindings
-            .chain(of_clusters)
-            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(if clustered { "frame with clusters" } else { "frame" }),
-            layout: self.pipelines.frame_layout(clustered),
-            entries: &entries,
-        })
+    /// A buffer of group 0, once it is there.
+    fn frame_buffer(&self, buffer: FrameBuffer) -> Option<wgpu::BufferBinding<'_>> {
+        let whole = match buffer {
+            FrameBuffer::Frame => Some(&self.frame_uniform),
+            FrameBuffer::Objects => self.objects.transforms.buffer(),
+            FrameBuffer::Materials => self.objects.materials.buffer(),
+            FrameBuffer::Instances => self.instances.buffer(),
+            FrameBuffer::Lights => self.lights.buffer(),
+            FrameBuffer::LightList => self.light_list.buffer(),
+            of_clusters => return self.clusters.buffer(of_clusters),
+        };
+        whole.map(|buffer| wgpu::BufferBinding { buffer, offset: 0, size: None })
+    }
+
+    /// Makes the groups 0 of a frame's draws that are not there yet.
+    fn make_frame_groups(&mut self, draws: &Draws) {
+        for batch in draws.batches() {
+            let bindings = FrameBindings::of(&batch.pipeline.variant);
+            if self.frame_groups.contains_key(&bindings) {
+                continue;
+            }
+            let layout = self.pipelines.frame_layout(&self.gpu, bindings).clone();
+            let entry = |buffer: FrameBuffer| {
+                let resource = wgpu::BindingResource::Buffer(self.frame_buffer(buffer)?);
+                Some(wgpu::BindGroupEntry { binding: buffer.binding(), resource })
+            };
+            let entries: Vec<_> = bindings.buffers().filter_map(entry).collect();
+            let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("frame"),
+                layout: &layout,
+                entries: &entries,
+            });
+            self.frame_groups.insert(bindings, group);
+        }
     }
 }
 
 /// Times the stages of a frame.
 struct Clock {
+    begun: Instant,
     last: Instant,
 }
 
+/// Where the times of stages are noted.
+struct Timed<'a> {
+    cpu: &'a mut CpuStages,
+    clock: &'a mut Clock,
+}
+
 impl Clock {
+    fn start() -> Self {
+        let begun = Instant::now();
+        Self { begun, last: begun }
+    }
+
     /// Milliseconds since the last call.
     fn lap(&mut self) -> f64 {
         let lap = milliseconds(self.last);

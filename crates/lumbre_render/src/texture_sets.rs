@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_scene::{Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
+use lumbre_scene::{Image, Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
 
 use wgpu::util::DeviceExt;
 
@@ -27,6 +27,8 @@ pub(crate) struct TextureSet {
     /// Bit i: slot i is bound.
     pub mask: u8,
     pub bind_group: wgpu::BindGroup,
+    /// The material's textures, made small.
+    pub stand_ins: MaterialTextures,
 }
 
 /// The images with their samplers, and the bytes of the maps' numbers.
@@ -67,6 +69,19 @@ pub(crate) fn second_set(textures: &MaterialTextures) -> u8 {
     slots(textures).iter().enumerate().map(|(i, slot)| u8::from(second(slot)) << i).sum()
 }
 
+/// The textures of a material as small as they may be for a software rasterizer to make the same code of them, which depends on whether sides are powers of two, and
+/// on samplers.
+fn stand_ins(textures: &MaterialTextures) -> MaterialTextures {
+    let mut small = textures.clone();
+    for reference in small.references_mut() {
+        let side = |side: u32| if side.is_power_of_two() { side.min(4) } else { 3 };
+        let (width, height) = (side(reference.image.width), side(reference.image.height));
+        let rgba = vec![0; 4 * (width * height) as usize];
+        reference.image = Arc::new(Image { name: "rehearsal".to_owned(), width, height, rgba });
+    }
+    small
+}
+
 impl TextureSets {
     /// The layout for a mask; none for no textures.
     pub fn layout(&mut self, gpu: &Gpu, mask: u8) -> Option<wgpu::BindGroupLayout> {
@@ -96,7 +111,11 @@ impl TextureSets {
                 bound.push((binding, view, textures.sampler(gpu, &texture.sampler)));
             }
         }
-        let set = Arc::new(TextureSet { mask, bind_group: bind(gpu, &layout, &bound, maps.as_ref()) });
+        let set = Arc::new(TextureSet {
+            mask,
+            bind_group: bind(gpu, &layout, &bound, maps.as_ref()),
+            stand_ins: stand_ins(material),
+        });
         self.sets.insert(key, Arc::clone(&set));
         Ok(Some(set))
     }

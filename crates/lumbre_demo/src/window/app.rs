@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use lumbre_optics::Light;
-use lumbre_render::{FrameOptions, FrameReport, Measure};
+use lumbre_render::{FrameOptions, FrameReport, Measure, MissingPipelines};
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::{DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, WindowEvent};
@@ -183,6 +183,7 @@ impl App {
             reflection: view.reflection,
             lightmaps: view.lightmaps,
             multisample: view.multisample,
+            missing_pipelines: MissingPipelines::Background,
             measure: if view.overlay { Measure::Time } else { Measure::Nothing },
             ..FrameOptions::default()
         }

@@ -190,8 +190,13 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
         "{} triangles of {} objects in {} draw calls",
         counts.triangles, counts.objects, counts.draws
     ));
-    let (outside, variants, bytes) = (counts.objects_outside, counts.variants, counts.uploaded_bytes);
-    let rest = format!("{outside} objects out of view, {variants} shader variants, {bytes} bytes uploaded");
+    let (outside, pipelines, bytes) = (counts.objects_outside, counts.pipelines_made, counts.uploaded_bytes);
+    let awaited = match counts.pipelines_awaited {
+        0 => String::new(),
+        awaited => format!(" and {awaited} being made"),
+    };
+    let rest =
+        format!("{outside} objects out of view, {pipelines} pipelines{awaited}, {bytes} bytes uploaded");
     ui.label(RichText::new(rest).color(DIM).small());
     for note in report.measured.iter().flat_map(|frame| &frame.notes) {
         ui.label(RichText::new(note).color(WARM).small());

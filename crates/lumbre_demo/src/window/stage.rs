@@ -6,8 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use bevy_ecs::world::World;
 use lumbre_render::{
-    Acquired, FrameOptions, FrameReport, Gpu, LightMeter, Metering, Offscreen, OffscreenFormat, RenderError,
-    Renderer, WindowSurface,
+    Acquired, FrameOptions, FrameReport, Gpu, LightMeter, Metering, MissingPipelines, Offscreen,
+    OffscreenFormat, RenderError, Renderer, WindowSurface,
 };
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
@@ -174,6 +174,8 @@ impl Stage {
         let (width, height) = self.size();
         let offscreen = Offscreen::new(&self.gpu, width, height, OffscreenFormat::Rgba8)?;
         let target = offscreen.target();
+        // It shows all that the frame should.
+        let options = &FrameOptions { missing_pipelines: MissingPipelines::Wait, ..options.clone() };
         match &self.picture_painter {
             Some(painter) => {
                 self.renderer.render_with_overlay(world, &target, options, |pass| painter.paint(pass))?

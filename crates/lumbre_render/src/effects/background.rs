@@ -37,6 +37,10 @@ impl Effect for Background {
         true
     }
 
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
     fn prepare(&mut self, _: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.color = match (frame.display_pass, frame.lit_format) {
             (true, wgpu::TextureFormat::Rgba16Float) => self.background.clamp(-LARGEST_HALF, LARGEST_HALF),

@@ -3,7 +3,7 @@
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 
-use lumbre_graph::{LoadOp, PassBuilder, Raster, TextureDescriptor, TextureHandle};
+use lumbre_graph::{BufferHandle, BufferRead, LoadOp, PassBuilder, Raster, TextureDescriptor, TextureHandle};
 
 use super::FrameGraph;
 use crate::frame_plan::{Ending, FramePlan};
@@ -29,6 +29,7 @@ pub struct Board {
     ending: Ending,
     /// What surfaces are lit with.
     lit_by: Vec<TextureHandle>,
+    lit_by_buffers: Vec<(BufferHandle, BufferRead)>,
     others: HashMap<TypeId, Box<dyn Any>>,
 }
 
@@ -57,6 +58,7 @@ impl Board {
                 .then(|| graph.texture("samples", described(plan.lit_format).samples(samples))),
             ending: plan.ending,
             lit_by: Vec::new(),
+            lit_by_buffers: Vec::new(),
             others: HashMap::new(),
         }
     }
@@ -85,6 +87,9 @@ impl Board {
         };
         let pass = graph.raster_pass(name);
         let pass = self.lit_by.iter().fold(pass, |pass, texture| pass.samples(texture));
+        let drawn = !matches!(load, LoadOp::Clear(_));
+        let buffers = self.lit_by_buffers.iter().filter(|_| drawn);
+        let pass = buffers.fold(pass, |pass, (buffer, how)| pass.reads(buffer, *how));
         match &mut self.multisampled {
             Some(samples) => pass.color(samples, load).resolve(result),
             None => pass.color(result, load),
@@ -98,6 +103,11 @@ impl Board {
     /// Has every later [`lit_pass`](Self::lit_pass) sample a texture.
     pub(super) fn lit_by(&mut self, texture: TextureHandle) {
         self.lit_by.push(texture);
+    }
+
+    /// Has every later [`lit_pass`](Self::lit_pass) that draws over what is there read a buffer.
+    pub(crate) fn lit_by_buffer(&mut self, buffer: BufferHandle, how: BufferRead) {
+        self.lit_by_buffers.push((buffer, how));
     }
 
     /// Leaves a value, as a rule a handle in a type of its own, for the effects that come later.

@@ -9,6 +9,7 @@ use lumbre_graph::LoadOp;
 use wgpu::util::DeviceExt;
 
 use super::{Board, Effect, FrameGraph, Stage};
+use crate::deferred::Deferred;
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
 use crate::frame_plan::FrameShape;
@@ -25,10 +26,14 @@ pub(super) struct DisplayPass {
 
 type Key = (DisplayVariant, wgpu::TextureFormat);
 
+fn key(frame: &FrameShape) -> Key {
+    (DisplayVariant::new(frame.display, frame.target_format), frame.target_format)
+}
+
 #[derive(Debug)]
 struct OnDevice {
     layout: wgpu::BindGroupLayout,
-    pipelines: HashMap<Key, wgpu::RenderPipeline>,
+    pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
     uniform: wgpu::Buffer,
     exposure: f32,
 }
@@ -46,12 +51,22 @@ impl Effect for DisplayPass {
         true
     }
 
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
+    fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
+        let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
+        Ok(!frame.display_pass || device.make(gpu, key(frame), false)?)
+    }
+
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.key = None;
         if frame.display_pass {
             let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
-            let variant = DisplayVariant::new(frame.display, frame.target_format);
-            self.key = Some(device.prepare(gpu, (variant, frame.target_format), frame.exposure)?);
+            device.make(gpu, key(frame), true)?;
+            device.expose(gpu, frame.exposure);
+            self.key = Some(key(frame));
         }
         Ok(())
     }
@@ -103,47 +118,22 @@ impl OnDevice {
         Self { layout, pipelines: HashMap::new(), uniform, exposure: 1.0 }
     }
 
-    /// Makes the pipeline for a target and writes the exposure if it changed; answers with the key for `draw`.
-    fn prepare(&mut self, gpu: &Gpu, key: Key, exposure: f32) -> Result<Key, RenderError> {
-        if !self.pipelines.contains_key(&key) {
-            let pipeline = self.make(gpu, key)?;
-            self.pipelines.insert(key, pipeline);
-        }
+    /// Makes the pipeline for a target, or begins to; whether it is there.
+    fn make(&mut self, gpu: &Gpu, key: Key, wait: bool) -> Result<bool, EffectError> {
+        let pipeline = self.pipelines.entry(key).or_insert_with(|| {
+            let (device, layout) = (gpu.device.clone(), self.layout.clone());
+            let make = move || Ok(make(&device, &layout, key)?);
+            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+        });
+        Ok(pipeline.is_there(wait)?)
+    }
+
+    /// Writes the exposure if it changed.
+    fn expose(&mut self, gpu: &Gpu, exposure: f32) {
         if exposure != self.exposure {
             self.exposure = exposure;
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&exposure));
         }
-        Ok(key)
-    }
-
-    fn make(&self, gpu: &Gpu, (variant, format): Key) -> Result<wgpu::RenderPipeline, RenderError> {
-        let module = shader::compile(&gpu.device, "display", &variant.flags())?;
-        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("display"),
-            bind_group_layouts: &[Some(&self.layout)],
-            immediate_size: 0,
-        });
-        Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("display"),
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        }))
     }
 
     /// Draws `frame` through the pipeline that `prepare` made.
@@ -154,7 +144,7 @@ impl OnDevice {
         key: &Key,
         frame: &wgpu::TextureView,
     ) {
-        let Some(pipeline) = self.pipelines.get(key) else { return };
+        let Some(Ok(pipeline)) = self.pipelines.get(key).and_then(Deferred::get) else { return };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("display"),
             layout: &self.layout,
@@ -167,6 +157,40 @@ impl OnDevice {
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..3, 0..1);
     }
+}
+
+fn make(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    (variant, format): Key,
+) -> Result<wgpu::RenderPipeline, RenderError> {
+    let module = shader::compile(device, "display", &variant.flags())?;
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("display"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("display"),
+        layout: Some(&pipeline_layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    }))
 }
 
 /// What the display makes of a colour for a target of this format: the numbers that the shaders write, in f64. Twin: shaders/display_color.wesl.

@@ -26,6 +26,10 @@ impl Effect for Forward {
         self.opaque
     }
 
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         board
             .lit_pass(graph, self.name(), LoadOp::Load)

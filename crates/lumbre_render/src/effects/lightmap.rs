@@ -27,6 +27,10 @@ impl Effect for Lightmap {
         self.lightmapped && self.switched_on
     }
 
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         board
             .lit_pass(graph, self.name(), LoadOp::Load)

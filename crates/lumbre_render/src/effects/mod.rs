@@ -55,8 +55,9 @@ pub enum Stage {
 
 /// A part of the frame that a scene may or may not call for. [`Renderer::builder`](crate::Renderer::builder) takes those of a program.
 ///
-/// Once a frame, in this order: `extract`; `prepare`, if it is called for; `declare`. An explanation without a device leaves out `prepare` and runs no
-/// pass.
+/// Once a frame, in this order: `extract`; `ready` and `prepare`, if it is called for; `declare`. An explanation without a device leaves out `prepare` and runs no
+/// pass. A frame that goes on as the one before, since pipelines are on their way, asks `extract` and `ready` once more, with what that one was drawn from; a frame in
+/// which nothing has changed (`is_still`) asks neither.
 pub trait Effect: Send + Sync {
     /// Its name, in plain words, for plans and errors.
     fn name(&self) -> &'static str;
@@ -67,6 +68,23 @@ pub trait Effect: Send + Sync {
     /// Takes from the World what it needs this frame; whether the scene calls for it. [`PassBuilder::calls_for`](lumbre_graph::PassBuilder::calls_for)
     /// of its passes gives the reason.
     fn extract(&mut self, world: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool;
+
+    /// Whether `extract` would take from the World what it took last: that of a World in which no camera, light, mesh, material, texture, transform or setting has
+    /// changed, with the same options. An effect that looks at nothing else answers true; one with components of its own looks whether they changed.
+    fn is_still(&mut self, world: &mut World) -> bool {
+        let _ = world;
+        false
+    }
+
+    /// Whether its pipelines are there for such a frame, where frames do not wait for them ([`MissingPipelines::Background`](crate::MissingPipelines)): an effect
+    /// that keeps them as [`Deferred`](crate::Deferred) begins to make them here. Until it answers true frames go on without it, or as they were with it.
+    ///
+    /// # Errors
+    /// Whatever keeps the effect from being drawn.
+    fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
+        let _ = (gpu, frame);
+        Ok(true)
+    }
 
     /// Makes what it needs on the GPU: pipelines, textures that outlive the frame, uniforms. Nothing that it is not called for.
     ///

@@ -32,6 +32,10 @@ impl Effect for Shadows {
         self.called_for == [true, true]
     }
 
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
     fn prepare(&mut self, _: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.atlas.clone_from(&frame.shadow_atlas);
         Ok(())

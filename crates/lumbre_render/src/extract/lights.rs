@@ -1,5 +1,7 @@
 //! Lights of a frame: those that are on and the faces of emissive objects, dynamic ones first. Which of them reach what is not decided here.
 
+use std::borrow::Cow;
+
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, SpotCone};
@@ -107,6 +109,25 @@ impl LightCounts {
             self.shadows.cascades |= kind == ShadowKind::Cascades;
             self.shadows.soft |= light_size(kind, light) > 0.0;
         }
+    }
+
+    /// Whether shaders for lights that count so know all of one that counts so by itself.
+    fn knows(&self, own: &Self, baked: bool) -> bool {
+        let there = match baked {
+            true => self.all > self.dynamic && (self.static_ambient || !own.static_ambient),
+            false => self.dynamic > 0,
+        };
+        let kinds = [
+            (own.directional, self.directional),
+            (own.point, self.point),
+            (own.spot, self.spot),
+            (own.polygon, self.polygon),
+            (own.shadows.lights > 0, self.shadows.lights > 0),
+            (own.shadows.cubes, self.shadows.cubes),
+            (own.shadows.cascades, self.shadows.cascades),
+            (own.shadows.soft, self.shadows.soft),
+        ];
+        there && kinds.iter().all(|(own, known)| !own || *known)
     }
 
     fn add_polygon(&mut self, polygon: &EmissivePolygon) {
@@ -227,6 +248,52 @@ impl LightSet {
     }
 }
 
+/// What the shaders of a frame know of lights: those of an earlier one, while others are being made.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct KnownLights<'a> {
+    pub set: &'a LightSet,
+    /// Fragments find lights with a range by clusters.
+    pub clustered: bool,
+    pub lightmaps: bool,
+    pub shadows: bool,
+}
+
+impl KnownLights<'_> {
+    /// A light as these shaders can show it, without its shadow if need be; nothing if they cannot. `so_far` counts those before it.
+    fn shown<'l>(&self, light: &'l Light, so_far: &LightSet) -> Option<Cow<'l, Light>> {
+        if light.kind == LightKind::Ambient {
+            return Some(Cow::Borrowed(light));
+        }
+        let plain = Light { shadow: false, ..light.clone() };
+        [Cow::Borrowed(light), Cow::Owned(plain)].into_iter().find(|light| {
+            let mut own = LightCounts::default();
+            own.add(light);
+            if !self.shadows {
+                own.shadows = ShadowCounts::default();
+            }
+            let baked = self.lightmaps && light.bake == BakeMode::Static;
+            let class = LightClass::of(light);
+            let of_class = match class {
+                LightClass::Unbounded => &self.set.unbounded,
+                LightClass::InverseSquare => &self.set.inverse_square,
+                LightClass::Ranged => &self.set.ranged,
+            };
+            // The uniform buffer is as long as it is.
+            let full = class == LightClass::InverseSquare
+                && self.set.inverse_square.all <= UNIFORM_LIGHTS
+                && so_far.inverse_square.all >= UNIFORM_LIGHTS;
+            self.set.every.knows(&own, baked) && (!self.clustered || of_class.knows(&own, baked) && !full)
+        })
+    }
+
+    fn shows_polygon(&self, polygon: &EmissivePolygon) -> bool {
+        let mut own = LightCounts::default();
+        own.add_polygon(polygon);
+        let baked = self.lightmaps && polygon.baked;
+        self.set.every.knows(&own, baked) && (!self.clustered || self.set.unbounded.knows(&own, baked))
+    }
+}
+
 /// How far a light of the buffer goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightReach {
@@ -293,7 +360,7 @@ pub(crate) struct SceneLights {
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
-/// range are `left_out`, each with a sentence.
+/// range are `left_out`, each with a sentence; with `known`, those that its shaders cannot show stay dark.
 ///
 /// # Errors
 /// [`RenderError::TooManyEmissiveFaces`].
@@ -301,11 +368,12 @@ pub(crate) fn extract_lights(
     world: &mut World,
     emitters: &mut Emitters,
     buffer: &mut GrowableBuffer<LightData>,
-    origin: DVec3,
+    (origin, known): (DVec3, Option<KnownLights<'_>>),
     left_out: &mut Vec<String>,
 ) -> Result<SceneLights, RenderError> {
     let mut scene = SceneLights::default();
-    let polygons = emitters.polygons(world)?;
+    let mut polygons = emitters.polygons(world)?;
+    polygons.retain(|polygon| known.is_none_or(|known| known.shows_polygon(polygon)));
     polygons.iter().for_each(|polygon| scene.set.add_polygon(polygon));
     let mut query = world.query::<(Entity, &Light, Option<&GlobalTransform>)>();
     let mut found: Vec<_> = query
@@ -325,6 +393,11 @@ pub(crate) fn extract_lights(
     let mut views = 0;
     for (lights, of_baked) in [(dynamic, false), (baked, true)] {
         for (entity, light, place) in lights {
+            let shown = match &known {
+                Some(known) => known.shown(light, &scene.set),
+                None => Some(Cow::Borrowed(*light)),
+            };
+            let Some(light) = &shown else { continue };
             let Some(class) = scene.set.add(light) else { continue };
             if class == LightClass::InverseSquare {
                 scene.inverse_square.push(InverseSquareLightData::new(light, place, origin));
@@ -345,6 +418,10 @@ pub(crate) fn extract_lights(
             scene.reaches.push(LightReach::of_polygon(polygon));
             data.push(LightData::polygon(&polygon.light, origin));
         }
+    }
+    if known.is_some() {
+        // Where all of a class are gone its lists are read still, and find a black one: `ClusterBuffers::build`.
+        data.push(LightData::default());
     }
     buffer.replace(data);
     Ok(scene)

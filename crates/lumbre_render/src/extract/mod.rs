@@ -12,7 +12,7 @@ pub(crate) use emitters::Emitters;
 #[cfg(test)]
 pub(crate) use lights::PolygonReach;
 pub(crate) use lights::{
-    LightClass, LightCounts, LightReach, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
+    KnownLights, LightClass, LightCounts, LightReach, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
 };
 pub(crate) use objects::{Object, Objects};
 pub(crate) use traits::{LitPass, Traits};

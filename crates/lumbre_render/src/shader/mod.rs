@@ -4,4 +4,6 @@ mod compile;
 mod variant;
 
 pub(crate) use compile::compile;
+#[cfg(test)]
+pub(crate) use compile::to_wgsl;
 pub use variant::{DisplayVariant, Feature, Variant};

@@ -130,6 +130,37 @@ features! {
     SoftShadows = 50 => "SOFT_SHADOWS",
 }
 
+/// Features that the frame, its lights and their lists decide on, and not a material alone.
+const OF_THE_FRAME: u64 = Feature::Lightmap as u64
+    | Feature::Lit as u64
+    | Feature::DynamicLights as u64
+    | Feature::StaticLights as u64
+    | Feature::DirectionalLights as u64
+    | Feature::PointLights as u64
+    | Feature::SpotLights as u64
+    | Feature::PolygonLights as u64
+    | Feature::FogLinear as u64
+    | Feature::FogExponential as u64
+    | Feature::FogExponentialSquared as u64
+    | Feature::FogDepthCue as u64
+    | Feature::Fog as u64
+    | Feature::Clamp as u64
+    | Feature::ClampVertices as u64
+    | Feature::HalfRange as u64
+    | Feature::Clusters as u64
+    | Feature::InverseSquareClusters as u64
+    | Feature::UniformLights as u64
+    | Feature::RangedClusters as u64
+    | Feature::Display as u64
+    | Feature::DisplaySrgb as u64
+    | Feature::DisplayClamp as u64
+    | Feature::EncodeSrgb as u64
+    | Feature::DecodeSrgb as u64
+    | Feature::Shadows as u64
+    | Feature::ShadowCubes as u64
+    | Feature::ShadowCascades as u64
+    | Feature::SoftShadows as u64;
+
 /// A variant of the forward shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
@@ -156,6 +187,17 @@ impl Variant {
     /// Whether the feature is in it.
     pub fn has(&self, feature: Feature) -> bool {
         self.bits & feature as u64 != 0
+    }
+
+    /// Whether both take the same light by the same lists, and write the same numbers: what is left to differ in is the material's own.
+    pub(crate) fn is_lit_as(&self, other: &Self) -> bool {
+        (self.bits ^ other.bits) & OF_THE_FRAME == 0 && self.shading == other.shading
+    }
+
+    /// In how much two variants differ.
+    pub(crate) fn differences(&self, other: &Self) -> (u32, bool, u64) {
+        let differ = self.bits ^ other.bits;
+        (differ.count_ones(), self.reflection != other.reflection, differ)
     }
 
     /// The variant with everything that cannot matter taken out, so that fewer pipelines are made.

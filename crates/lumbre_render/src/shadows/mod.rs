@@ -7,6 +7,7 @@ mod views;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, DVec4, Mat4};
 
+use crate::deferred::Deferred;
 use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
@@ -65,19 +66,25 @@ pub(crate) struct ShadowMaps {
     pub stale: Vec<StaleMap>,
     views: GrowableBuffer<ViewData>,
     matrices: Vec<u8>,
+    casters: Option<Deferred<CasterPipelines>>,
     device: Option<OnDevice>,
     /// Of the next atlas, in texels.
     side: u32,
 }
 
-/// The maps themselves, and how they are drawn and bound.
+/// How casters are drawn into a map.
+#[derive(Debug)]
+pub(crate) struct CasterPipelines {
+    layout: wgpu::BindGroupLayout,
+    pub caster: wgpu::RenderPipeline,
+    pub clear: wgpu::RenderPipeline,
+}
+
+/// The maps themselves, and how they are bound.
 #[derive(Debug)]
 pub(crate) struct OnDevice {
     pub atlas: wgpu::Texture,
     pub atlas_view: wgpu::TextureView,
-    caster_layout: wgpu::BindGroupLayout,
-    pub caster_pipeline: wgpu::RenderPipeline,
-    pub clear_pipeline: wgpu::RenderPipeline,
     matrices: wgpu::Buffer,
     pub caster_group: Option<wgpu::BindGroup>,
     pub receiver_group: Option<wgpu::BindGroup>,
@@ -90,9 +97,40 @@ impl ShadowMaps {
             stale: Vec::new(),
             views: GrowableBuffer::new("shadow views"),
             matrices: Vec::new(),
+            casters: None,
             device: None,
             side: 0,
         }
+    }
+
+    /// Begins to make the pipelines that draw casters, unless they are there or on their way; whether they are there. With `wait` they are; else what `afterwards`
+    /// answers with is done before they count as there.
+    ///
+    /// # Errors
+    /// [`RenderError::Shader`], a fault of ours.
+    pub fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        wait: bool,
+        afterwards: impl FnOnce() -> Option<Box<dyn FnOnce() + Send>>,
+    ) -> Result<bool, RenderError> {
+        let casters = self.casters.get_or_insert_with(|| {
+            let device = gpu.device.clone();
+            let afterwards = if wait { None } else { afterwards() };
+            let make = move || {
+                let casters = CasterPipelines::new(&device)?;
+                afterwards.into_iter().for_each(|afterwards| afterwards());
+                Ok(casters)
+            };
+            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+        });
+        let variant = || "shadow_caster".to_owned();
+        casters.is_there(wait).map_err(|message| RenderError::Shader { variant: variant(), message })
+    }
+
+    /// The pipelines, once `prepare` has made them.
+    pub fn pipelines(&self) -> Option<&CasterPipelines> {
+        self.casters.as_ref()?.get()?.ok()
     }
 
     /// Chooses views and places for the lights of a frame, and finds out which maps are as they have to be.
@@ -171,7 +209,7 @@ impl ShadowMaps {
         self.views.replace(data);
     }
 
-    /// Makes and uploads what the stale maps are drawn with, and what surfaces read. `objects` is the table of transforms.
+    /// Makes and uploads what the stale maps are drawn with, and what surfaces read, after `prepare`. `objects` is the table of transforms.
     ///
     /// # Errors
     /// [`RenderError::Shader`], a fault of ours; [`RenderError::BufferTooLarge`].
@@ -184,7 +222,7 @@ impl ShadowMaps {
     ) -> Result<u64, RenderError> {
         if self.device.as_ref().is_none_or(|device| device.atlas.width() != self.side) {
             let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
-            self.device = Some(OnDevice::new(gpu, side)?);
+            self.device = Some(OnDevice::new(gpu, side));
         }
         let bytes = self.views.pending_bytes() + self.matrices.len() as u64;
         let renewed = self.views.upload(gpu)?;
@@ -195,7 +233,9 @@ impl ShadowMaps {
         if renewed || device.receiver_group.is_none() {
             device.receiver_group = self.views.buffer().map(|views| device.receivers(gpu, views, layout));
         }
-        device.caster_group = Some(device.casters(gpu, objects));
+        let pipelines = self.casters.as_ref().and_then(|casters| casters.get()?.ok());
+        device.caster_group =
+            pipelines.map(|pipelines| pipelines.group(&gpu.device, objects, &device.matrices));
         for caster in self.stale.iter().flat_map(|map| &map.casters) {
             if let Some(mesh) = meshes.get_mut(caster.mesh) {
                 mesh.prepare(gpu, &[Attribute::Position], None);
@@ -309,19 +349,8 @@ pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     })
 }
 
-impl OnDevice {
-    fn new(gpu: &Gpu, side: u32) -> Result<Self, RenderError> {
-        let device = &gpu.device;
-        let atlas = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("shadow atlas"),
-            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: crate::target::DEPTH_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+impl CasterPipelines {
+    pub fn new(device: &wgpu::Device) -> Result<Self, RenderError> {
         let entry = |binding, ty, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::VERTEX,
@@ -329,14 +358,14 @@ impl OnDevice {
             count: None,
         };
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
-        let caster_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("shadow casters"),
             entries: &[entry(0, storage, false), entry(1, wgpu::BufferBindingType::Uniform, true)],
         });
         let module = crate::shader::compile(device, "shadow_caster", &[])?;
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("shadow casters"),
-            bind_group_layouts: &[Some(&caster_layout)],
+            bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
         let positions = [Some(wgpu::VertexBufferLayout {
@@ -347,7 +376,7 @@ impl OnDevice {
         let make = |entry_point: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>], compare| {
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(entry_point),
-                layout: Some(&layout),
+                layout: Some(&pipeline_layout),
                 vertex: wgpu::VertexState {
                     module: &module,
                     entry_point: Some(entry_point),
@@ -369,35 +398,58 @@ impl OnDevice {
                 cache: None,
             })
         };
+        Ok(Self {
+            caster: make("caster", &positions, wgpu::CompareFunction::Greater),
+            clear: make("clear", &[], wgpu::CompareFunction::Always),
+            layout,
+        })
+    }
+
+    /// What they read: the table of objects, and a matrix at an offset.
+    pub fn group(
+        &self,
+        device: &wgpu::Device,
+        objects: &wgpu::Buffer,
+        matrices: &wgpu::Buffer,
+    ) -> wgpu::BindGroup {
+        let matrix = wgpu::BufferBinding { buffer: matrices, offset: 0, size: wgpu::BufferSize::new(64) };
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow casters"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: objects.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(matrix) },
+            ],
+        })
+    }
+}
+
+impl OnDevice {
+    fn new(gpu: &Gpu, side: u32) -> Self {
+        let device = &gpu.device;
+        let atlas = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("shadow atlas"),
+            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: crate::target::DEPTH_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
         let matrices = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("shadow matrices"),
             size: (MOST_VIEWS * STRIDE) as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Ok(Self {
+        Self {
             atlas_view: atlas.create_view(&Default::default()),
-            caster_pipeline: make("caster", &positions, wgpu::CompareFunction::Greater),
-            clear_pipeline: make("clear", &[], wgpu::CompareFunction::Always),
             atlas,
-            caster_layout,
             matrices,
             caster_group: None,
             receiver_group: None,
-        })
-    }
-
-    fn casters(&self, gpu: &Gpu, objects: &wgpu::Buffer) -> wgpu::BindGroup {
-        let matrix =
-            wgpu::BufferBinding { buffer: &self.matrices, offset: 0, size: wgpu::BufferSize::new(64) };
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shadow casters"),
-            layout: &self.caster_layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: objects.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(matrix) },
-            ],
-        })
+        }
     }
 
     fn receivers(&self, gpu: &Gpu, views: &wgpu::Buffer, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {

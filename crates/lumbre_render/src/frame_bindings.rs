@@ -1,0 +1,170 @@
+//! Group 0 of the forward shader: which of a frame's buffers a variant reads, and the layout that holds these and no others. The bindings are those of shaders/frame.wesl and
+//! shaders/light_clusters.wesl. What stands in the buffers is not decided here.
+
+use crate::Gpu;
+use crate::shader::{Feature, Variant};
+
+/// A buffer of group 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FrameBuffer {
+    Frame,
+    Objects,
+    Materials,
+    Instances,
+    Lights,
+    LightList,
+    ClusterGrid,
+    ClusterLists,
+    /// As many as a uniform buffer holds.
+    UniformLights,
+    /// The same lights, any number.
+    InverseSquareLights,
+}
+
+/// Some of the buffers of group 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct FrameBindings(u16);
+
+impl FrameBuffer {
+    const ALL: [Self; 10] = [
+        Self::Frame,
+        Self::Objects,
+        Self::Materials,
+        Self::Instances,
+        Self::Lights,
+        Self::LightList,
+        Self::ClusterGrid,
+        Self::ClusterLists,
+        Self::UniformLights,
+        Self::InverseSquareLights,
+    ];
+
+    pub fn binding(self) -> u32 {
+        self as u32
+    }
+
+    pub fn is_uniform(self) -> bool {
+        matches!(self, Self::Frame | Self::ClusterGrid | Self::UniformLights)
+    }
+
+    /// The name of the graph's resource, if it holds light.
+    pub fn light_resource(self) -> Option<&'static str> {
+        match self {
+            Self::Frame | Self::Objects | Self::Materials | Self::Instances => None,
+            Self::Lights => Some("lights"),
+            Self::LightList => Some("lights of objects"),
+            Self::ClusterGrid => Some("cluster grid"),
+            Self::ClusterLists => Some("lights of clusters"),
+            Self::UniformLights | Self::InverseSquareLights => Some("inverse-square lights"),
+        }
+    }
+}
+
+impl FrameBindings {
+    /// What a variant reads.
+    pub fn of(variant: &Variant) -> Self {
+        let has = |feature| variant.has(feature);
+        let listed = has(Feature::DynamicLights) || has(Feature::StaticLights);
+        let inverse_square = has(Feature::InverseSquareClusters);
+        let reads = |buffer: &FrameBuffer| match buffer {
+            FrameBuffer::Frame | FrameBuffer::Objects | FrameBuffer::Materials | FrameBuffer::Instances => {
+                true
+            }
+            FrameBuffer::Lights => listed || has(Feature::RangedClusters),
+            FrameBuffer::LightList => listed,
+            FrameBuffer::ClusterGrid | FrameBuffer::ClusterLists => has(Feature::Clusters),
+            FrameBuffer::UniformLights => inverse_square && has(Feature::UniformLights),
+            FrameBuffer::InverseSquareLights => inverse_square && !has(Feature::UniformLights),
+        };
+        Self(FrameBuffer::ALL.into_iter().filter(reads).map(|buffer| 1 << buffer.binding()).sum())
+    }
+
+    /// These and others.
+    pub fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    pub fn buffers(self) -> impl Iterator<Item = FrameBuffer> {
+        FrameBuffer::ALL.into_iter().filter(move |buffer| self.0 & (1 << buffer.binding()) != 0)
+    }
+
+    /// Those that hold light, by the name of the graph's resource, each once.
+    pub fn light_resources(self) -> impl Iterator<Item = (&'static str, FrameBuffer)> {
+        let both = [FrameBuffer::UniformLights, FrameBuffer::InverseSquareLights];
+        // The same buffer, bound in two ways.
+        let last = both.iter().all(|buffer| self.0 & (1 << buffer.binding()) != 0).then_some(both[1]);
+        let named = self.buffers().filter(move |buffer| Some(*buffer) != last);
+        named.filter_map(|buffer| Some((buffer.light_resource()?, buffer)))
+    }
+
+    pub fn layout(self, gpu: &Gpu) -> wgpu::BindGroupLayout {
+        let entry = |buffer: FrameBuffer| wgpu::BindGroupLayoutEntry {
+            binding: buffer.binding(),
+            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+            ty: wgpu::BindingType::Buffer {
+                ty: match buffer.is_uniform() {
+                    true => wgpu::BufferBindingType::Uniform,
+                    false => wgpu::BufferBindingType::Storage { read_only: true },
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let entries: Vec<_> = self.buffers().map(entry).collect();
+        gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("frame"),
+            entries: &entries,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use lumbre_optics::{ReflectionModel, Shading};
+
+    use super::*;
+    use crate::shader::to_wgsl;
+
+    #[test]
+    fn a_variant_is_bound_what_it_reads_and_nothing_else() {
+        let mut seen = BTreeSet::new();
+        let some: [&[Feature]; 8] = [
+            &[],
+            &[Feature::DynamicLights, Feature::PointLights],
+            &[Feature::StaticLights, Feature::DirectionalLights],
+            &[Feature::InverseSquareClusters, Feature::UniformLights],
+            &[Feature::InverseSquareClusters],
+            &[Feature::RangedClusters, Feature::SpotLights],
+            &[Feature::RangedClusters, Feature::SpotLights, Feature::InverseSquareClusters, Feature::Shadows],
+            &[Feature::DynamicLights, Feature::PolygonLights, Feature::RangedClusters, Feature::PointLights],
+        ];
+        for shading in Shading::ALL {
+            for lit in some {
+                for other in [vec![], vec![Feature::FogLinear, Feature::Fog], vec![Feature::Matt]] {
+                    let features: Vec<_> = [Feature::Lit].iter().chain(lit).chain(&other).copied().collect();
+                    let mut variant = Variant::new(*shading, ReflectionModel::Blinn);
+                    features.iter().for_each(|feature| variant.set(*feature, true));
+                    let variant = variant.reduced();
+                    let source = to_wgsl("forward", &variant.flags()).unwrap();
+                    let module = naga::front::wgsl::parse_str(&source).unwrap();
+                    let read: Vec<u32> = module
+                        .global_variables
+                        .iter()
+                        .filter_map(|(_, global)| {
+                            global.binding.as_ref().filter(|binding| binding.group == 0)
+                        })
+                        .map(|binding| binding.binding)
+                        .collect();
+                    let read = BTreeSet::from_iter(read);
+                    let bound = FrameBindings::of(&variant).buffers().map(FrameBuffer::binding).collect();
+                    assert_eq!(read, bound, "{variant}");
+                    seen.insert(read);
+                }
+            }
+        }
+        assert!(seen.len() >= 6, "{seen:?}");
+    }
+}

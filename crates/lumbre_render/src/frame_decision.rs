@@ -1,0 +1,187 @@
+//! What a frame is decided to be, and what it was asked for: plain data, so that a frame can go on as the one before, or be that one.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::world::{World, WorldId};
+use lumbre_graph::Plan;
+use lumbre_optics::FlatRule;
+use lumbre_scene::SceneSettings;
+
+use crate::draws::{Batch, Draws};
+use crate::extract::{CameraView, SceneLights};
+use crate::features::FrameFeatures;
+use crate::frame_bindings::FrameBindings;
+use crate::frame_plan::{FramePlan, FrameShape};
+use crate::shader::Feature;
+use crate::{FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics};
+
+/// What the variants and passes of a frame follow from.
+#[derive(Clone, Debug)]
+pub(crate) struct Decision {
+    pub options: FrameOptions,
+    pub settings: SceneSettings,
+    pub plan: FramePlan,
+    pub features: FrameFeatures,
+}
+
+/// Decisions whose pipelines are there, by the format of their target.
+#[derive(Debug, Default)]
+pub(crate) struct Decisions {
+    world: Option<WorldId>,
+    made: Vec<(wgpu::TextureFormat, Decision)>,
+}
+
+/// A frame that is decided, ready to be uploaded and encoded.
+#[derive(Debug)]
+pub(crate) struct Decided {
+    pub decision: Decision,
+    /// By effect: whether its passes are in the graph, and whether it is called for.
+    pub declared: Vec<bool>,
+    pub called_for: Vec<bool>,
+    pub lights: SceneLights,
+    pub draws: Draws,
+    pub light_list: Vec<u32>,
+    /// On average.
+    pub lights_per_object: f32,
+    /// An effect that is called for draws the shapes of objects.
+    pub draws_objects: bool,
+}
+
+/// From where a frame is seen, and where it goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen<'a> {
+    pub target: &'a FrameTarget,
+    pub view: CameraView,
+    pub exposure: f32,
+}
+
+/// What a frame was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AskedFrame {
+    world: WorldId,
+    options: FrameOptions,
+    size: (u32, u32),
+    format: wgpu::TextureFormat,
+}
+
+/// The last frame, for one in which nothing has changed.
+#[derive(Debug)]
+pub(crate) struct LastFrame {
+    pub asked: AskedFrame,
+    pub decided: Decided,
+    pub statistics: Statistics,
+    pub view: CameraView,
+    pub exposure: f32,
+    /// It waits for pipelines: the next one may be another.
+    pub waits: bool,
+    /// What was drawn of it, and into which texture.
+    pub drawn: Option<(Arc<Plan>, wgpu::Texture)>,
+}
+
+impl Decisions {
+    /// The decision that a frame can go on with: none if it is to wait for its pipelines, or is the first of its kind.
+    pub fn former(
+        &mut self,
+        world: &World,
+        target: &FrameTarget,
+        options: &FrameOptions,
+    ) -> Option<Decision> {
+        if self.world != Some(world.id()) {
+            *self = Self { world: Some(world.id()), made: Vec::new() };
+        }
+        let waits = options.missing_pipelines == MissingPipelines::Wait || options.probe;
+        let former = self.made.iter().find(|(format, _)| *format == target.format());
+        former.filter(|_| !waits).map(|(_, decision)| decision.clone())
+    }
+
+    /// Keeps a decision whose pipelines are there.
+    pub fn keep(&mut self, target: &FrameTarget, decision: &Decision) {
+        self.made.retain(|(format, _)| *format != target.format());
+        self.made.push((target.format(), decision.clone()));
+    }
+}
+
+impl Decision {
+    /// What effects are told of it.
+    pub fn shape(&self, seen: &Seen<'_>) -> FrameShape {
+        self.plan.shape(seen.target, self.options.display, seen.exposure)
+    }
+
+    pub fn flat_rule(&self) -> FlatRule {
+        self.options.flat_rule.unwrap_or(self.settings.flat_rule)
+    }
+}
+
+impl Decided {
+    /// What each of its lit passes draws and tests.
+    pub fn lit_passes(&self) -> LitPasses {
+        LitPasses {
+            lightmap: self.pass_lights(&self.draws.lightmapped),
+            forward: self.pass_lights(&self.draws.opaque),
+            transparent: self.pass_lights(&self.draws.transparent),
+        }
+    }
+
+    fn pass_lights(&self, batches: &[Batch]) -> PassLights {
+        let (mut objects, mut entries) = (0, 0);
+        let (mut lists, mut lights) = (HashSet::new(), HashSet::<u32>::new());
+        let (mut inverse_square, mut ranged) = (false, false);
+        for batch in batches {
+            inverse_square |= batch.pipeline.variant.has(Feature::InverseSquareClusters);
+            ranged |= batch.pipeline.variant.has(Feature::RangedClusters);
+            for instance in
+                &self.draws.instances[batch.instances.start as usize..batch.instances.end as usize]
+            {
+                let list = instance.first_light as usize..instance.static_end as usize;
+                (objects, entries) = (objects + 1, entries + list.len());
+                // Objects share lists.
+                if lists.insert(list.clone()) {
+                    lights.extend(&self.light_list[list]);
+                }
+            }
+        }
+        let set = &self.lights.set;
+        let of_clusters = [(inverse_square, set.inverse_square.all), (ranged, set.ranged.all)];
+        let clustered: u32 = of_clusters.iter().filter(|(read, _)| *read).map(|(_, count)| count).sum();
+        PassLights {
+            objects,
+            draws: batches.len(),
+            // Fewer than 2^32 lights have room; one may be in the lists of vertices and of clusters both.
+            lights: (lights.len() as u32 + clustered).min(set.every.all),
+            lights_per_object: entries as f32 / objects.max(1) as f32,
+        }
+    }
+
+    /// The buffers of group 0 that any of its draws reads.
+    pub fn bindings(&self) -> FrameBindings {
+        let of = self.draws.batches().map(|batch| FrameBindings::of(&batch.pipeline.variant));
+        of.fold(FrameBindings::default(), FrameBindings::and)
+    }
+}
+
+impl AskedFrame {
+    pub fn new(world: &World, target: &FrameTarget, options: &FrameOptions) -> Self {
+        // Whether it is measured changes nothing of it.
+        let options = FrameOptions { measure: Measure::Nothing, keep_unchanged: false, ..options.clone() };
+        Self { world: world.id(), options, size: target.size(), format: target.format() }
+    }
+}
+
+impl LastFrame {
+    /// Whether a frame that was asked for so is this one, if nothing has changed in the World.
+    pub fn is(&self, asked: &AskedFrame) -> bool {
+        !self.waits && self.asked == *asked
+    }
+
+    /// Its plan, if it is in this texture.
+    pub fn plan_in(&self, target: &FrameTarget) -> Option<&Arc<Plan>> {
+        self.drawn.as_ref().filter(|(_, texture)| *texture == target.texture).map(|(plan, _)| plan)
+    }
+}
+
+/// The camera that a frame was asked for, in one that goes on as another.
+pub(crate) fn with_camera(options: &FrameOptions, camera: Option<Entity>) -> FrameOptions {
+    FrameOptions { camera, ..options.clone() }
+}

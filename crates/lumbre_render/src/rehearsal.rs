@@ -1,0 +1,241 @@
+//! A first draw with a pipeline where no frame waits for it. A software rasterizer compiles a pipeline's shaders when it first draws with them, on the thread that draws, for
+//! half a second and more; but it keeps the code on disk (Mesa's shader cache), for every device of the machine. So what is made in the background is drawn with once on
+//! another device of the same adapter, one triangle without an area, and the first frame that draws with it finds its code. GPUs compile when a pipeline is made.
+
+use std::sync::{Arc, Mutex};
+
+use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, MaterialTextures};
+
+use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::pipelines::{Afterwards, Pipeline, PipelineKey, Pipelines};
+use crate::shader::Feature;
+use crate::shadows::CasterPipelines;
+use crate::target::DEPTH_FORMAT;
+use crate::texture_sets::{TextureSet, TextureSets};
+use crate::textures::Textures;
+use crate::{Gpu, RenderError};
+
+/// A device to rehearse on, and what draws need on it.
+#[derive(Debug)]
+struct Rehearsal {
+    gpu: Gpu,
+    pipelines: Pipelines,
+    sets: TextureSets,
+    textures: Textures,
+    /// Zeros, as large as any uniform array: a uniform and storage buffer, vertices and indices.
+    zeros: wgpu::Buffer,
+}
+
+/// Texels along the side of what is drawn into.
+const SIDE: u32 = 16;
+/// What the uniform array of lights takes.
+const ZEROS: u64 = 1 << 16;
+
+/// The rehearsals of a renderer, on a device that is opened with the first of them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rehearsals(Arc<Mutex<Option<Rehearsal>>>);
+
+impl Rehearsals {
+    /// A first draw with a pipeline and the textures of a material, if the adapter compiles when it draws.
+    pub fn of(&self, gpu: &Gpu, key: PipelineKey, textures: Option<&TextureSet>) -> Option<Afterwards> {
+        let textures = textures.map(|set| set.stand_ins.clone());
+        self.job(gpu, move |rehearsal| rehearsal.draw(key, textures.as_ref()))
+    }
+
+    /// A first draw of a shadow map.
+    pub fn of_casters(&self, gpu: &Gpu) -> Option<Afterwards> {
+        self.job(gpu, Rehearsal::draw_casters)
+    }
+
+    fn job(
+        &self,
+        gpu: &Gpu,
+        draw: impl FnOnce(&mut Rehearsal) -> Result<(), RenderError> + Send + 'static,
+    ) -> Option<Afterwards> {
+        if gpu.adapter.get_info().device_type != wgpu::DeviceType::Cpu {
+            return None;
+        }
+        let (place, instance, adapter) = (Arc::clone(&self.0), gpu.instance.clone(), gpu.adapter.clone());
+        Some(Box::new(move || {
+            let Ok(mut rehearsal) = place.lock() else { return };
+            let drawn = match &mut *rehearsal {
+                Some(rehearsal) => draw(rehearsal),
+                None => Rehearsal::new(instance, adapter).and_then(|new| draw(rehearsal.insert(new))),
+            };
+            if let Err(error) = drawn {
+                // The frame that draws with it first takes longer; all else is as it would be.
+                tracing::debug!("a pipeline was not rehearsed: {error}");
+            }
+        }))
+    }
+}
+
+impl Rehearsal {
+    /// Opens a device beside that of the frames.
+    fn new(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self, RenderError> {
+        let gpu = Gpu::from_adapter(instance, adapter)?;
+        let zeros = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("rehearsal"),
+            size: ZEROS,
+            usage: wgpu::BufferUsages::UNIFORM
+                | wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::VERTEX
+                | wgpu::BufferUsages::INDEX,
+            mapped_at_creation: false,
+        });
+        let (pipelines, sets, textures) = (Pipelines::new(&gpu), TextureSets::default(), Textures::default());
+        Ok(Self { gpu, pipelines, sets, textures, zeros })
+    }
+
+    /// Draws with a pipeline, and waits until that is done.
+    ///
+    /// # Errors
+    /// What a frame with it would meet.
+    fn draw(&mut self, key: PipelineKey, textures: Option<&MaterialTextures>) -> Result<(), RenderError> {
+        self.pipelines.prepare(&self.gpu, &mut self.sets, key, true, || None)?;
+        let set = match textures {
+            Some(textures) => self.sets.set(&self.gpu, &mut self.textures, textures)?,
+            None => None,
+        };
+        let lightmap = match key.variant.has(Feature::Lightmap) {
+            true => {
+                let (name, encoding) = ("rehearsal".to_owned(), LightmapEncoding::default());
+                let texels = vec![glam::Vec3::ZERO; 16];
+                let image = Arc::new(LightmapImage { name, width: 4, height: 4, texels, encoding });
+                Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image })?)
+            }
+            false => None,
+        };
+        let frame = self.frame_group(FrameBindings::of(&key.variant));
+        let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_group());
+        let Some(pipeline) = self.pipelines.get(&key) else { return Ok(()) };
+        let groups =
+            [Some(&frame), set.as_ref().map(|set| &set.bind_group), lightmap.as_deref(), shadows.as_ref()];
+        let drawn = self.submit(key, pipeline, groups);
+        self.sets.sweep();
+        self.textures.sweep();
+        drawn
+    }
+
+    /// Draws a caster into a map.
+    fn draw_casters(&mut self) -> Result<(), RenderError> {
+        let device = &self.gpu.device;
+        let pipelines = CasterPipelines::new(device)?;
+        let group = pipelines.group(device, &self.zeros, &self.zeros);
+        let map = self.texture(DEPTH_FORMAT, 1);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("rehearsal"),
+            depth_stencil_attachment: Some(depth_attachment(&map)),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &group, &[0]);
+        pass.set_pipeline(&pipelines.clear);
+        pass.draw(0..3, 0..1);
+        pass.set_pipeline(&pipelines.caster);
+        pass.set_vertex_buffer(0, self.zeros.slice(..));
+        pass.set_index_buffer(self.zeros.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..3, 0, 0..1);
+        drop(pass);
+        self.finish(encoder)
+    }
+
+    /// Hands commands over, and waits for them.
+    fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<(), RenderError> {
+        self.gpu.queue.submit([encoder.finish()]);
+        // A device that is lost shows in the check.
+        let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+        self.gpu.check()
+    }
+
+    fn texture(&self, format: wgpu::TextureFormat, sample_count: u32) -> wgpu::TextureView {
+        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("rehearsal"),
+            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: match format == DEPTH_FORMAT && sample_count == 1 {
+                true => wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                false => wgpu::TextureUsages::RENDER_ATTACHMENT,
+            },
+            view_formats: &[],
+        });
+        texture.create_view(&Default::default())
+    }
+
+    fn submit(
+        &self,
+        key: PipelineKey,
+        pipeline: &Pipeline,
+        groups: [Option<&wgpu::BindGroup>; 4],
+    ) -> Result<(), RenderError> {
+        let (color, depth) = (self.texture(key.format, key.samples), self.texture(DEPTH_FORMAT, key.samples));
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("rehearsal"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &color,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(depth_attachment(&depth)),
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline.pipeline);
+        for (index, group) in (0..).zip(groups).filter(|(_, group)| group.is_some()) {
+            pass.set_bind_group(index, group, &[]);
+        }
+        for slot in 0..pipeline.attributes.len() as u32 {
+            pass.set_vertex_buffer(slot, self.zeros.slice(..));
+        }
+        if pipeline.flat {
+            pass.draw(0..3, 0..1);
+        } else {
+            pass.set_index_buffer(self.zeros.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..3, 0, 0..1);
+        }
+        drop(pass);
+        self.finish(encoder)
+    }
+
+    /// Group 0.
+    fn frame_group(&mut self, bindings: FrameBindings) -> wgpu::BindGroup {
+        let entry = |buffer: FrameBuffer| wgpu::BindGroupEntry {
+            binding: buffer.binding(),
+            resource: self.zeros.as_entire_binding(),
+        };
+        let entries: Vec<_> = bindings.buffers().map(entry).collect();
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("rehearsal"),
+            layout: self.pipelines.frame_layout(&self.gpu, bindings),
+            entries: &entries,
+        })
+    }
+
+    /// Group 3.
+    fn shadow_group(&self) -> wgpu::BindGroup {
+        let atlas = self.texture(DEPTH_FORMAT, 1);
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("rehearsal"),
+            layout: self.pipelines.shadow_layout(),
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&atlas) },
+                wgpu::BindGroupEntry { binding: 1, resource: self.zeros.as_entire_binding() },
+            ],
+        })
+    }
+}
+
+fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
+    }
+}

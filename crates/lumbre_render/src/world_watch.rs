@@ -1,0 +1,51 @@
+//! Whether anything of a World has changed that a frame is drawn from, by bevy_ecs's own marks: no component is read. What changed is found by `extract`.
+
+use bevy_ecs::archetype::ArchetypeId;
+use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::WorldId;
+use lumbre_optics::{Light, Material, ReflectionModel, Shading};
+use lumbre_scene::{
+    ActiveCamera, Camera, ChildOf, Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap,
+    MaterialTextures, Mesh, Name, SceneSettings, StaticObject, Transform,
+};
+
+/// What changed in any way that a frame may show.
+type Changes = Or<(
+    Or<(Changed<Mesh>, Changed<Material>, Changed<MaterialTextures>, Changed<Lightmap>)>,
+    Or<(Changed<Shading>, Changed<ReflectionModel>, Changed<EmissiveLight>, Changed<Hidden>)>,
+    Or<(Changed<StaticObject>, Changed<DynamicObject>, Changed<Name>)>,
+    Or<(Changed<Transform>, Changed<GlobalTransform>, Changed<ChildOf>, Changed<Children>)>,
+    Or<(Changed<Light>, Changed<Camera>, Changed<ActiveCamera>)>,
+)>;
+type Watch = SystemState<Query<'static, 'static, (), Changes>>;
+
+/// Watches one World at a time.
+#[derive(Default)]
+pub(crate) struct WorldWatch {
+    state: Option<(WorldId, Watch)>,
+    settings: Option<SceneSettings>,
+    /// How many entities have which components: what is removed, or an entity that is gone, leaves no other mark.
+    populations: Vec<(ArchetypeId, u32)>,
+}
+
+impl WorldWatch {
+    /// Whether nothing has changed since this was asked last; false of a World that it was not asked of before.
+    pub fn is_still(&mut self, world: &mut World) -> bool {
+        let known = self.state.as_ref().is_some_and(|(id, _)| *id == world.id());
+        if !known {
+            self.state = Some((world.id(), SystemState::new(world)));
+        }
+        let settings = world.get_resource::<SceneSettings>().copied();
+        let archetypes = world.archetypes().iter().filter(|archetype| !archetype.is_empty());
+        let populations: Vec<_> = archetypes.map(|archetype| (archetype.id(), archetype.len())).collect();
+        let same = settings == self.settings && populations == self.populations;
+        (self.settings, self.populations) = (settings, populations);
+        // Asked in any case, so that it knows from when on to look next time.
+        let unmarked = match &mut self.state {
+            Some((_, state)) => state.get(world).is_ok_and(|changes| changes.is_empty()),
+            None => false,
+        };
+        known && same && unmarked
+    }
+}
