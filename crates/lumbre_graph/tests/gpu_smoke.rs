@@ -132,7 +132,7 @@ fn adding<'a>(
     first: &'a wgpu::RenderPipeline,
     second: &'a wgpu::RenderPipeline,
 ) -> Graph<'a, Vec<&'static str>> {
-    let mut graph = Graph::with_user("adding");
+    let mut graph: Graph<'a, Vec<&'static str>> = Graph::with_user("adding");
     let mut target = graph.texture("target", TextureDescriptor::new_2d(SIDE, SIDE, FORMAT));
     let clear = LoadOp::ClearIfFirst(Color { r: 0.0, g: 0.5, b: 0.0, a: 0.0 });
     for (name, pipeline) in [("first", first), ("second", second)] {

@@ -5,5 +5,5 @@ mod variant;
 
 pub(crate) use compile::compile;
 #[cfg(test)]
-pub(crate) use compile::to_wgsl;
+pub(crate) use lumbre_shaders::to_wgsl;
 pub use variant::{DisplayVariant, Feature, Variant};

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DQuat, DVec2, DVec3, Vec3};
@@ -11,8 +12,6 @@ use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
-
-mod common;
 
 /// Side of a texel, metres.
 const TEXEL: f64 = 0.05;

@@ -4,14 +4,13 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
-
-mod common;
 
 fn run(world: &mut World, side: u32) -> BakeReport {
     let options = BakeOptions { density: Density::MapSize(side), error: 0.0005, ..BakeOptions::default() };

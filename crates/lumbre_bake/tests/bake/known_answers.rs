@@ -4,14 +4,13 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
-
-mod common;
 
 fn draft(side: u32) -> BakeOptions {
     BakeOptions { density: Density::MapSize(side), quality: Quality::Draft, ..BakeOptions::default() }

@@ -4,6 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
@@ -11,8 +12,6 @@ use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{AlphaMode, BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
-
-mod common;
 
 fn run(world: &mut World) -> BakeReport {
     let options =

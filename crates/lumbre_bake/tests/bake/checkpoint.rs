@@ -12,13 +12,8 @@ use lumbre_bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, CheckpointError, Density, Quality, bake, bake_with,
 };
 
-#[path = "common/mod.rs"]
-mod common;
-#[path = "common/corner.rs"]
-mod corner;
-
-use common::bits;
-use corner::corner;
+use crate::common::bits;
+use crate::corner::corner;
 
 fn options() -> BakeOptions {
     BakeOptions {

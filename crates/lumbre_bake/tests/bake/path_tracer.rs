@@ -9,12 +9,10 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Mesh, SceneSettings, StaticObject, Transform};
 
-mod common;
-mod held_out;
-
-use held_out::path_tracer::{Effort, PathTracer};
-use held_out::reference_points::read;
-use held_out::scenes::{self, region::Region};
+use crate::held_out::path_tracer::{Effort, PathTracer};
+use crate::held_out::reference_points::read;
+use crate::held_out::scenes::{self, region::Region};
+use crate::{common, held_out};
 
 #[test]
 fn agrees_with_another_path_tracer() {

@@ -11,12 +11,9 @@ use bevy_ecs::world::World;
 use glam::DVec3;
 use lumbre_bake::{BakeOptions, Density, bake};
 
-mod common;
-mod held_out;
-
-use held_out::judgement::{Judgement, judge};
-use held_out::reference_points::read;
-use held_out::scenes;
+use crate::held_out::judgement::{Judgement, judge};
+use crate::held_out::reference_points::read;
+use crate::held_out::scenes;
 
 fn baked(scene: fn(u64, f64) -> World, name: &str, density: f64) -> Judgement {
     let mut world = scene(0, 1.0);

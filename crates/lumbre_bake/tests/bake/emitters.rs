@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
@@ -13,8 +14,6 @@ use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{
     Image, MaterialTextures, Mesh, Name, Sampler, StaticObject, TextureReference, Transform, Wrap,
 };
-
-mod common;
 
 fn run(world: &mut World, side: u32) -> BakeReport {
     let options =

@@ -4,14 +4,13 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Mesh, Name, StaticObject, Transform};
-
-mod common;
 
 fn matt(reflectance: f32, emission: f32) -> Material {
     let front =

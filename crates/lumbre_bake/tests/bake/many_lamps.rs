@@ -7,14 +7,13 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, bake};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
-
-mod common;
 
 /// A matt or glowing horizontal square of a side about a place, looking up or down.
 fn spawn_square(world: &mut World, middle: Vec3, side: f32, up: bool, radiance: f32) {

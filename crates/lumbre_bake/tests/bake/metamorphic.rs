@@ -11,10 +11,8 @@ use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
 
-mod common;
-mod held_out;
-
-use held_out::scenes;
+use crate::held_out::scenes;
+use crate::{common, held_out};
 
 fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
     bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
@@ -12,8 +13,6 @@ use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
-
-mod common;
 
 fn run(world: &mut World, side: u32) -> BakeReport {
     run_with(world, side, Quality::Draft)

@@ -9,10 +9,7 @@ use glam::Vec3;
 use lumbre_bake::{BakeOptions, BakeReport, Density, bake};
 use lumbre_optics::{Light, Material};
 
-#[path = "common/corner.rs"]
-mod corner;
-
-use corner::corner;
+use crate::corner::corner;
 
 fn baked(world: &mut World, error: f64) -> BakeReport {
     let options = BakeOptions { density: Density::MapSize(24), error, ..BakeOptions::default() };

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
-
-mod common;
 
 fn matt(reflectance: f32) -> Material {
     let front = Surface { diffuse: Vec3::splat(reflectance), ..Surface::default() };

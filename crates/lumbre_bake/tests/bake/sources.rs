@@ -1,6 +1,6 @@
 //! What counts as the baker's source: every crate whose change may change a baked bit changes the content hash.
 
-#[path = "../build/sources.rs"]
+#[path = "../../build/sources.rs"]
 mod sources;
 
 use std::fs;

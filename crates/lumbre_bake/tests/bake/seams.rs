@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
+use crate::common;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
@@ -11,8 +12,6 @@ use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
-
-mod common;
 
 fn matt(reflectance: f32, emission: f32) -> Material {
     let front =

@@ -3,10 +3,9 @@
 
 use std::ops::ControlFlow;
 
+use crate::common;
 use bevy_ecs::world::World;
 use lumbre_bake::{BakeOptions, Density, bake};
-
-mod common;
 
 /// Median, 95th percentile, RMSE and bias, relative to the mean irradiance. Measured at these sizes and this error asked
 /// for: 0.7, 3.5, 2.6, -0.2 % and 0.6, 3.2, 1.6, 0.2 %; another seed moves them by a tenth of that.

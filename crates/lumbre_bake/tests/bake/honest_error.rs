@@ -6,15 +6,13 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::{common, held_out};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
-
-mod common;
-mod held_out;
 
 fn matt(reflectance: Vec3, emission: Vec3) -> Material {
     Material {

@@ -9,12 +9,11 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use crate::common;
 use bevy_ecs::world::World;
 use glam::{DMat4, DVec2, DVec3};
 use lumbre_bake::{BakeOptions, Density, Probes, Quality, bake};
 use lumbre_scene::{LightmapEncoding, PackedFormat, SaveOptions, Supercompression, load, save_with};
-
-mod common;
 
 /// A texture as Bevy would upload it.
 struct Texture {

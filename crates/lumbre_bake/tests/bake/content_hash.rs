@@ -17,10 +17,7 @@ use lumbre_scene::{
     Name, Sampler, TextureReference, Transform, Wrap,
 };
 
-#[path = "common/corner.rs"]
-mod corner;
-
-use corner::corner;
+use crate::corner::corner;
 
 fn hash(change: impl FnOnce(&mut World)) -> ContentHash {
     let mut world = corner();

@@ -14,11 +14,8 @@ use lumbre_bake::{
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
-mod common;
-#[path = "common/corner.rs"]
-mod corner;
-
-use corner::corner;
+use crate::common;
+use crate::corner::corner;
 
 fn options() -> BakeOptions {
     BakeOptions { density: Density::MapSize(48), quality: Quality::Final, ..BakeOptions::default() }

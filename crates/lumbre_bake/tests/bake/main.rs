@@ -1,0 +1,37 @@
+//! The baker as a whole, a subject a module. One program for all of them: each would carry the baker's generic code anew.
+//!
+//! What measures the whole process, its memory or its answer to a signal, is a program of its own beside this one.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/corner.rs"]
+mod corner;
+#[path = "../held_out/mod.rs"]
+mod held_out;
+
+mod atlases;
+mod checkpoint;
+mod content_hash;
+mod emitters;
+mod error_curve;
+mod hard_cases;
+mod hard_cases_of_size;
+mod hard_shadows;
+mod held_out_scenes;
+mod honest_error;
+mod known_answers;
+mod leaks;
+mod limits;
+mod many_lamps;
+mod metamorphic;
+mod path_tracer;
+mod probes;
+mod real_client;
+mod rebake;
+mod reference_irradiance;
+mod resolution_error;
+mod seams;
+mod sky;
+mod soft_shadows;
+mod sources;
+mod texture_coordinates;
