@@ -153,8 +153,6 @@ impl BakedLight {
 pub enum BakeNews {
     /// There is (better) light.
     Light(BakedLight),
-    /// All passes are done: the file can be written.
-    Done,
     /// The baked file is written.
     Saved(PathBuf),
     /// It was cancelled, as asked.
@@ -277,9 +275,6 @@ impl BackgroundBake {
             match self.messages.try_recv() {
                 Ok(Message::Status(status)) => self.status = Some(status),
                 Ok(Message::Done(baked)) => {
-                    if self.is_baking() {
-                        news.push(BakeNews::Done);
-                    }
                     self.work = Work::Nothing;
                     self.baked = Some(baked);
                 }

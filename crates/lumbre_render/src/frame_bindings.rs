@@ -126,7 +126,7 @@ mod tests {
     use lumbre_optics::{ReflectionModel, Shading};
 
     use super::*;
-    use crate::shader::to_wgsl;
+    use lumbre_shaders::to_wgsl;
 
     #[test]
     fn a_variant_is_bound_what_it_reads_and_nothing_else() {

@@ -314,15 +314,14 @@ impl Viewing {
                     self.since_metered = None;
                     self.sync_default_lights();
                 }
-                BakeNews::Done if self.keeps_bake => {
-                    self.keeps_bake = false;
-                    self.save_bake();
-                }
-                BakeNews::Done => {}
                 BakeNews::Saved(path) => self.say(format!("written: {}", path.display())),
                 BakeNews::Cancelled => self.say("the bake was cancelled; B begins again".to_owned()),
                 BakeNews::Failed(error) => self.complain(error.to_string()),
             }
+        }
+        if self.keeps_bake && self.can_save() {
+            self.keeps_bake = false;
+            self.save_bake();
         }
     }
 

@@ -4,6 +4,4 @@ mod compile;
 mod variant;
 
 pub(crate) use compile::compile;
-#[cfg(test)]
-pub(crate) use lumbre_shaders::to_wgsl;
 pub use variant::{DisplayVariant, Feature, Variant};
