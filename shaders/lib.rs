@@ -9,11 +9,14 @@
 //! ```
 //!
 //! ```
-//! let (_, source) = lumbre_shaders::MODULES.iter().find(|(path, _)| *path == "optics/lambert").unwrap();
-//! assert!(source.contains("fn lambert(normal: vec3<f32>, light: vec3<f32>) -> f32"));
+//! use lumbre_shaders::{Kept, MODULES, Program, UnnamedFeatures};
 //!
-//! let wgsl = lumbre_shaders::to_wgsl("optics/lambert", &[]).unwrap();
-//! assert!(wgsl.contains("max(dot(normal, light), 0.0)"));
+//! let modules: Vec<_> = MODULES.iter().map(|(path, source)| (*path, (*source).into())).collect();
+//! let unnamed = UnnamedFeatures::AreOff;
+//! let program =
+//!     Program { modules: &modules, root: "optics/lambert", features: &[], unnamed, kept: Kept::RootModule };
+//! let wgsl = program.to_wgsl().unwrap();
+//! assert!(wgsl.contains("fn lambert(normal: vec3<f32>, light: vec3<f32>) -> f32"), "{wgsl}");
 //! ```
 
 mod program;
