@@ -15,7 +15,7 @@ impl<T: Send + Sync + 'static> Deferred<T> {
     pub fn begin(gpu: &Gpu, make: impl FnOnce() -> Result<T, EffectError> + Send + 'static) -> Self {
         let place = Arc::new(OnceLock::new());
         let made = Arc::clone(&place);
-        gpu.background().run(Box::new(move || {
+        gpu.worker_thread().run(Box::new(move || {
             // Whoever waits is answered whatever happens.
             let result = catch_unwind(AssertUnwindSafe(make));
             let _ = made.set(result.unwrap_or_else(|_| Err("its making has panicked".into())));

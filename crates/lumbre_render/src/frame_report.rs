@@ -31,7 +31,7 @@ pub struct Statistics {
     pub pipelines_awaited: usize,
     /// How fragments and vertices find their lights.
     pub light_lists: LightListing,
-    /// What the passes that draw lit surfaces draw and test, each its own.
+    /// What the passes that draw lit surfaces draw and test, each its own; zeros where nothing is measured, since every object's list is counted for it.
     pub lit_passes: LitPasses,
     /// What the CPU did, stage by stage.
     pub cpu: CpuStages,

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use bevy_ecs::resource::Resource;
 
 use crate::RenderError;
-use crate::background::Background;
+use crate::worker_thread::WorkerThread;
 
 /// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
 #[derive(Resource, Clone, Debug)]
@@ -21,7 +21,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     lost: Arc<AtomicBool>,
     fault: Arc<Mutex<Option<String>>>,
-    background: Arc<Background>,
+    worker_thread: Arc<WorkerThread>,
 }
 
 /// A field of `wgpu::Limits` by name, how it is read, and the least that will do.
@@ -74,8 +74,8 @@ impl Gpu {
                 return Err(RenderError::DeviceTooSmall { limit, least, found });
             }
         }
-        let (lost, fault, background) = Default::default();
-        let gpu = Self { instance, adapter, device, queue, lost, fault, background };
+        let (lost, fault, worker_thread) = Default::default();
+        let gpu = Self { instance, adapter, device, queue, lost, fault, worker_thread };
         let noted = gpu.notes();
         gpu.device.set_device_lost_callback(move |reason, message| {
             tracing::warn!("the GPU device is lost ({reason:?}): {message}");
@@ -158,8 +158,8 @@ impl Gpu {
     }
 
     /// Where pipelines are made that no frame waits for.
-    pub(crate) fn background(&self) -> &Background {
-        &self.background
+    pub(crate) fn worker_thread(&self) -> &WorkerThread {
+        &self.worker_thread
     }
 
     /// Whether the device is gone: make another `Gpu` and another renderer.

@@ -34,7 +34,6 @@
 //! # Ok::<(), lumbre_render::RenderError>(())
 //! ```
 
-mod background;
 mod cluster_buffers;
 mod deferred;
 mod draws;
@@ -74,6 +73,7 @@ mod target;
 mod texture_sets;
 mod textures;
 mod window_surface;
+mod worker_thread;
 mod world_watch;
 
 pub use {bevy_ecs, glam, wgpu};

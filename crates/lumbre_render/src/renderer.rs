@@ -33,8 +33,8 @@ use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::world_watch::WorldWatch;
 use crate::{
-    CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, Measure, RenderError,
-    Statistics,
+    CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, LitPasses, Measure,
+    RenderError, Statistics,
 };
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
@@ -487,7 +487,7 @@ impl Renderer {
         };
         Ok(Statistics {
             light_lists,
-            lit_passes: decided.lit_passes(),
+            lit_passes: LitPasses::default(),
             cpu: *cpu,
             lights: lights.set.every.all,
             static_lights: lights.set.every.all - lights.set.every.dynamic,
@@ -549,6 +549,9 @@ impl Renderer {
         let drawn = run_graph(&mut self.executor, &self.gpu, effects, (target, &light), &mut scene, overlay)?;
         self.gpu.check()?;
         frame.statistics.cpu.encoding_ms = clock.lap();
+        if options.measure != Measure::Nothing {
+            frame.statistics.lit_passes = decided.lit_passes();
+        }
         frame.statistics.cpu.total_ms = milliseconds(clock.begun);
         frame.drawn = Some((Arc::clone(&drawn.plan), target.texture.clone()));
         let report = FrameReport {

@@ -6,11 +6,12 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::grey;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{
     Image, MaterialTextures, Mesh, Name, Sampler, StaticObject, TextureReference, Transform, Wrap,
 };
@@ -19,12 +20,6 @@ fn run(world: &mut World, side: u32) -> BakeReport {
     let options =
         BakeOptions { density: Density::MapSize(side), quality: Quality::Final, ..BakeOptions::default() };
     bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
-
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
 }
 
 /// A horizontal square of a side about a place, looking up or down.
@@ -61,8 +56,8 @@ fn a_tiny_bright_emitter() {
     // A millimetre across, a million times as bright as a lamp of a metre: E = L A cos⁴ θ / h², the rest of its size being 10⁻⁶.
     let (side, radiance, height) = (1e-3f32, 1e6f32, 1.0f32);
     let mut world = World::new();
-    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.5, 0.0));
-    spawn(&mut world, square(Vec3::new(0.0, height, 0.0), side, false), matt(0.0, radiance));
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.5, 0.0));
+    spawn(&mut world, square(Vec3::new(0.0, height, 0.0), side, false), grey(0.0, radiance));
     run(&mut world, 64);
     let power = f64::from(radiance) * f64::from(side).powi(2);
     let found = common::compare(&mut world, &points(0.0, |p| power / (1.0 + p.x * p.x + p.z * p.z).powi(2)));
@@ -79,8 +74,8 @@ fn no_fireflies_of_a_tiny_emitter() {
         let mut room = shapes::cuboid(Vec3::new(3.0, 2.0, 2.0), 1);
         room.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
         room.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        spawn(&mut world, room, matt(0.7, 0.0));
-        spawn(&mut world, square(Vec3::new(0.4, 0.5, 0.1), side, false), matt(0.0, 1.0 / (side * side)));
+        spawn(&mut world, room, grey(0.7, 0.0));
+        spawn(&mut world, square(Vec3::new(0.4, 0.5, 0.1), side, false), grey(0.0, 1.0 / (side * side)));
         world
     });
     let [a, b] = [&mut tiny, &mut small].map(|world| run(world, 48));
@@ -108,12 +103,12 @@ fn light_ratios_of_a_hundred_million() {
     let floor = |x: f32| square(Vec3::new(x, 0.0, 0.0), 1.6, true);
     let mut world = World::new();
     for (x, radiance) in [(-1.0, 1.0f32), (1.0, 1e8)] {
-        spawn(&mut world, floor(x), matt(0.0, 0.0));
-        spawn(&mut world, square(Vec3::new(x, 0.8, 0.0), 0.5, false), matt(0.0, radiance));
+        spawn(&mut world, floor(x), grey(0.0, 0.0));
+        spawn(&mut world, square(Vec3::new(x, 0.8, 0.0), 0.5, false), grey(0.0, radiance));
     }
     let mut wall = square(Vec3::ZERO, 4.0, true);
     wall.positions.iter_mut().for_each(|p| *p = Vec3::new(0.0, p.x, p.z));
-    spawn(&mut world, wall, Material { double_sided: true, ..matt(0.0, 0.0) });
+    spawn(&mut world, wall, Material { double_sided: true, ..grey(0.0, 0.0) });
     run(&mut world, 64);
     for (x, radiance) in [(-1.0, 1.0), (1.0, 1e8)] {
         let value = |p: DVec3| PI * radiance * common::to_square(p.x - x, p.z, 0.5, 0.8);
@@ -128,7 +123,7 @@ fn bright_and_dim_lights_side_by_side() {
     // 20 point lights, each a tenth of the one before, under a plate that hides all but the dimmest and the sum of the others:
     // more than have samples of their own.
     let mut world = World::new();
-    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let strengths: Vec<f32> = (0..20).map(|i| 0.4f32.powi(i)).collect();
     for (i, &strength) in strengths.iter().enumerate() {
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(strength)) };
@@ -152,10 +147,10 @@ fn a_lamp_of_ten_thousand_triangles() {
     // A sphere of one radiance sends E = π L (r/d)² cos θ wherever it is whole above the horizon.
     let (radius, height, radiance) = (0.15f32, 1.0f32, 10.0f32);
     let mut world = World::new();
-    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let mut ball = shapes::uv_sphere(radius, 100, 51);
     ball.positions.iter_mut().for_each(|p| p.y += height);
-    spawn(&mut world, ball, matt(0.0, radiance));
+    spawn(&mut world, ball, grey(0.0, radiance));
     let report = run(&mut world, 64);
     let value = |p: DVec3| {
         let d = p.x.hypot(p.z).hypot(f64::from(height));
@@ -189,9 +184,9 @@ fn emission_that_varies_by_texture() {
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
     let (side, height) = (1.0f64, 0.2f64);
     let mut world = World::new();
-    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let lamp = Mesh(Arc::new(square(Vec3::new(0.0, height as f32, 0.0), side as f32, false)));
-    world.spawn((lamp, matt(0.0, 1.0), textures, StaticObject));
+    world.spawn((lamp, grey(0.0, 1.0), textures, StaticObject));
     let report = run(&mut world, 96);
     let look_up = |u: f64, v: f64| {
         let (x, y) = (u * N as f64 - 0.5, v * N as f64 - 0.5);
@@ -237,10 +232,10 @@ fn one_texel(side: u32) -> (World, BakeReport) {
         scale: Vec2::ONE,
     };
     let mut world = World::new();
-    spawn(&mut world, square(Vec3::ZERO, 1.6, true), matt(0.0, 0.0));
+    spawn(&mut world, square(Vec3::ZERO, 1.6, true), grey(0.0, 0.0));
     let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
     // As bright as it is small.
-    let lamp = matt(0.0, (side * side) as f32);
+    let lamp = grey(0.0, (side * side) as f32);
     let mesh = Mesh(Arc::new(square(Vec3::Y, 1.0, false)));
     world.spawn((Name::new("screen"), mesh, lamp, textures, StaticObject));
     let report = run(&mut world, 24);

@@ -5,24 +5,19 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{AlphaMode, BakeMode, Light, Material, Surface};
+use lumbre_optics::{AlphaMode, BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
 fn run(world: &mut World) -> BakeReport {
     let options =
         BakeOptions { density: Density::MapSize(24), quality: Quality::Draft, ..BakeOptions::default() };
     bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
-
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
 }
 
 fn spawn(world: &mut World, mesh: TriangleMesh, material: Material, place: Transform) -> Entity {
@@ -52,16 +47,16 @@ fn degenerate_triangles_are_dropped_by_name() {
     mesh.normals = vec![Vec3::ZERO, Vec3::NAN, Vec3::Y, Vec3::NEG_Y, Vec3::Y, Vec3::Y, Vec3::Y];
     mesh.indices.extend([0, 1, 4, 0, 1, 1, 5, 5, 5, 0, 1, 6]);
     let mut world = World::new();
-    let floor = spawn(&mut world, mesh, matt(0.5, 0.0), Transform::IDENTITY);
+    let floor = spawn(&mut world, mesh, grey(0.5, 0.0), Transform::IDENTITY);
     world.entity_mut(floor).insert(Name::new("bad floor"));
-    spawn(&mut world, square(1.0, false), matt(0.5, 1.0), Transform::IDENTITY);
+    spawn(&mut world, square(1.0, false), grey(0.5, 1.0), Transform::IDENTITY);
     let report = run(&mut world);
     for part in ["bad floor: 2 triangles with NaN", "bad floor: 2 triangles without area"] {
         assert!(report.warnings.iter().any(|line| line.contains(part)), "{:?}", report.warnings);
     }
     let mut good = World::new();
-    let reference = spawn(&mut good, square(0.0, true), matt(0.5, 0.0), Transform::IDENTITY);
-    spawn(&mut good, square(1.0, false), matt(0.5, 1.0), Transform::IDENTITY);
+    let reference = spawn(&mut good, square(0.0, true), grey(0.5, 0.0), Transform::IDENTITY);
+    spawn(&mut good, square(1.0, false), grey(0.5, 1.0), Transform::IDENTITY);
     run(&mut good);
     assert!(mean(&world, floor) > 0.5 && mean(&good, reference) > 0.5);
     // The same light at the same places, though the maps differ in their layout.
@@ -85,8 +80,8 @@ fn degenerate_triangles_are_dropped_by_name() {
 #[test]
 fn reflectance_above_one_is_clamped_with_a_warning() {
     let mut world = World::new();
-    let floor = spawn(&mut world, square(0.0, true), matt(3.0, 0.0), Transform::IDENTITY);
-    spawn(&mut world, square(1.0, false), matt(3.0, 1.0), Transform::IDENTITY);
+    let floor = spawn(&mut world, square(0.0, true), grey(3.0, 0.0), Transform::IDENTITY);
+    spawn(&mut world, square(1.0, false), grey(3.0, 1.0), Transform::IDENTITY);
     let report = run(&mut world);
     assert!(report.warnings.iter().any(|line| line.contains("above 0.999")), "{:?}", report.warnings);
     // ρ = 1, F = 0.415 for squares of side 2 at distance 1: B1 = F π / (1 - F²) = 1.58 at most.
@@ -98,11 +93,11 @@ fn reflectance_above_one_is_clamped_with_a_warning() {
 fn a_lamp_in_the_plane_of_the_ceiling_shines() {
     let floor_light = |with_ceiling: bool| {
         let mut world = World::new();
-        let floor = spawn(&mut world, square(0.0, true), matt(0.0, 0.0), Transform::IDENTITY);
+        let floor = spawn(&mut world, square(0.0, true), grey(0.0, 0.0), Transform::IDENTITY);
         if with_ceiling {
-            spawn(&mut world, square(1.0, false), matt(0.0, 0.0), Transform::IDENTITY);
+            spawn(&mut world, square(1.0, false), grey(0.0, 0.0), Transform::IDENTITY);
         }
-        spawn(&mut world, square(1.0, false), matt(0.0, 1.0), Transform::IDENTITY);
+        spawn(&mut world, square(1.0, false), grey(0.0, 1.0), Transform::IDENTITY);
         let report = run(&mut world);
         assert_eq!(report.warnings.iter().any(|line| line.contains("lie exactly on others")), with_ceiling);
         mean(&world, floor)
@@ -117,10 +112,10 @@ fn a_lamp_in_the_plane_of_the_ceiling_shines() {
 fn a_sheet_of_two_faces_keeps_its_sides_apart() {
     // Lit from above only; the same corners twice, cut along the other diagonal. ρ = 0.
     let mut world = World::new();
-    let top = spawn(&mut world, square(0.0, true), matt(0.0, 0.0), Transform::IDENTITY);
+    let top = spawn(&mut world, square(0.0, true), grey(0.0, 0.0), Transform::IDENTITY);
     let mut below = square(0.0, false);
     below.indices = vec![1, 2, 3, 1, 3, 0];
-    let bottom = spawn(&mut world, below, matt(0.0, 0.0), Transform::IDENTITY);
+    let bottom = spawn(&mut world, below, grey(0.0, 0.0), Transform::IDENTITY);
     let light = Light { bake: BakeMode::Static, ..Light::directional(Vec3::splat(FRAC_1_PI)) };
     let down = Transform::from_xyz(0.0, 5.0, 0.0).looking_at(DVec3::ZERO, DVec3::X);
     world.spawn((light, down));
@@ -135,7 +130,7 @@ fn a_mirror_image_keeps_its_front() {
     let light = |scale: DVec3| {
         let mut world = World::new();
         let floor =
-            spawn(&mut world, square(0.0, true), matt(0.0, 0.0), Transform::IDENTITY.with_scale(scale));
+            spawn(&mut world, square(0.0, true), grey(0.0, 0.0), Transform::IDENTITY.with_scale(scale));
         let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
         world.spawn((lamp, Transform::from_xyz(0.0, 1.0, 0.0)));
         run(&mut world);
@@ -152,7 +147,7 @@ fn instances_share_coordinates_and_have_their_own_maps() {
     let mesh = Arc::new(shapes::cuboid(Vec3::ONE, 1));
     let at = |x: f64| Transform::from_xyz(x, 0.0, 0.0);
     let [near, far] =
-        [1.5, 6.0].map(|x| world.spawn((Mesh(mesh.clone()), matt(0.5, 0.0), StaticObject, at(x))).id());
+        [1.5, 6.0].map(|x| world.spawn((Mesh(mesh.clone()), grey(0.5, 0.0), StaticObject, at(x))).id());
     let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((lamp, Transform::IDENTITY));
     run(&mut world);
@@ -165,8 +160,8 @@ fn instances_share_coordinates_and_have_their_own_maps() {
 fn what_a_mask_cuts_out_lets_light_through() {
     let below = |alpha: f32| {
         let mut world = World::new();
-        let floor = spawn(&mut world, square(0.0, true), matt(0.0, 0.0), Transform::IDENTITY);
-        let sheet = Material { alpha, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..matt(0.0, 0.0) };
+        let floor = spawn(&mut world, square(0.0, true), grey(0.0, 0.0), Transform::IDENTITY);
+        let sheet = Material { alpha, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..grey(0.0, 0.0) };
         spawn(&mut world, square(0.5, true), sheet, Transform::IDENTITY);
         let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
         world.spawn((lamp, Transform::from_xyz(0.0, 1.0, 0.0)));

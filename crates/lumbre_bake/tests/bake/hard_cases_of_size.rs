@@ -6,12 +6,13 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{Material, Surface};
+use lumbre_optics::Material;
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
 fn run(world: &mut World, side: u32) -> BakeReport {
@@ -21,12 +22,6 @@ fn run(world: &mut World, side: u32) -> BakeReport {
 fn run_with(world: &mut World, side: u32, quality: Quality) -> BakeReport {
     let options = BakeOptions { density: Density::MapSize(side), quality, ..BakeOptions::default() };
     bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
-
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
 }
 
 /// A box seen from inside.
@@ -81,7 +76,7 @@ fn no_ray_hits_the_face_it_left_from_a_millimetre_to_a_hundred_kilometres() {
         for away in [0.0, 50.0] {
             let mut world = World::new();
             let at = DVec3::new(1.0, -0.3, 0.7) * (away * f64::from(size));
-            let entity = spawn(&mut world, room(Vec3::new(1.0, 0.6, 0.8) * size), matt(REFLECTANCE, 1.0), at);
+            let entity = spawn(&mut world, room(Vec3::new(1.0, 0.6, 0.8) * size), grey(REFLECTANCE, 1.0), at);
             let report = run(&mut world, 24);
             for e in lit(&world, entity) {
                 // Rows of the form factors sum to one within 2e-3 before they are multiplied by 1/(1 - ρ).
@@ -101,10 +96,10 @@ fn a_lamp_a_thousandth_of_the_room_gives_all_its_light_and_no_sparks() {
     const REFLECTANCE: f32 = 0.5;
     for quality in [Quality::Draft, Quality::Final] {
         let mut world = World::new();
-        spawn(&mut world, room(Vec3::splat(2.0)), matt(REFLECTANCE, 0.0), DVec3::ZERO);
+        spawn(&mut world, room(Vec3::splat(2.0)), grey(REFLECTANCE, 0.0), DVec3::ZERO);
         let side = 2e-3f32;
         let lamp = shapes::cuboid(Vec3::splat(side), 1);
-        spawn(&mut world, lamp, matt(0.0, 1e6), DVec3::new(0.1, 0.2, -0.15));
+        spawn(&mut world, lamp, grey(0.0, 1e6), DVec3::new(0.1, 0.2, -0.15));
         run_with(&mut world, 64, quality);
         let walls = on_the_walls(&mut world, 1.0);
         let all: Vec<f64> = walls.iter().flatten().copied().collect();
@@ -128,12 +123,12 @@ fn a_room_lit_a_hundred_million_times_less_than_its_neighbour_is_as_bright_as_al
     let dim_room = |bright: bool| {
         let mut world = World::new();
         let at = DVec3::new(5.0, 0.0, 0.0);
-        let dim = spawn(&mut world, room(Vec3::splat(2.0)), matt(0.5, 0.0), at);
+        let dim = spawn(&mut world, room(Vec3::splat(2.0)), grey(0.5, 0.0), at);
         let lamp = || shapes::cuboid(Vec3::splat(0.4), 1);
-        spawn(&mut world, lamp(), matt(0.3, 1.0), at + DVec3::new(0.2, 0.4, 0.1));
+        spawn(&mut world, lamp(), grey(0.3, 1.0), at + DVec3::new(0.2, 0.4, 0.1));
         if bright {
-            spawn(&mut world, room(Vec3::splat(2.0)), matt(0.6, 0.0), DVec3::ZERO);
-            spawn(&mut world, lamp(), matt(0.3, 1e8), DVec3::new(-0.2, 0.4, 0.3));
+            spawn(&mut world, room(Vec3::splat(2.0)), grey(0.6, 0.0), DVec3::ZERO);
+            spawn(&mut world, lamp(), grey(0.3, 1e8), DVec3::new(-0.2, 0.4, 0.3));
         }
         run(&mut world, 32);
         mean(&lit(&world, dim))
@@ -156,7 +151,7 @@ fn coordinates_out_of_range_and_overlapping_are_named_and_replaced() {
         // All six faces have all of the unit square.
         let mut mesh = room(Vec3::ONE);
         mesh.uv1 = mesh.uv0.iter().map(|&uv| change(uv)).collect();
-        let entity = spawn(&mut world, mesh, matt(0.5, 1.0), DVec3::ZERO);
+        let entity = spawn(&mut world, mesh, grey(0.5, 1.0), DVec3::ZERO);
         world.entity_mut(entity).insert(Name::new("papered room"));
         let report = run(&mut world, 32);
         let named = |line: &String| line.contains("papered room") && line.contains("unwrapped anew");
@@ -172,7 +167,7 @@ fn coordinates_out_of_range_and_overlapping_are_named_and_replaced() {
 fn charts_below_a_texel_have_light() {
     // A heap of triangles each far smaller than a texel, in the furnace: every one has πL/(1 - ρ), none is black.
     let mut world = World::new();
-    spawn(&mut world, room(Vec3::ONE), matt(0.5, 1.0), DVec3::ZERO);
+    spawn(&mut world, room(Vec3::ONE), grey(0.5, 1.0), DVec3::ZERO);
     let mut crumbs = TriangleMesh::default();
     for i in 0..60 {
         let turn = f64::from(i) * 2.399_963;
@@ -182,7 +177,7 @@ fn charts_below_a_texel_have_light() {
         crumbs.positions.extend(tiny.positions.iter().map(|p| *p + at.as_vec3()));
         crumbs.indices.extend(tiny.indices.iter().map(|index| index + first));
     }
-    let entity = spawn(&mut world, crumbs.clone(), matt(0.5, 1.0), DVec3::ZERO);
+    let entity = spawn(&mut world, crumbs.clone(), grey(0.5, 1.0), DVec3::ZERO);
     // A crumb's side is 1/156 of a texel.
     let options = BakeOptions {
         density: Density::TexelsPerMeter(32.0),

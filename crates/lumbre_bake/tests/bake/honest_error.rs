@@ -6,20 +6,14 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::scene_parts::matt;
 use crate::{common, held_out};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
-
-fn matt(reflectance: Vec3, emission: Vec3) -> Material {
-    Material {
-        front: Surface { diffuse: reflectance, emission, ..Surface::default() },
-        ..Material::default()
-    }
-}
 
 /// A box seen from inside.
 fn room(size: Vec3) -> Arc<TriangleMesh> {

@@ -5,26 +5,16 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::{matt, run};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{BakeError, BakeOptions, Density, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
 fn draft(side: u32) -> BakeOptions {
     BakeOptions { density: Density::MapSize(side), quality: Quality::Draft, ..BakeOptions::default() }
-}
-
-fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
-
-fn matt(reflectance: Vec3, emission: Vec3) -> Material {
-    Material {
-        front: Surface { diffuse: reflectance, emission, ..Surface::default() },
-        ..Material::default()
-    }
 }
 
 /// A box seen from inside.

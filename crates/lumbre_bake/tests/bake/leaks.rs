@@ -5,22 +5,17 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
 
 /// Side of a texel, metres.
 const TEXEL: f64 = 0.05;
-
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
-}
 
 /// Turned, so that no wall lies on numbers that are exact.
 fn place() -> Transform {
@@ -64,7 +59,7 @@ fn beyond(thickness: f32) -> (Vec3, Vec3) {
 /// A lamp under the ceiling near the wall, and a point light low beside it.
 fn add_light(world: &mut World, reflectance: f32) {
     let lamp = sides(Vec3::new(-0.6, 1.3, -0.3), Vec3::new(-0.2, 1.35, 0.3), false, |_| true);
-    spawn(world, lamp, matt(reflectance, 8.0));
+    spawn(world, lamp, grey(reflectance, 8.0));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(0.2)) };
     let place = place();
     let at = place.rotation * DVec3::new(-0.15, 0.2, 0.4) + place.translation;
@@ -156,7 +151,7 @@ fn compare_with_alone(world: &World, room: Entity, alone: &World, same: Entity) 
 /// The lit room by itself: `walls` says which sides it has of its own.
 fn alone(keep: impl Fn(Vec3) -> bool, wall: Option<(TriangleMesh, Material)>) -> (World, Entity) {
     let mut world = World::new();
-    let room = spawn(&mut world, sides(LOW, HIGH, true, keep), matt(0.6, 0.0));
+    let room = spawn(&mut world, sides(LOW, HIGH, true, keep), grey(0.6, 0.0));
     if let Some((mesh, material)) = wall {
         spawn(&mut world, mesh, material);
     }
@@ -169,9 +164,9 @@ fn alone(keep: impl Fn(Vec3) -> bool, wall: Option<(TriangleMesh, Material)>) ->
 fn two_closed_boxes_share_a_wall() {
     for thickness in [0.0, 0.01] {
         let mut world = World::new();
-        let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), matt(0.6, 0.0));
+        let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), grey(0.6, 0.0));
         let (low, high) = beyond(thickness);
-        let dark = spawn(&mut world, sides(low, high, true, |_| true), matt(0.6, 0.0));
+        let dark = spawn(&mut world, sides(low, high, true, |_| true), grey(0.6, 0.0));
         add_light(&mut world, 0.5);
         let report = run(&mut world);
         assert!(brightest(&world, room) > 1.0);
@@ -192,13 +187,13 @@ fn but_towards(x: f32) -> impl Fn(Vec3) -> bool {
 #[test]
 fn a_wall_of_zero_thickness_and_two_sides() {
     let mut world = World::new();
-    let room = spawn(&mut world, sides(LOW, HIGH, true, but_towards(1.0)), matt(0.6, 0.0));
+    let room = spawn(&mut world, sides(LOW, HIGH, true, but_towards(1.0)), grey(0.6, 0.0));
     let (low, high) = beyond(0.0);
-    let dark = spawn(&mut world, sides(low, high, true, but_towards(-1.0)), matt(0.6, 0.0));
+    let dark = spawn(&mut world, sides(low, high, true, but_towards(-1.0)), grey(0.6, 0.0));
     // Its front looks into the dark room: a map shows fronts.
     let wall = || {
         let mesh = sides(LOW, HIGH, false, |normal| normal.x > 0.5);
-        (mesh, Material { double_sided: true, ..matt(0.6, 0.0) })
+        (mesh, Material { double_sided: true, ..grey(0.6, 0.0) })
     };
     let (mesh, material) = wall();
     let wall_between = spawn(&mut world, mesh, material);
@@ -217,11 +212,11 @@ fn a_wall_of_zero_thickness_and_two_sides() {
 fn a_wall_a_centimetre_thick_between_texels_of_five() {
     let thickness = 0.01;
     let mut world = World::new();
-    let room = spawn(&mut world, sides(LOW, HIGH, true, but_towards(1.0)), matt(0.6, 0.0));
+    let room = spawn(&mut world, sides(LOW, HIGH, true, but_towards(1.0)), grey(0.6, 0.0));
     let (low, high) = beyond(thickness);
-    let dark = spawn(&mut world, sides(low, high, true, but_towards(-1.0)), matt(0.6, 0.0));
+    let dark = spawn(&mut world, sides(low, high, true, but_towards(-1.0)), grey(0.6, 0.0));
     let wall = || sides(Vec3::new(0.0, LOW.y, LOW.z), Vec3::new(thickness, HIGH.y, HIGH.z), false, |_| true);
-    let wall_between = spawn(&mut world, wall(), matt(0.6, 0.0));
+    let wall_between = spawn(&mut world, wall(), grey(0.6, 0.0));
     add_light(&mut world, 0.5);
     run(&mut world);
     assert!(brightest(&world, room) > 1.0);
@@ -232,7 +227,7 @@ fn a_wall_a_centimetre_thick_between_texels_of_five() {
     let found = look_up(&world, wall_between);
     assert!(found.iter().filter(towards_dark).count() > 1000);
     assert!(found.iter().filter(towards_dark).all(|found| found.irradiance == 0.0));
-    let (single, same) = alone(but_towards(1.0), Some((wall(), matt(0.6, 0.0))));
+    let (single, same) = alone(but_towards(1.0), Some((wall(), grey(0.6, 0.0))));
     let (share, ratio) = compare_with_alone(&world, room, &single, same);
     println!("{share:.4} within two stated errors; difference over stated: {ratio:.2}");
     assert!(share >= 0.95 && ratio <= 1.0, "{share} {ratio}");
@@ -250,17 +245,17 @@ fn under_a_wall(thickness: f32, reflectance: f32, steps: &[f64]) -> (Vec<f64>, f
     let no_floor = |normal: Vec3| normal.y > -0.5;
     let lit = move |normal: Vec3| no_floor(normal) && normal.x < 0.5;
     let other = move |normal: Vec3| no_floor(normal) && normal.x > -0.5;
-    spawn(&mut world, sides(LOW, HIGH, true, lit), matt(reflectance, 0.0));
+    spawn(&mut world, sides(LOW, HIGH, true, lit), grey(reflectance, 0.0));
     let (low, high) = beyond(thickness);
-    let dark = spawn(&mut world, sides(low, high, true, other), matt(reflectance, 0.0));
+    let dark = spawn(&mut world, sides(low, high, true, other), grey(reflectance, 0.0));
     let below = Vec3::new(high.x, LOW.y + 1.0, high.z);
-    let floor = spawn(&mut world, sides(LOW, below, true, |normal| normal.y < -0.5), matt(reflectance, 0.0));
+    let floor = spawn(&mut world, sides(LOW, below, true, |normal| normal.y < -0.5), grey(reflectance, 0.0));
     if thickness > 0.0 {
         let corner = Vec3::new(thickness, HIGH.y, HIGH.z);
-        spawn(&mut world, sides(LOW.with_x(0.0), corner, false, |_| true), matt(reflectance, 0.0));
+        spawn(&mut world, sides(LOW.with_x(0.0), corner, false, |_| true), grey(reflectance, 0.0));
     } else {
         let wall = sides(LOW, HIGH, false, |normal| normal.x > 0.5);
-        spawn(&mut world, wall, Material { double_sided: true, ..matt(reflectance, 0.0) });
+        spawn(&mut world, wall, Material { double_sided: true, ..grey(reflectance, 0.0) });
     }
     add_light(&mut world, reflectance);
     run_with(&mut world, Quality::Final);
@@ -299,11 +294,11 @@ fn a_floor_that_runs_through_under_the_wall_leaks_a_texel_at_most() {
 #[test]
 fn what_stands_on_what_stands_on_the_floor() {
     let mut world = World::new();
-    spawn(&mut world, sides(LOW, HIGH, true, |_| true), matt(0.6, 0.0));
+    spawn(&mut world, sides(LOW, HIGH, true, |_| true), grey(0.6, 0.0));
     let lower = (Vec3::new(-1.6, 0.0, -0.5), Vec3::new(-0.9, 0.3, 0.4));
     let upper = (Vec3::new(-1.5, 0.3, -0.3), Vec3::new(-1.1, HIGH.y, 0.3));
     let [lower, upper] = [lower, upper]
-        .map(|(low, high)| (spawn(&mut world, sides(low, high, false, |_| true), matt(0.6, 0.0)), low, high));
+        .map(|(low, high)| (spawn(&mut world, sides(low, high, false, |_| true), grey(0.6, 0.0)), low, high));
     add_light(&mut world, 0.5);
     let report = run(&mut world);
     for ((entity, low, high), heights) in [(lower, vec![0.0]), (upper, vec![0.3, f64::from(HIGH.y)])] {
@@ -339,8 +334,8 @@ fn what_stands_on_what_stands_on_the_floor() {
 #[test]
 fn a_house_of_zero_thickness_is_lit_on_both_sides() {
     let mut world = World::new();
-    let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), matt(0.6, 0.0));
-    let house = spawn(&mut world, sides(LOW, HIGH, false, |_| true), matt(0.6, 0.0));
+    let room = spawn(&mut world, sides(LOW, HIGH, true, |_| true), grey(0.6, 0.0));
+    let house = spawn(&mut world, sides(LOW, HIGH, false, |_| true), grey(0.6, 0.0));
     add_light(&mut world, 0.5);
     let alone = run(&mut world);
     assert!(brightest(&world, room) > 1.0 && alone.leaked_rays < 1000, "{}", alone.leaked_rays);

@@ -31,6 +31,7 @@ mod real_client;
 mod rebake;
 mod reference_irradiance;
 mod resolution_error;
+mod scene_parts;
 mod seams;
 mod sky;
 mod soft_shadows;

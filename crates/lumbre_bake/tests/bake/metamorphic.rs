@@ -1,22 +1,18 @@
 //! What must not change a bake, or by no more than its stated error: threads, scale, rotation, triangles, things that light never meets.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{BakeOptions, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
 
 use crate::held_out::scenes;
+use crate::scene_parts::run;
 use crate::{common, held_out};
-
-fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
 
 fn draft() -> BakeOptions {
     BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() }

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Mesh, SceneSettings, StaticObject, Transform};
 
 use crate::held_out::path_tracer::{Effort, PathTracer};
 use crate::held_out::reference_points::read;
 use crate::held_out::scenes::{self, region::Region};
+use crate::scene_parts::grey;
 use crate::{common, held_out};
 
 #[test]
@@ -49,14 +50,8 @@ fn agrees_with_another_path_tracer() {
     }
 }
 
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
-}
-
 fn floor(world: &mut World) {
-    world.spawn((Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1))), matt(0.5, 0.0), StaticObject));
+    world.spawn((Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1))), grey(0.5, 0.0), StaticObject));
 }
 
 /// Points of the floor about the origin.
@@ -85,7 +80,7 @@ fn sun_and_sky() {
         let positions = corners.map(Vec3::from).to_vec();
         Mesh(Arc::new(TriangleMesh { positions, indices: order, ..TriangleMesh::default() }))
     };
-    world.spawn((wall(vec![0, 1, 2, 0, 2, 3]), matt(0.0, 0.0), StaticObject));
+    world.spawn((wall(vec![0, 1, 2, 0, 2, 3]), grey(0.0, 0.0), StaticObject));
     world.insert_resource(SceneSettings { sky: Vec3::splat(2.0), ..SceneSettings::default() });
     let sun = Light { bake: BakeMode::Static, ..Light::directional(Vec3::splat(3.0)) };
     world.spawn((sun, Transform::IDENTITY.looking_at(DVec3::new(1.0, -1.0, 0.0), DVec3::Y)));
@@ -142,8 +137,8 @@ fn many_lamps_as_their_sum() {
         radiance * side * side * places.iter().map(term).sum::<f64>()
     };
     let mut world = World::new();
-    world.spawn((Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1))), matt(0.0, 0.0), StaticObject));
-    world.spawn((Mesh(Arc::new(lamps)), matt(0.0, radiance as f32), StaticObject));
+    world.spawn((Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1))), grey(0.0, 0.0), StaticObject));
+    world.spawn((Mesh(Arc::new(lamps)), grey(0.0, radiance as f32), StaticObject));
     let found = PathTracer::new(&mut world).at(&on_the_floor(), Effort::fixed(16, 16), 3);
     let relative = found.iter().map(|p| p.error.x / p.value.x).fold(0.0, f64::max);
     let off = sigmas(&found, square);
@@ -151,7 +146,7 @@ fn many_lamps_as_their_sum() {
     assert!(off < 1.6 && relative < 0.01, "{off} {relative}");
 
     let mut world = World::new();
-    world.spawn((Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1))), matt(0.0, 0.0), StaticObject));
+    world.spawn((Mesh(Arc::new(shapes::plane(20.0, 20.0, 1, 1))), grey(0.0, 0.0), StaticObject));
     for at in &places {
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(1e-2)) };
         world.spawn((light, Transform::from_translation(*at)));

@@ -3,28 +3,18 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::scene_parts::{matt, run};
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec3, Vec3};
 use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{DynamicObject, EmissiveLight, IrradianceVolume, Mesh, Name, StaticObject, Transform};
 
 const SIDES: [DVec3; 6] = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
 
 fn draft() -> BakeOptions {
     BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() }
-}
-
-fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
-
-fn matt(reflectance: Vec3, emission: Vec3) -> Material {
-    Material {
-        front: Surface { diffuse: reflectance, emission, ..Surface::default() },
-        ..Material::default()
-    }
 }
 
 /// A box seen from inside.

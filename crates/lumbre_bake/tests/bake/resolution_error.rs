@@ -1,22 +1,16 @@
 //! The error that the map's resolution leaves, as the bake estimates it, against closed forms.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::{grey, run};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{BakeOptions, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Mesh, Name, StaticObject, Transform};
-
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
-}
 
 /// A rectangle that looks up.
 fn plane(x: [f32; 2], y: f32, z: [f32; 2]) -> Mesh {
@@ -36,9 +30,9 @@ fn shadow() -> World {
     let mut world = World::new();
     let half = HALF as f32;
     let name = |name: &str| Name::new(name.to_owned());
-    world.spawn((name("floor"), plane([-half, half], 0.0, [-half, half]), matt(0.0, 0.0), StaticObject));
+    world.spawn((name("floor"), plane([-half, half], 0.0, [-half, half]), grey(0.0, 0.0), StaticObject));
     let board = plane([-half, EDGE as f32], HEIGHT as f32, [-half, half]);
-    world.spawn((name("board"), board, Material { double_sided: true, ..matt(0.0, 0.0) }, StaticObject));
+    world.spawn((name("board"), board, Material { double_sided: true, ..grey(0.0, 0.0) }, StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(LIGHT.x, LIGHT.y, LIGHT.z)));
     world
@@ -64,10 +58,6 @@ fn reference(count: u32) -> Vec<common::ReferencePoint> {
         common::ReferencePoint { position, normal: DVec3::Y, irradiance: DVec3::splat(light) }
     };
     points(count, [-HALF, HALF], 0.0).chain(points(boards, [-HALF, EDGE], HEIGHT)).map(lit).collect()
-}
-
-fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
 }
 
 #[test]
@@ -104,7 +94,7 @@ fn nothing_is_lost_where_light_is_the_same_everywhere() {
     let mut mesh = shapes::cuboid(Vec3::new(2.0, 1.0, 1.5), 1);
     mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
     mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    world.spawn((Mesh(Arc::new(mesh)), matt(0.6, 1.0), StaticObject));
+    world.spawn((Mesh(Arc::new(mesh)), grey(0.6, 1.0), StaticObject));
     let options =
         BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() };
     let report = run(&mut world, &options);

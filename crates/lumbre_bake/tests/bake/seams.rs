@@ -1,27 +1,18 @@
 //! Seams: both sides of a smooth border show the same light, corners and walls stay apart, and nothing else moves.
 
 use std::f64::consts::PI;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::common;
+use crate::scene_parts::{grey, run};
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
+use lumbre_bake::{BakeOptions, Density, LightmapError, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
-
-fn matt(reflectance: f32, emission: f32) -> Material {
-    let front =
-        Surface { diffuse: Vec3::splat(reflectance), emission: Vec3::splat(emission), ..Surface::default() };
-    Material { front, ..Material::default() }
-}
-
-fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
-}
 
 /// A rectangle of the floor that looks up, with a rectangle of the map.
 fn add_quad(mesh: &mut TriangleMesh, x: [f32; 2], z: [f32; 2], u: [f32; 2], v: [f32; 2]) {
@@ -82,7 +73,7 @@ fn border() -> impl Iterator<Item = DVec3> {
 fn charts_of_different_density_meet() {
     let baked = [false, true].map(|seams| {
         let mut world = World::new();
-        let floor = world.spawn((cut_floor(), matt(0.0, 0.0), StaticObject)).id();
+        let floor = world.spawn((cut_floor(), grey(0.0, 0.0), StaticObject)).id();
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
         world.spawn((light, Transform::from_xyz(0.1, 0.35, 0.2)));
         let report = run(&mut world, &BakeOptions { seams, ..side_of_48() });
@@ -115,11 +106,11 @@ fn a_sphere_of_many_charts_has_no_seams() {
     let baked = [false, true].map(|seams| {
         let mut world = World::new();
         let ball = Mesh(Arc::new(shapes::tetrahedral_sphere(0.5, 4, false)));
-        world.spawn((Name::new("ball"), ball, matt(0.6, 0.0), StaticObject));
+        world.spawn((Name::new("ball"), ball, grey(0.6, 0.0), StaticObject));
         let mut lamp = shapes::cuboid(Vec3::new(2.0, 0.1, 2.0), 1);
         lamp.uv1.clear();
         let above = Transform::from_xyz(0.3, 1.2, 0.1);
-        world.spawn((Name::new("lamp"), Mesh(Arc::new(lamp)), matt(0.5, 3.0), StaticObject, above));
+        world.spawn((Name::new("lamp"), Mesh(Arc::new(lamp)), grey(0.5, 3.0), StaticObject, above));
         let report = run(&mut world, &BakeOptions { seams, ..side_of_48() });
         (report, common::maps(&mut world))
     });
@@ -146,9 +137,9 @@ fn abutting_objects_of_their_own_maps_meet() {
     };
     let baked = [false, true].map(|seams| {
         let mut world = World::new();
-        let long = world.spawn((tile([-2.0, 0.0], [-1.0, 1.0]), matt(0.5, 0.0), StaticObject)).id();
+        let long = world.spawn((tile([-2.0, 0.0], [-1.0, 1.0]), grey(0.5, 0.0), StaticObject)).id();
         let short = [[-1.0, 0.3], [0.3, 1.0]]
-            .map(|z| world.spawn((tile([0.0, 0.7], z), matt(0.5, 0.0), StaticObject)).id());
+            .map(|z| world.spawn((tile([0.0, 0.7], z), grey(0.5, 0.0), StaticObject)).id());
         let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
         world.spawn((light, Transform::from_xyz(-0.1, 0.2, 0.1)));
         let density = Density::TexelsPerMeter(9.0);
@@ -173,7 +164,7 @@ fn a_corner_is_not_a_seam() {
     room.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
     room.normals.iter_mut().for_each(|normal| *normal = -*normal);
     let mut world = World::new();
-    world.spawn((Mesh(Arc::new(room)), matt(0.5, 0.0), StaticObject));
+    world.spawn((Mesh(Arc::new(room)), grey(0.5, 0.0), StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(0.5, 0.5, 0.2)));
     let report = run(&mut world, &side_of_48());
@@ -185,7 +176,7 @@ fn a_corner_is_not_a_seam() {
 #[test]
 fn a_wall_on_the_seam_keeps_the_sides_apart() {
     let mut world = World::new();
-    let floor = world.spawn((cut_floor(), matt(0.5, 0.0), StaticObject)).id();
+    let floor = world.spawn((cut_floor(), grey(0.5, 0.0), StaticObject)).id();
     let wall = TriangleMesh {
         positions: [[0.0, -1.0], [0.0, 1.0], [4.0, 1.0], [4.0, -1.0]]
             .map(|[y, z]| Vec3::new(0.0, y, z))
@@ -193,7 +184,7 @@ fn a_wall_on_the_seam_keeps_the_sides_apart() {
         indices: vec![0, 1, 2, 0, 2, 3],
         ..TriangleMesh::default()
     };
-    let wall_material = Material { double_sided: true, ..matt(0.5, 0.0) };
+    let wall_material = Material { double_sided: true, ..grey(0.5, 0.0) };
     world.spawn((Mesh(Arc::new(wall)), wall_material, StaticObject));
     let light = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
     world.spawn((light, Transform::from_xyz(-0.5, 0.5, 0.1)));
@@ -210,10 +201,10 @@ fn a_sharp_shadow_across_the_seam_stays_sharp() {
     // A roof over z < 0.05; light straight from above: E = 1 beside it, 0 under it.
     let baked = [false, true].map(|seams| {
         let mut world = World::new();
-        let floor = world.spawn((cut_floor(), matt(0.0, 0.0), StaticObject)).id();
+        let floor = world.spawn((cut_floor(), grey(0.0, 0.0), StaticObject)).id();
         let mut roof = TriangleMesh::default();
         add_quad(&mut roof, [-3.0, 3.0], [-2.0, 0.05], [0.0, 1.0], [0.0, 1.0]);
-        world.spawn((Mesh(Arc::new(roof)), matt(0.0, 0.0), StaticObject, Transform::from_xyz(0.0, 1.0, 0.0)));
+        world.spawn((Mesh(Arc::new(roof)), grey(0.0, 0.0), StaticObject, Transform::from_xyz(0.0, 1.0, 0.0)));
         let sun = Light { bake: BakeMode::Static, ..Light::directional(Vec3::splat(1.0 / PI as f32)) };
         world.spawn((sun, Transform::from_xyz(0.0, 5.0, 0.0).looking_at(DVec3::ZERO, DVec3::X)));
         let report = run(&mut world, &side_of_48());
@@ -253,14 +244,14 @@ fn scene(scale: f32) -> World {
     let mut world = World::new();
     let mut floor = cut_floor().0.as_ref().clone();
     floor.positions.iter_mut().for_each(|p| *p *= scale);
-    world.spawn((Name::new("floor"), Mesh(Arc::new(floor)), matt(0.5, 0.0), StaticObject));
+    world.spawn((Name::new("floor"), Mesh(Arc::new(floor)), grey(0.5, 0.0), StaticObject));
     let at = |x: f32, y: f32, z: f32| {
         Transform::from_xyz(f64::from(x * scale), f64::from(y * scale), f64::from(z * scale))
     };
     let ball = Mesh(Arc::new(shapes::tetrahedral_sphere(0.25 * scale, 3, false)));
-    world.spawn((Name::new("ball"), ball, matt(0.5, 0.0), StaticObject, at(0.5, 0.5, 0.25)));
+    world.spawn((Name::new("ball"), ball, grey(0.5, 0.0), StaticObject, at(0.5, 0.5, 0.25)));
     let lamp = Mesh(Arc::new(shapes::cuboid(Vec3::new(0.5, 0.125, 0.5) * scale, 1)));
-    world.spawn((Name::new("lamp"), lamp, matt(0.25, 5.0), StaticObject, at(-0.25, 1.0, 0.0)));
+    world.spawn((Name::new("lamp"), lamp, grey(0.25, 5.0), StaticObject, at(-0.25, 1.0, 0.0)));
     world
 }
 

@@ -9,22 +9,22 @@ type Job = Box<dyn FnOnce() + Send>;
 
 /// The thread, started when there is something to do.
 #[derive(Debug, Default)]
-pub(crate) struct Background(Mutex<Option<Worker>>);
+pub(crate) struct WorkerThread(Mutex<Option<Running>>);
 
 #[derive(Debug)]
-struct Worker {
+struct Running {
     jobs: Sender<Job>,
     /// What is still to be done is wanted by nobody.
     ends: Arc<AtomicBool>,
     thread: JoinHandle<()>,
 }
 
-impl Background {
+impl WorkerThread {
     /// Does it after what was handed over before; here, where there can be no thread.
     pub fn run(&self, job: Job) {
         let Ok(mut worker) = self.0.lock() else { return job() };
         if worker.is_none() {
-            *worker = Worker::start();
+            *worker = Running::start();
         }
         let refused = match &*worker {
             Some(worker) => worker.jobs.send(job).err().map(|refused| refused.0),
@@ -38,9 +38,9 @@ impl Background {
     }
 }
 
-impl Drop for Background {
+impl Drop for WorkerThread {
     fn drop(&mut self) {
-        let Some(Worker { jobs, ends, thread }) = self.0.get_mut().ok().and_then(Option::take) else {
+        let Some(Running { jobs, ends, thread }) = self.0.get_mut().ok().and_then(Option::take) else {
             return;
         };
         ends.store(true, Ordering::Relaxed);
@@ -52,7 +52,7 @@ impl Drop for Background {
     }
 }
 
-impl Worker {
+impl Running {
     fn start() -> Option<Self> {
         let (jobs, queue) = channel();
         let ends = Arc::new(AtomicBool::new(false));
