@@ -5,6 +5,8 @@
 //! compiles shaders.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::MODULES;
 
@@ -80,11 +82,28 @@ impl Program<'_> {
     }
 }
 
-/// One of the embedded modules in WGSL, with exactly these features.
+/// What was compiled of the embedded modules, by root and features that are on. A program asks for the same variants again for each renderer and device; each takes
+/// milliseconds to compile, and has some tens of kilobytes.
+static COMPILED: Mutex<BTreeMap<String, Arc<str>>> = Mutex::new(BTreeMap::new());
+
+/// One of the embedded modules in WGSL, with exactly these features. Compiled once in a process.
 ///
 /// # Errors
 /// As [`Program::to_wgsl`].
-pub fn to_wgsl(root: &str, features: &[(&str, bool)]) -> Result<String, WeslError> {
+pub fn to_wgsl(root: &str, features: &[(&str, bool)]) -> Result<Arc<str>, WeslError> {
+    let on = features.iter().filter(|(_, on)| *on).map(|(name, _)| *name);
+    let key = std::iter::once(root).chain(on).collect::<Vec<_>>().join(" ");
+    // What another thread left is whole, whatever became of that thread.
+    let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(wgsl) = compiled().get(&key) {
+        return Ok(Arc::clone(wgsl));
+    }
+    let wgsl: Arc<str> = compile(root, features)?.into();
+    compiled().insert(key, Arc::clone(&wgsl));
+    Ok(wgsl)
+}
+
+fn compile(root: &str, features: &[(&str, bool)]) -> Result<String, WeslError> {
     let modules: Vec<_> = MODULES.iter().map(|(path, source)| (*path, Cow::Borrowed(*source))).collect();
     // A feature that nobody named is a slip of ours, not a feature that is off.
     let unnamed = UnnamedFeatures::AreErrors;

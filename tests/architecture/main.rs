@@ -153,6 +153,7 @@ fn what_the_documentation_names_exists() {
         "docs/testing.md",
         "docs/hard-cases.md",
         "docs/baking.md",
+        "docs/walks.md",
     ];
     for page in pages {
         let page = root.join(page);
@@ -193,4 +194,37 @@ fn what_the_documentation_names_exists() {
             (*path, names.clone())
         );
     }
+}
+
+/// The first column of each table of a page, below its heading.
+fn first_columns(page: &str) -> Vec<Vec<&str>> {
+    let mut tables = Vec::new();
+    for line in page.lines() {
+        match line.strip_prefix("| ").and_then(|row| row.split(" | ").next()) {
+            Some("file") => tables.push(Vec::new()),
+            Some(cell) => tables.last_mut().into_iter().for_each(|table: &mut Vec<&str>| table.push(cell)),
+            None => {}
+        }
+    }
+    tables
+}
+
+#[test]
+fn a_light_and_a_feature_pass_few_files() {
+    let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let page = std::fs::read_to_string(root.join("docs/walks.md")).unwrap();
+    let walks = first_columns(&page);
+    assert_eq!(walks.len(), 3, "a light, a feature, an effect");
+    for (walk, subject) in walks.iter().zip(["light", "fog", "shadow"]) {
+        assert!((4..=12).contains(&walk.len()), "{} files about {subject}", walk.len());
+        for file in walk {
+            let source =
+                std::fs::read_to_string(root.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"));
+            assert!(source.to_lowercase().contains(subject), "{file} has no word about {subject}");
+        }
+    }
+    assert_eq!(
+        first_columns("| file | what |\n|---|---|\n| a.rs | b |\n\n| file | c |\n"),
+        [vec!["a.rs"], vec![]]
+    );
 }

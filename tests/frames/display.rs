@@ -7,7 +7,9 @@ use glam::Vec3;
 use lumbre_mesh::shapes;
 use lumbre_optics::{Fog, FogMode, Light, Material, Shading};
 use lumbre_render::effects::display_color;
-use lumbre_render::{Display, FrameOptions, FrameTarget, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{
+    Display, FrameOptions, FrameTarget, Offscreen, OffscreenFormat, RenderError, Renderer, Viewport,
+};
 use lumbre_scene::{Camera, Mesh, SceneSettings, Transform};
 
 use crate::adapter::gpu;
@@ -125,5 +127,62 @@ fn a_target_that_encodes_holds_the_same_bytes() {
             let mean = plain.iter().map(|byte| f64::from(*byte)).sum::<f64>() / plain.len() as f64;
             assert!((20.0..250.0).contains(&mean), "{mean}");
         }
+    }
+}
+
+/// Rows of a part of a picture of eight bits.
+fn part(picture: &[u8], width: u32, [x, y]: [u32; 2], [columns, rows]: [u32; 2]) -> Vec<u8> {
+    let row = |row: u32| {
+        let first = 4 * (row * width + x) as usize;
+        &picture[first..first + 4 * columns as usize]
+    };
+    (y..y + rows).flat_map(row).copied().collect()
+}
+
+#[test]
+fn a_viewport_holds_the_frame_and_what_is_around_it_is_kept_or_cleared() {
+    let mut world = scene(Shading::Phong);
+    let options = FrameOptions { exposure: Some(0.7), ..FrameOptions::default() };
+    let (size, origin) = ([40, 64], [50, 20]);
+    // The frame by itself, with a display pass as in a viewport.
+    let alone = Offscreen::new(gpu(), size[0], size[1], OffscreenFormat::Rgba8).unwrap();
+    let mut renderer = Renderer::new(gpu());
+    renderer.render(&mut world, &alone.target(), &FrameOptions { probe: true, ..options.clone() }).unwrap();
+    let alone = alone.read_rgba8(gpu()).unwrap();
+
+    let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::Rgba8).unwrap();
+    renderer.render(&mut world, &target.target(), &options).unwrap();
+    let whole = target.read_rgba8(gpu()).unwrap();
+    let viewport = Viewport::new(origin, size);
+    renderer.render(&mut world, &target.target().with_viewport(viewport), &options).unwrap();
+    let within = target.read_rgba8(gpu()).unwrap();
+    assert_eq!(part(&within, SIZE, origin, size), alone);
+    let changed = |x: u32, y: u32| {
+        let pixel = 4 * (y * SIZE + x) as usize;
+        within[pixel..pixel + 4] != whole[pixel..pixel + 4]
+    };
+    for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
+        let inside =
+            (origin[0]..origin[0] + size[0]).contains(&x) && (origin[1]..origin[1] + size[1]).contains(&y);
+        assert!(inside || !changed(x, y), "{x}, {y}");
+    }
+
+    // A still World in a viewport is kept; in another one it is drawn.
+    let kept = FrameOptions { keep_unchanged: true, ..options.clone() };
+    let drawn = |renderer: &mut Renderer, world: &mut World, viewport: Viewport| {
+        let report = renderer.render(world, &target.target().with_viewport(viewport), &kept).unwrap();
+        report.plan.running().count() > 0
+    };
+    assert!(!drawn(&mut renderer, &mut world, viewport));
+    assert!(drawn(&mut renderer, &mut world, viewport.with_clear(wgpu::Color::GREEN)));
+    let cleared = target.read_rgba8(gpu()).unwrap();
+    assert_eq!(part(&cleared, SIZE, origin, size), alone);
+    assert_eq!(cleared[..4], [0, 255, 0, 255]);
+    assert_eq!(cleared[4 * (SIZE * SIZE - 1) as usize..], [0, 255, 0, 255]);
+
+    for (origin, size) in [([50, 20], [47, 64]), ([0, 0], [0, 5]), ([u32::MAX, 0], [2, 2])] {
+        let outside = target.target().with_viewport(Viewport::new(origin, size));
+        let error = renderer.render(&mut world, &outside, &options).unwrap_err();
+        assert!(matches!(error, RenderError::Viewport { .. }), "{error}");
     }
 }

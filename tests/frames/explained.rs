@@ -12,8 +12,8 @@ use lumbre_optics::{
 };
 use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer, explain};
 use lumbre_scene::{
-    Camera, EmissiveLight, Hidden, Lightmap, LightmapEncoding, LightmapImage, MaterialTextures, Mesh,
-    NormalTexture, OcclusionTexture, SceneSettings, Transform,
+    Camera, Census, ChildOf, DynamicObject, EmissiveLight, Hidden, Lightmap, LightmapEncoding, LightmapImage,
+    MaterialTextures, Mesh, NormalTexture, OcclusionTexture, SceneSettings, StaticObject, Transform,
 };
 use lumbre_tests::panes::{image, sharp};
 
@@ -184,6 +184,8 @@ fn what_is_explained_is_what_is_drawn() {
         let drawn: Vec<&str> = report.plan.running().collect();
         assert_eq!(named, drawn, "passes of World {number}");
         assert_eq!(explained.variants, renderer.drawn_variants(), "variants of World {number}");
+        assert_eq!(explained.census, *report.census, "census of World {number}");
+        assert_eq!(Census::of(&mut world), *report.census, "census of World {number}");
 
         let has = |feature: &str| {
             explained.variants.keys().any(|variant| variant.split(' ').any(|word| word == feature))
@@ -221,4 +223,99 @@ fn what_is_explained_is_what_is_drawn() {
     assert!(passes_seen.len() >= 5, "{passes_seen:?}");
     assert!(variants_seen.len() > 50, "{} variants", variants_seen.len());
     assert!(called_for.values().all(|count| *count > 0), "{called_for:?}");
+}
+
+/// Changes a component or a place in the hierarchy of some object or light.
+fn change(random: &mut Random, world: &mut World) {
+    let objects: Vec<Entity> = world.query_filtered::<Entity, With<Mesh>>().iter(world).collect();
+    let lights: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(world).collect();
+    let (Some(object), other) = (pick(random, &objects), pick(random, &objects)) else { return };
+    let light = pick(random, &lights);
+    let mut entity = world.entity_mut(object);
+    match (random.below(13), light) {
+        (0, _) => {
+            entity.insert(random_material(random));
+        }
+        (1, _) => {
+            entity.insert(Hidden);
+        }
+        (2, _) => {
+            entity.remove::<Hidden>();
+        }
+        (3, _) => {
+            entity.insert(random.one_of(Shading::ALL));
+        }
+        (4, _) => {
+            entity.remove::<(Shading, ReflectionModel, MaterialTextures)>();
+        }
+        (5, _) => {
+            entity.insert(random_textures(random));
+        }
+        (6, _) => {
+            entity.remove::<Lightmap>();
+        }
+        (7, _) => {
+            entity.insert(Mesh(Arc::new(shapes::uv_sphere(0.2, 6, 3))));
+        }
+        (8, _) => {
+            entity.insert((StaticObject, EmissiveLight));
+        }
+        (9, _) => {
+            entity.insert(DynamicObject);
+        }
+        (10, Some(light)) => {
+            world.entity_mut(light).insert(random_light(random));
+        }
+        (11, _) if objects.len() > 1 => entity.despawn(),
+        // Below something that may be hidden.
+        (_, _) if other.is_some_and(|other| other > object) => {
+            entity.insert(ChildOf(other.unwrap_or(object)));
+        }
+        _ => world.resource_mut::<SceneSettings>().two_sided ^= true,
+    }
+}
+
+fn pick(random: &mut Random, entities: &[Entity]) -> Option<Entity> {
+    (!entities.is_empty()).then(|| random.one_of(entities))
+}
+
+#[test]
+fn the_census_follows_every_change() {
+    let mut random = Random(5);
+    let mut renderer = Renderer::new(gpu());
+    let target = Offscreen::new(gpu(), 16, 16, OffscreenFormat::Rgba8).unwrap();
+    let mut different = std::collections::HashSet::new();
+    for _ in 0..6 {
+        let mut world = random_world(&mut random);
+        for step in 0..25 {
+            let report = renderer.render(&mut world, &target.target(), &FrameOptions::default()).unwrap();
+            assert_eq!(Census::of(&mut world), *report.census, "after {step} changes");
+            different.insert(format!("{:?}", report.census));
+            change(&mut random, &mut world);
+        }
+    }
+    assert!(different.len() > 60, "{} different ones", different.len());
+}
+
+#[test]
+fn what_hangs_from_something_hidden_is_not_drawn() {
+    let mut world = World::new();
+    let ball = || (Mesh(Arc::new(shapes::uv_sphere(0.3, 8, 4))), Transform::IDENTITY);
+    let group = world.spawn(Transform::IDENTITY).id();
+    let below = world.spawn((Transform::IDENTITY, ChildOf(group))).id();
+    world.spawn((ball(), ChildOf(below)));
+    world.spawn((ball(), EmissiveLight, Material::emissive(Vec3::ONE), ChildOf(group)));
+    world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 6.0)));
+    let mut renderer = Renderer::new(gpu());
+    let target = Offscreen::new(gpu(), 16, 16, OffscreenFormat::Rgba8).unwrap();
+    let mut counts = |world: &mut World| {
+        let report = renderer.render(world, &target.target(), &FrameOptions::default()).unwrap();
+        (report.statistics.objects, report.statistics.lights > 0)
+    };
+    assert_eq!(counts(&mut world), (2, true));
+    world.entity_mut(group).insert(Hidden);
+    assert_eq!(counts(&mut world), (0, false));
+    world.entity_mut(group).remove::<Hidden>();
+    world.entity_mut(below).insert(Hidden);
+    assert_eq!(counts(&mut world), (1, true));
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use lumbre::graph;
 use lumbre::render::{Display, Gpu, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
+use lumbre::scene::Census;
 use serde::Serialize;
 
 use crate::arguments::Render;
@@ -19,6 +20,8 @@ struct Timings {
     device: String,
     width: u32,
     height: u32,
+    /// What the scene calls for: what the frames' passes and shader variants were decided from.
+    census: Option<Census>,
     frames: Vec<FrameTimes>,
 }
 
@@ -72,7 +75,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
     let mut renderer = Renderer::new(&gpu);
     let format = if floats { OffscreenFormat::LinearFloat } else { OffscreenFormat::Rgba8 };
     let target = Offscreen::new(&gpu, width, height, format)?;
-    let mut frames = Vec::new();
+    let (mut frames, mut census) = (Vec::new(), None);
     for _ in 0..asked.frames {
         let start = Instant::now();
         let report = renderer
@@ -81,6 +84,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         let measured = renderer.wait()?.cloned();
         let wall_ms = start.elapsed().as_secs_f64() * 1e3;
         frames.push(frame_times(wall_ms, report.statistics, measured));
+        census = Some(Census::clone(&report.census));
     }
     let shows_something = write_frame(&asked.output, &gpu, &target, floats)?;
     if !shows_something && loaded.report.triangles > 0 {
@@ -90,7 +94,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         );
     }
     if let Some(path) = &asked.timings {
-        let timings = Timings { device: gpu.describe(), width, height, frames };
+        let timings = Timings { device: gpu.describe(), width, height, census, frames };
         write_file(path, |path| Ok(std::fs::write(path, serde_json::to_string_pretty(&timings)? + "\n")?))?;
     }
     Ok(())

@@ -146,6 +146,7 @@ fn frames_and_timings_are_written_whole() {
 
     let timings: serde_json::Value = serde_json::from_slice(&std::fs::read(&times).unwrap()).unwrap();
     let frames = timings["frames"].as_array().unwrap();
+    assert!(timings["census"]["meshes"].as_u64() > Some(0), "{}", timings["census"]);
     assert_eq!(frames.len(), 3);
     let forward =
         frames[2]["passes"].as_array().unwrap().iter().find(|pass| pass["name"] == "forward").unwrap();

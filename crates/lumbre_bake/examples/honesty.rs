@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
 use lumbre_scene::Lightmap;
 
 #[path = "../tests/held_out/input.rs"]
@@ -212,7 +212,7 @@ type Maps = Vec<(String, Map)>;
 fn baked(input: &Path, options: &BakeOptions) -> Result<(BakeReport, Maps), Box<dyn Error>> {
     let mut world = input::world_of(input)?;
     let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()))?;
-    let mut query = world.query::<(&Lightmap, &LightmapError)>();
+    let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<(String, Map)> = query
         .iter(&world)
         .map(|(map, errors)| {

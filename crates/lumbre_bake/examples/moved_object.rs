@@ -9,7 +9,7 @@ use std::path::Path;
 
 use bevy_ecs::world::World;
 use glam::DVec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Samples, rebake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Samples, TexelErrors, rebake};
 use lumbre_scene::{Lightmap, Name, Transform};
 
 #[path = "../tests/held_out/input.rs"]
@@ -82,7 +82,7 @@ fn baked(
     options: &BakeOptions,
 ) -> Result<(Texels, BakeReport, Option<Samples>), Box<dyn Error>> {
     let (report, samples) = rebake(&mut world, options, former, None, &mut |_| ControlFlow::Continue(()))?;
-    let mut query = world.query::<(&Lightmap, &LightmapError)>();
+    let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
         query.iter(&world).map(|(map, error)| (map.image.clone(), error.0.clone())).collect();
     maps.sort_by(|a, b| a.0.name.cmp(&b.0.name));

@@ -18,7 +18,7 @@ use crate::scene::{LightmapLayout, Object, textures_of};
 /// How far each texel of an entity's [`Lightmap`] may be off: one standard error in the map's own unit (E/π, mean of the channels), row
 /// by row; NaN where the map shows no surface. Against a converged bake of the same map at least 95 % of the texels are within two.
 #[derive(Component, Clone, Debug)]
-pub struct LightmapError(pub Arc<[f32]>);
+pub struct TexelErrors(pub Arc<[f32]>);
 
 /// Gives every object its map: E/π, and 0 where nothing is known; and its errors.
 pub(crate) fn apply(
@@ -39,14 +39,14 @@ pub(crate) fn apply(
     let image = |name: String, width: u32, height: u32, texels: Vec<Vec3>| {
         Arc::new(LightmapImage { name, width, height, texels, encoding: LightmapEncoding::Rgb32Float })
     };
-    let shared: Vec<(Lightmap, LightmapError)> = (0..pages.pages.len())
+    let shared: Vec<(Lightmap, TexelErrors)> = (0..pages.pages.len())
         .map(|index| {
             let page = &pages.pages[index];
             let texels = pages.compose(index, layout, light, Vec3::ZERO);
             let name = file_name(&format!("atlas-{}", index + 1), &mut names);
             let errors = pages.compose(index, layout, error, f32::NAN);
             let image = image(name, page.width, page.height, texels);
-            (Lightmap { image }, LightmapError(errors.into()))
+            (Lightmap { image }, TexelErrors(errors.into()))
         })
         .collect();
     for (index, object) in objects.iter().enumerate() {
@@ -58,7 +58,7 @@ pub(crate) fn apply(
                 let texels = own.clone().map(light).collect();
                 let name = file_name(&object.name, &mut names);
                 let image = image(name, map.width, map.height, texels);
-                (Lightmap { image }, LightmapError(own.map(error).collect()))
+                (Lightmap { image }, TexelErrors(own.map(error).collect()))
             }
         };
         for ((part, mesh), &moved) in object.primitives.iter().zip(&map.meshes).zip(&map.moved) {
@@ -92,7 +92,7 @@ pub(crate) fn forget_lightmaps(world: &mut World, objects: &[Object]) {
     let mut mapped = world.query_filtered::<Entity, With<Lightmap>>();
     let stale: Vec<Entity> = mapped.iter(world).filter(|entity| !kept.contains(entity)).collect();
     for entity in stale {
-        world.entity_mut(entity).remove::<(Lightmap, LightmapError)>();
+        world.entity_mut(entity).remove::<(Lightmap, TexelErrors)>();
     }
 }
 

@@ -57,7 +57,7 @@ mod texels;
 mod transport;
 mod unwrapped_from;
 
-pub use apply::LightmapError;
+pub use apply::TexelErrors;
 pub use bake::{bake, bake_with, rebake};
 pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};

@@ -17,8 +17,8 @@ use glam::Vec3;
 use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
 use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
-    DynamicObject, GlobalTransform, Hidden, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh,
-    PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, save_baked,
+    DynamicObject, GlobalTransform, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, PackedFormat,
+    Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, hidden_entities, save_baked,
 };
 
 /// One bake of several, each better than the one before.
@@ -416,12 +416,13 @@ pub fn has_light_to_bake(world: &mut World) -> bool {
         let back = material.back.as_ref().filter(|_| material.double_sided);
         !material.unlit && (bright(material.front.emission) || back.is_some_and(|back| bright(back.emission)))
     };
+    let hidden = hidden_entities(world);
     world.get_resource::<SceneSettings>().is_some_and(|settings| bright(settings.sky))
         || world.query::<&Light>().iter(world).any(is_baked)
         || world
-            .query_filtered::<&Material, (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>()
+            .query_filtered::<(Entity, &Material), (With<StaticObject>, Without<DynamicObject>)>()
             .iter(world)
-            .any(emits)
+            .any(|(entity, material)| emits(material) && !hidden.contains(&entity))
 }
 
 /// Square metres of everything that stands still.

@@ -2,17 +2,17 @@
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
-use lumbre_scene::{Extras, GlobalTransform, Hidden, Mesh, StaticObject};
+use lumbre_scene::{Extras, GlobalTransform, Mesh, StaticObject, hidden_entities};
 
 /// The triangles of all static meshes in the world's space, metres, except those whose node says
 /// `extras.lumbre_demo.solid = false`. Global transforms must be up to date.
 pub fn level_triangles(world: &mut World) -> Vec<[DVec3; 3]> {
-    let mut meshes = world
-        .query_filtered::<(&Mesh, &GlobalTransform, Option<&ChildOf>), (With<StaticObject>, Without<Hidden>)>(
-        );
+    let hidden = hidden_entities(world);
+    let mut meshes =
+        world.query_filtered::<(Entity, &Mesh, &GlobalTransform, Option<&ChildOf>), With<StaticObject>>();
     let mut extras = world.query::<&Extras>();
     let mut triangles = Vec::new();
-    for (mesh, place, parent) in meshes.iter(world) {
+    for (_, mesh, place, parent) in meshes.iter(world).filter(|object| !hidden.contains(&object.0)) {
         let said = parent.and_then(|parent| extras.get(world, parent.parent()).ok());
         if said.is_some_and(|extras| extras.0.pointer("/lumbre_demo/solid") == Some(&false.into())) {
             continue;

@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::DVec3;
-use lumbre_scene::SceneSettings;
+use lumbre_scene::{ObjectTraits, SceneSettings};
 
-use crate::extract::{CameraView, LitPass, Object, Objects, Traits};
+use crate::extract::{CameraView, LitPass, Object, Objects};
 use crate::features::{self, FrameFeatures};
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
@@ -72,7 +72,7 @@ impl Draws {
         };
         let mut visible: Vec<Visible> = Vec::new();
         // Most objects are as the one before.
-        let mut known: Option<(Traits, Variant)> = None;
+        let mut known: Option<(ObjectTraits, Variant)> = None;
         let mut known_key: Option<(PipelineKey, Option<PipelineKey>)> = None;
         for (slot, object) in objects.iter() {
             if !inside(object) {
@@ -80,7 +80,7 @@ impl Draws {
                 continue;
             }
             let traits = &object.traits;
-            let pass = traits.pass(frame.lightmaps);
+            let pass = LitPass::of(traits, frame.lightmaps);
             let variant = match known {
                 Some((of, variant)) if of == *traits => variant,
                 _ => features::variant(traits, settings, frame),

@@ -56,6 +56,19 @@ pub enum RenderError {
         /// The adapter's name.
         adapter: String,
     },
+    /// A viewport that is empty, or reaches beyond its texture.
+    #[error(
+        "the viewport of {} x {} texels at ({}, {}) does not lie within its target of {} x {}: give it a size of 1 or more, and keep it inside",
+        size[0], size[1], origin[0], origin[1], texture[0], texture[1]
+    )]
+    Viewport {
+        /// Column and row of its first texel.
+        origin: [u32; 2],
+        /// Its width and height.
+        size: [u32; 2],
+        /// Width and height of the texture.
+        texture: [u32; 2],
+    },
     /// No camera to draw from.
     #[error("the World has no Camera: spawn one with `Camera::default()` and a Transform")]
     NoCamera,

@@ -5,14 +5,12 @@ use std::fmt::Write;
 
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Explanation, PassExplanation, TextureDescriptor};
-use lumbre_optics::{Material, ReflectionModel, Shading};
-use lumbre_scene::{
-    Census, Hidden, HiddenCone, Lightmap, MaterialTextures, Mesh, SceneSettings, hidden_cones,
-};
+use lumbre_optics::Shading;
+use lumbre_scene::{Census, HiddenCone, ObjectCensus, SceneSettings, hidden_cones, shown_objects};
 
 use crate::effect_costs::FrameCost;
 use crate::effects::{self, Effect, Stage};
-use crate::extract::{LightSet, Traits};
+use crate::extract::LightSet;
 use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
 use crate::frame_bindings::FrameBindings;
@@ -84,20 +82,8 @@ fn explain_with(
     if !options.shadows {
         lights = lights.without_shadows();
     }
-    let mut query = world.query_filtered::<(
-        &Mesh,
-        &Material,
-        Option<&MaterialTextures>,
-        Has<Lightmap>,
-        (Option<&Shading>, Option<&ReflectionModel>),
-    ), Without<Hidden>>();
-    let traits: Vec<Traits> = query
-        .iter(world)
-        .map(|(mesh, material, maps, lightmap, (shading, reflection))| {
-            Traits::new(material, maps, &mesh.0, lightmap, (shading.copied(), reflection.copied()))
-        })
-        .collect();
-    let facts = SceneFacts::new(&traits, &lights, &settings, options);
+    let objects = shown_objects(world);
+    let facts = SceneFacts::new(&ObjectCensus::of(&objects), &lights, &settings, options);
     let mut radiance = false;
     for effect in effects.iter_mut() {
         let called_for = effect.extract(world, &facts, options);
@@ -108,23 +94,24 @@ fn explain_with(
     let common = FrameFeatures::new(options, &settings, lights, (plan.ending, target_format, half));
     let mut variants = BTreeMap::new();
     let (mut clustered, mut bindings) = (0, FrameBindings::default());
-    for object in &traits {
+    for (object, _) in &objects {
         let variant = features::variant(object, &settings, &common);
         clustered += usize::from(variant.has(Feature::Clusters));
         bindings = bindings.and(FrameBindings::of(&variant));
         *variants.entry(variant.to_string()).or_insert(0) += 1;
     }
-    let light_lists = lights.listing(options.light_lists, clustered, traits.len());
+    let light_lists = lights.listing(options.light_lists, clustered, objects.len());
     let target = TextureDescriptor::new_2d(width, height, target_format);
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
     let light = bindings.light_resources().map(|(name, buffer)| (name, buffer, usage));
-    let frame = declare(effects.iter(), &plan, (target, &mut { light }), None).compile()?.explain();
+    let frame = declare(effects.iter(), &plan, (target, None, &mut { light }), None).compile()?.explain();
     let hidden_cones = match options.shading {
         // Whatever the objects ask for.
         Some(Shading::Phong) => Vec::new(),
         _ => hidden_cones(world),
     };
-    Ok(SceneExplanation { census: Census::of(world), hidden_cones, frame, light_lists, variants, cost: None })
+    let census = Census::clone(&facts.census);
+    Ok(SceneExplanation { census, hidden_cones, frame, light_lists, variants, cost: None })
 }
 
 impl SceneExplanation {

@@ -7,7 +7,7 @@ use bevy_ecs::entity::Entity;
 use bevy_ecs::world::{World, WorldId};
 use lumbre_graph::Plan;
 use lumbre_optics::FlatRule;
-use lumbre_scene::SceneSettings;
+use lumbre_scene::{Census, SceneSettings};
 
 use crate::draws::{Batch, Draws};
 use crate::extract::{CameraView, SceneLights};
@@ -15,7 +15,9 @@ use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
 use crate::shader::Feature;
-use crate::{FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics};
+use crate::{
+    FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics, Viewport,
+};
 
 /// What the variants and passes of a frame follow from.
 #[derive(Clone, Debug)]
@@ -26,11 +28,18 @@ pub(crate) struct Decision {
     pub features: FrameFeatures,
 }
 
-/// Decisions whose pipelines are there, by the format of their target.
+/// Decisions whose pipelines are there, by the kind of their target.
 #[derive(Debug, Default)]
 pub(crate) struct Decisions {
     world: Option<WorldId>,
-    made: Vec<(wgpu::TextureFormat, Decision)>,
+    made: Vec<(TargetKind, Decision)>,
+}
+
+/// The format of a target, and whether the frame fills a part of it.
+type TargetKind = (wgpu::TextureFormat, bool);
+
+fn target_kind(target: &FrameTarget) -> TargetKind {
+    (target.format(), target.viewport.is_some())
 }
 
 /// A frame that is decided, ready to be uploaded and encoded.
@@ -47,6 +56,8 @@ pub(crate) struct Decided {
     pub lights_per_object: f32,
     /// An effect that is called for draws the shapes of objects.
     pub draws_objects: bool,
+    /// What the frame was decided from.
+    pub census: Arc<Census>,
 }
 
 /// From where a frame is seen, and where it goes.
@@ -63,6 +74,7 @@ pub(crate) struct AskedFrame {
     world: WorldId,
     options: FrameOptions,
     size: (u32, u32),
+    viewport: Option<Viewport>,
     format: wgpu::TextureFormat,
 }
 
@@ -92,14 +104,15 @@ impl Decisions {
             *self = Self { world: Some(world.id()), made: Vec::new() };
         }
         let waits = options.missing_pipelines == MissingPipelines::Wait || options.probe;
-        let former = self.made.iter().find(|(format, _)| *format == target.format());
+        let former = self.made.iter().find(|(kind, _)| *kind == target_kind(target));
         former.filter(|_| !waits).map(|(_, decision)| decision.clone())
     }
 
     /// Keeps a decision whose pipelines are there.
     pub fn keep(&mut self, target: &FrameTarget, decision: &Decision) {
-        self.made.retain(|(format, _)| *format != target.format());
-        self.made.push((target.format(), decision.clone()));
+        let kind = target_kind(target);
+        self.made.retain(|(other, _)| *other != kind);
+        self.made.push((kind, decision.clone()));
     }
 }
 
@@ -165,7 +178,13 @@ impl AskedFrame {
     pub fn new(world: &World, target: &FrameTarget, options: &FrameOptions) -> Self {
         // Whether it is measured changes nothing of it.
         let options = FrameOptions { measure: Measure::Nothing, keep_unchanged: false, ..options.clone() };
-        Self { world: world.id(), options, size: target.size(), format: target.format() }
+        Self {
+            world: world.id(),
+            options,
+            size: target.size(),
+            viewport: target.viewport,
+            format: target.format(),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::effects::{Board, Effect, FrameGraph};
 use crate::frame_bindings::FrameBuffer;
 use crate::frame_plan::FramePlan;
 use crate::frame_scene::FrameScene;
-use crate::{FrameTarget, Gpu, RenderError};
+use crate::{FrameTarget, Gpu, RenderError, Viewport};
 
 /// What draws over the finished frame.
 pub(crate) type Overlay<'a> = Box<dyn FnOnce(&mut wgpu::RenderPass<'static>) + 'a>;
@@ -23,12 +23,13 @@ pub(crate) fn run_graph<'a>(
     scene: &mut FrameScene<'a>,
     overlay: Option<Overlay<'a>>,
 ) -> Result<Frame, RenderError> {
-    let described = TextureDescriptor::new_2d(target.width, target.height, target.format);
+    let (width, height) = (target.texture.width(), target.texture.height());
+    let described = TextureDescriptor::new_2d(width, height, target.format);
     let effects =
         || effects.iter().zip(declared).filter(|(_, declared)| **declared).map(|(effect, _)| effect);
     let buffers = light.iter().map(|(name, buffer, bound)| (*name, *buffer, bound.usage()));
     let target_usage = described.usage(target.texture.usage());
-    let graph = declare(effects(), plan, (target_usage, &mut { buffers }), overlay);
+    let graph = declare(effects(), plan, (target_usage, target.viewport, &mut { buffers }), overlay);
     let imports = Imports::new().texture("target", &target.view);
     let imports = light.iter().fold(imports, |imports, (name, _, bound)| imports.buffer(*name, bound));
     let imports = effects().fold(imports, |imports, effect| effect.imports(imports));
@@ -39,11 +40,11 @@ pub(crate) fn run_graph<'a>(
 pub(crate) fn declare<'a>(
     effects: impl IntoIterator<Item = &'a Box<dyn Effect>>,
     plan: &FramePlan,
-    (target, light): (TextureDescriptor, &mut dyn Iterator<Item = LightBuffer>),
+    (target, viewport, light): (TextureDescriptor, Option<Viewport>, &mut dyn Iterator<Item = LightBuffer>),
     overlay: Option<Overlay<'a>>,
 ) -> FrameGraph<'a> {
     let mut graph = FrameGraph::with_user("frame");
-    let mut board = Board::new(&mut graph, plan, target);
+    let mut board = Board::new(&mut graph, plan, target, viewport);
     for (name, buffer, usage) in light {
         let handle = graph.import_buffer(name, BufferDescriptor::new(4).usage(usage));
         let read = if buffer.is_uniform() { BufferRead::Uniform } else { BufferRead::Storage };

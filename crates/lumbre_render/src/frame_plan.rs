@@ -1,7 +1,7 @@
 //! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
 
 use crate::facts::SceneFacts;
-use crate::{Display, FrameOptions, FrameTarget, Gpu};
+use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
 
 /// How radiance reaches the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +50,8 @@ impl FramePlan {
         radiance: bool,
         (gpu, target, exposure): (&Gpu, &FrameTarget, f32),
     ) -> Self {
+        // A part of a texture would want depth as large as all of it.
+        let radiance = radiance || target.viewport.is_some();
         let mut plan = Self::new(facts, options, target.format, radiance);
         let wide = wgpu::TextureFormat::Rgba32Float;
         let features = gpu.device.features();
@@ -84,6 +86,7 @@ impl FramePlan {
             linear_format: self.linear_format,
             lit_format: self.lit_format,
             target_format: target.format,
+            viewport: target.viewport,
             samples: self.samples,
             display,
             exposure,
@@ -97,8 +100,10 @@ impl FramePlan {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FrameShape {
-    /// Width and height of the target, and of the textures of the [`Board`](crate::effects::Board), in texels.
+    /// Width and height of the frame, and of the textures of the [`Board`](crate::effects::Board), in texels.
     pub size: [u32; 2],
+    /// The part of the target that the frame fills, if it is not all of it.
+    pub viewport: Option<Viewport>,
     /// Format of [`Board::linear`](crate::effects::Board::linear).
     pub linear_format: wgpu::TextureFormat,
     /// Format of what [`Board::lit_pass`](crate::effects::Board::lit_pass) draws into.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_graph::Plan;
+use lumbre_scene::Census;
 
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -124,6 +125,8 @@ pub struct FrameReport {
     pub statistics: Statistics,
     /// Which passes ran, which did not, and why.
     pub plan: Arc<Plan>,
+    /// What the scene calls for: what the frame's passes and shader variants were decided from.
+    pub census: Arc<Census>,
     /// Lights, fog and objects made in code with what no file may have (a number that is none, an index past the end, no Transform, no Material), each with a
     /// sentence that names it: the frame is drawn without them, and a warning is logged when one appears.
     pub left_out: Vec<String>,

@@ -92,5 +92,5 @@ pub use offscreen::{Offscreen, OffscreenFormat, read_texture};
 pub use options::{Display, FrameOptions, LightLists, Measure, MissingPipelines};
 pub use renderer::{Renderer, RendererBuilder};
 pub use schedule::{CurrentTarget, LastFrame, RenderSet, render_frame};
-pub use target::{DEPTH_FORMAT, FrameTarget};
+pub use target::{DEPTH_FORMAT, FrameTarget, Viewport};
 pub use window_surface::{Acquired, SurfaceFrame, WindowSurface};

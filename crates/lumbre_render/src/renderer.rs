@@ -204,6 +204,7 @@ impl Renderer {
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
         self.gpu.check()?;
+        target.check()?;
         let mut clock = Clock::start();
         let asked = AskedFrame::new(world, target, options);
         let still = self.is_still(world);
@@ -236,10 +237,12 @@ impl Renderer {
     fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &Clock) -> FrameReport {
         let cpu = CpuStages { total_ms: milliseconds(clock.begun), ..CpuStages::default() };
         let statistics = Statistics { uploaded_bytes: 0, cpu, ..last.statistics };
+        let census = Arc::clone(&last.decided.census);
         self.last = Some(last);
         FrameReport {
             statistics,
             plan: Arc::new(plan),
+            census,
             measured: self.executor.latest_report().cloned(),
             left_out: self.left_out.clone(),
         }
@@ -328,8 +331,7 @@ impl Renderer {
             lights.shadows.clear();
         }
         timed.cpu.lights_ms += timed.clock.lap();
-        let traits = self.objects.iter().map(|(_, object)| &object.traits);
-        let facts = SceneFacts::new(traits, &lights.set, settings, options);
+        let facts = SceneFacts::new(&self.objects.census, &lights.set, settings, options);
         let called_for: Vec<bool> =
             self.effects.iter_mut().map(|effect| effect.extract(world, &facts, options)).collect();
         let called = || self.effects.iter().zip(&called_for).filter(|(_, called)| **called);
@@ -373,6 +375,7 @@ impl Renderer {
             light_list,
             lights_per_object,
             draws_objects,
+            census: facts.census,
         })
     }
 
@@ -554,9 +557,11 @@ impl Renderer {
         }
         frame.statistics.cpu.total_ms = milliseconds(clock.begun);
         frame.drawn = Some((Arc::clone(&drawn.plan), target.texture.clone()));
+        let census = Arc::clone(&frame.decided.census);
         let report = FrameReport {
             statistics: frame.statistics,
             plan: drawn.plan,
+            census,
             measured: self.executor.latest_report().cloned(),
             left_out: self.left_out.clone(),
         };

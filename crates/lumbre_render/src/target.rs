@@ -1,4 +1,6 @@
-//! Where a frame goes: any colour texture, a window's or our own. Not how it is shown.
+//! Where a frame goes: any colour texture, a window's or our own, or a part of it. Not how it is shown.
+
+use crate::RenderError;
 
 /// Format of the depth buffer: reversed-Z wants floats. 1 is at the near plane, 0 at infinity.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -9,8 +11,34 @@ pub struct FrameTarget {
     pub(crate) texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
     pub(crate) format: wgpu::TextureFormat,
+    /// Of the frame: of the viewport, if there is one.
     pub(crate) width: u32,
     pub(crate) height: u32,
+    pub(crate) viewport: Option<Viewport>,
+}
+
+/// The part of a target that a frame fills, in texels from the upper left corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewport {
+    /// Column and row of its first texel.
+    pub origin: [u32; 2],
+    /// Width and height, 1 or more.
+    pub size: [u32; 2],
+    /// What becomes of the target around it: cleared to this colour, as the target holds it, before the frame is drawn, or kept as it is.
+    pub clear: Option<wgpu::Color>,
+}
+
+impl Viewport {
+    /// A part of a target, around which everything is kept: for split screens, or a picture in an interface.
+    pub fn new(origin: [u32; 2], size: [u32; 2]) -> Self {
+        Self { origin, size, clear: None }
+    }
+
+    /// Clears the rest of the target to a colour first.
+    #[must_use]
+    pub fn with_clear(self, color: wgpu::Color) -> Self {
+        Self { clear: Some(color), ..self }
+    }
 }
 
 impl FrameTarget {
@@ -26,16 +54,26 @@ impl FrameTarget {
             format: texture.format(),
             width: texture.width(),
             height: texture.height(),
+            viewport: None,
             texture: texture.clone(),
         }
     }
 
-    /// Width divided by height.
+    /// The same texture, for a frame that fills a part of it. Such a frame has a display pass. A viewport that does not lie within the texture is
+    /// [`RenderError::Viewport`] of the frame that is drawn into it. Overlays, and effects at [`Stage::Picture`](crate::effects::Stage::Picture), draw over
+    /// the whole texture.
+    #[must_use]
+    pub fn with_viewport(self, viewport: Viewport) -> Self {
+        let [width, height] = viewport.size;
+        Self { width, height, viewport: Some(viewport), ..self }
+    }
+
+    /// Width divided by height, of the viewport if there is one.
     pub fn aspect(&self) -> f64 {
         f64::from(self.width) / f64::from(self.height)
     }
 
-    /// Width and height in texels.
+    /// Width and height of the frame in texels: of the viewport if there is one.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
@@ -43,5 +81,21 @@ impl FrameTarget {
     /// Texel format.
     pub fn format(&self) -> wgpu::TextureFormat {
         self.format
+    }
+
+    /// Whether the frame lies within the texture.
+    ///
+    /// # Errors
+    /// [`RenderError::Viewport`].
+    pub(crate) fn check(&self) -> Result<(), RenderError> {
+        let Some(Viewport { origin, size, .. }) = self.viewport else { return Ok(()) };
+        let texture = [self.texture.width(), self.texture.height()];
+        let within = |axis: usize| {
+            size[axis] > 0 && origin[axis].checked_add(size[axis]).is_some_and(|end| end <= texture[axis])
+        };
+        match within(0) && within(1) {
+            true => Ok(()),
+            false => Err(RenderError::Viewport { origin, size, texture }),
+        }
     }
 }

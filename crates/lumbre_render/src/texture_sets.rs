@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_scene::{Image, Lightmap, MaterialTextures, Mipmap, Sampler, TextureReference, Wrap};
+use lumbre_scene::{Image, Lightmap, MaterialTextures, Mipmap, Sampler, Wrap};
 
 use wgpu::util::DeviceExt;
 
@@ -12,8 +12,8 @@ use crate::shader::Feature;
 use crate::textures::{Texels, Textures};
 use crate::{Gpu, RenderError};
 
-/// The slots of a set in binding order: the feature that reads it, and what its texels are.
-const SLOTS: [(Feature, Texels); 5] = [
+/// The slots of a set in binding order, which is that of `MaterialTextures::slots`: the feature that reads it, and what its texels are.
+const SLOTS: [(Feature, Texels); MaterialTextures::SLOTS] = [
     (Feature::BaseColorTexture, Texels::Colors),
     (Feature::EmissiveTexture, Texels::Colors),
     (Feature::MetallicRoughnessTexture, Texels::Numbers),
@@ -43,30 +43,9 @@ pub(crate) struct TextureSets {
     lightmaps: HashMap<usize, Arc<wgpu::BindGroup>>,
 }
 
-fn slots(textures: &MaterialTextures) -> [Option<&TextureReference>; SLOTS.len()] {
-    [
-        textures.base_color.as_ref(),
-        textures.emissive.as_ref(),
-        textures.metallic_roughness.as_ref().map(|mapped| &mapped.texture),
-        textures.normal.as_ref().map(|slot| &slot.texture),
-        textures.occlusion.as_ref().map(|slot| &slot.texture),
-    ]
-}
-
-/// Which slots a material fills.
-pub(crate) fn mask(textures: &MaterialTextures) -> u8 {
-    slots(textures).iter().enumerate().map(|(i, slot)| u8::from(slot.is_some()) << i).sum()
-}
-
 /// The features that go with a mask.
 pub(crate) fn features(mask: u8) -> impl Iterator<Item = (Feature, bool)> {
     SLOTS.iter().enumerate().map(move |(i, (feature, _))| (*feature, mask & (1 << i) != 0))
-}
-
-/// Which of a material's slots read `uv1`.
-pub(crate) fn second_set(textures: &MaterialTextures) -> u8 {
-    let second = |slot: &Option<&TextureReference>| slot.is_some_and(|texture| texture.tex_coord != 0);
-    slots(textures).iter().enumerate().map(|(i, slot)| u8::from(second(slot)) << i).sum()
 }
 
 /// The textures of a material as small as they may be for a software rasterizer to make the same code of them, which depends on whether sides are powers of two, and
@@ -95,9 +74,9 @@ impl TextureSets {
         textures: &mut Textures,
         material: &MaterialTextures,
     ) -> Result<Option<Arc<TextureSet>>, RenderError> {
-        let mask = mask(material);
+        let mask = material.slot_mask();
         let Some(layout) = self.layout(gpu, mask) else { return Ok(None) };
-        let slots = slots(material);
+        let slots = material.slots();
         let maps = SurfaceMapsData::new(material);
         let images = slots.map(|slot| slot.map(|t| (Arc::as_ptr(&t.image) as usize, t.sampler)));
         let key = (images, maps.map(bytemuck::cast));

@@ -36,17 +36,34 @@ pub struct MaterialTextures {
 }
 
 impl MaterialTextures {
-    /// The textures that there are.
-    pub fn references(&self) -> impl Iterator<Item = &TextureReference> {
+    /// How many textures a material may have.
+    pub const SLOTS: usize = 5;
+
+    /// Its textures: base colour, emissive, metallic-roughness, normal, occlusion.
+    pub fn slots(&self) -> [Option<&TextureReference>; Self::SLOTS] {
         let Self { base_color, emissive, metallic_roughness, normal, occlusion } = self;
-        let slots = [
+        [
             base_color.as_ref(),
             emissive.as_ref(),
             metallic_roughness.as_ref().map(|mapped| &mapped.texture),
             normal.as_ref().map(|normal| &normal.texture),
             occlusion.as_ref().map(|occlusion| &occlusion.texture),
-        ];
-        slots.into_iter().flatten()
+        ]
+    }
+
+    /// Which of its slots are filled: bit i for slot i.
+    pub fn slot_mask(&self) -> u8 {
+        mask(self.slots().map(|slot| slot.is_some()))
+    }
+
+    /// Which of its slots read the second set of texture coordinates: bit i for slot i.
+    pub fn second_set_mask(&self) -> u8 {
+        mask(self.slots().map(|slot| slot.is_some_and(|texture| texture.tex_coord != 0)))
+    }
+
+    /// The textures that there are.
+    pub fn references(&self) -> impl Iterator<Item = &TextureReference> {
+        self.slots().into_iter().flatten()
     }
 
     /// The textures that there are, to be changed.
@@ -61,6 +78,11 @@ impl MaterialTextures {
         ];
         slots.into_iter().flatten()
     }
+}
+
+/// Bit i for truth i.
+fn mask(bits: [bool; MaterialTextures::SLOTS]) -> u8 {
+    (0..).zip(bits).map(|(place, bit)| u8::from(bit) << place).sum()
 }
 
 /// A tangent-space normal map: red points along the mesh's tangents, green against v, blue along the normal (glTF's convention).
@@ -139,7 +161,7 @@ impl EmissiveLight {
     }
 }
 
-/// Hides the mesh of an entity.
+/// Hides the mesh of an entity, and those of all that hangs from it. Lights shine on, but for glowing faces that are hidden.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hidden;
 

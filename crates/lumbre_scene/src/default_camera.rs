@@ -10,7 +10,7 @@ use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, DVec3};
 use lumbre_optics::Material;
 
-use crate::{Bounds, Camera, GlobalTransform, Hidden, Mesh, Projection, Transform, scene_bounds};
+use crate::{Bounds, Camera, GlobalTransform, Mesh, Projection, Transform, hidden_entities, scene_bounds};
 
 /// Rays along each side of the grid: enough to see a door, few enough that large meshes take no time.
 const GRID: usize = 24;
@@ -69,8 +69,9 @@ fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
     // The box as [0, 1]³, so that one grid serves all directions.
     let unit = DAffine3::from_scale(size.recip()) * DAffine3::from_translation(-bounds.min);
     let mut first = vec![[f64::INFINITY; GRID * GRID]; 6];
-    let mut query = world.query_filtered::<(&Mesh, &GlobalTransform, Option<&Material>), Without<Hidden>>();
-    for (mesh, transform, material) in query.iter(world) {
+    let hidden = hidden_entities(world);
+    let mut query = world.query::<(Entity, &Mesh, &GlobalTransform, Option<&Material>)>();
+    for (_, mesh, transform, material) in query.iter(world).filter(|object| !hidden.contains(&object.0)) {
         let to_unit = unit * transform.0;
         let mirrored = to_unit.matrix3.determinant() < 0.0;
         let double_sided = material.is_some_and(|material| material.double_sided);

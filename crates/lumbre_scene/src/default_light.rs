@@ -6,8 +6,8 @@ use glam::{DQuat, EulerRot, Vec3};
 use lumbre_optics::{BakeMode, Light, Material};
 
 use crate::{
-    ChildOf, EmissiveLight, Hidden, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, Transform,
-    update_transforms,
+    ChildOf, EmissiveLight, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, Transform,
+    hidden_entities, update_transforms,
 };
 
 /// Radiance of a white surface that faces the key light.
@@ -37,13 +37,13 @@ pub fn is_without_light(world: &mut World) -> bool {
         return false;
     }
     // What glows as a whole shows itself; a texture may glow in few places.
-    let takes_light = |(material, textures): (&Material, Option<&MaterialTextures>)| {
+    let hidden = hidden_entities(world);
+    let takes_light = |(entity, material, textures): (Entity, &Material, Option<&MaterialTextures>)| {
         let glows = shines(material.front.emission) && textures.is_none_or(|own| own.emissive.is_none());
-        !material.unlit && !glows
+        !material.unlit && !glows && !hidden.contains(&entity)
     };
-    let mut shown =
-        world.query_filtered::<(&Material, Option<&MaterialTextures>), (With<Mesh>, Without<Hidden>)>();
-    shown.iter(world).any(takes_light)
+    let mut objects = world.query_filtered::<(Entity, &Material, Option<&MaterialTextures>), With<Mesh>>();
+    objects.iter(world).any(takes_light)
 }
 
 /// Hangs a key light, from above the viewer's left shoulder, and a fill light from the right on a camera. Global transforms are up to date

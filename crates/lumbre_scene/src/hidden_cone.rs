@@ -7,7 +7,7 @@ use glam::DVec3;
 use lumbre_optics::{FlatRule, Light, LightKind, Material, Shading};
 use serde::Serialize;
 
-use crate::{Bounds, ChildOf, GlobalTransform, Hidden, Mesh, Name, SceneSettings};
+use crate::{Bounds, ChildOf, GlobalTransform, Mesh, Name, SceneSettings, hidden_entities};
 
 /// Triangles that are looked at in all, so that an answer comes within a second.
 const MOST_TRIANGLES: usize = 20_000_000;
@@ -50,15 +50,13 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
     }
     let mut found = Vec::new();
     let mut left = MOST_TRIANGLES;
-    let mut query = world.query_filtered::<(
-        NameOrEntity,
-        Option<&ChildOf>,
-        &Mesh,
-        &Material,
-        &GlobalTransform,
-        Option<&Shading>,
-    ), Without<Hidden>>();
-    for (name, parent, mesh, material, transform, shading) in query.iter(world) {
+    let hidden = hidden_entities(world);
+    let mut query =
+        world
+            .query::<(NameOrEntity, Option<&ChildOf>, &Mesh, &Material, &GlobalTransform, Option<&Shading>)>(
+            );
+    let shown = query.iter(world).filter(|object| !hidden.contains(&object.0.entity));
+    for (name, parent, mesh, material, transform, shading) in shown {
         let shading = shading.copied().unwrap_or(settings.shading);
         if shading == Shading::Phong || material.unlit || !transform.0.is_finite() {
             continue;

@@ -29,7 +29,7 @@
 //! let mut again = World::new();
 //! let report = load_slice(&mut again, &std::fs::read(&path)?, "example.glb", None)?;
 //! assert_eq!(report.nodes.len(), 1);
-//! assert_eq!(Census::of(&mut again).point_lights, 1);
+//! assert_eq!(Census::of(&mut again).lights.point_lights, 1);
 //! # update_transforms(&mut again);
 //! # std::fs::remove_file(path)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -48,11 +48,15 @@ mod medium;
 mod quadric;
 mod settings;
 mod transform;
+mod visibility;
 
 pub use bevy_ecs::hierarchy::{ChildOf, Children};
 pub use bevy_ecs::name::Name;
 pub use bounds::scene_bounds;
-pub use census::{Census, CensusLine};
+pub use census::{
+    Census, CensusLine, LightCensus, Mobility, ObjectCensus, ObjectComponents, ObjectItem, ObjectTraits,
+    light_place, shines, shown_objects,
+};
 pub use components::{
     ActiveCamera, Bounds, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, MaterialTextures,
     Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, Primitive, Projection, SharedImage,
@@ -76,3 +80,4 @@ pub use medium::Medium;
 pub use quadric::{Quadric, QuadricError, QuadricShape};
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};
+pub use visibility::{hidden_entities, with_descendants};

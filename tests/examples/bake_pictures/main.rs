@@ -13,7 +13,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use image::{Rgb, RgbImage};
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, bake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, TexelErrors, bake};
 use lumbre_optics::Material;
 use lumbre_render::{Display, FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Lightmap, LightmapImage, default_camera};
@@ -105,7 +105,7 @@ fn sigma(gpu: &Gpu, model: &Path) -> Result<RgbImage, Box<dyn Error>> {
     // A map holds E/π, and so do its errors.
     let mean = (report.mean_irradiance.iter().sum::<f64>() / 3.0 / std::f64::consts::PI) as f32;
     let part = |error: f32| (error / mean / RANGE[0]).ln() / (RANGE[1] / RANGE[0]).ln();
-    let mut maps = world.query::<(&mut Lightmap, &LightmapError, &mut Material)>();
+    let mut maps = world.query::<(&mut Lightmap, &TexelErrors, &mut Material)>();
     for (mut map, errors, mut material) in maps.iter_mut(&mut world) {
         let texels =
             errors.0.iter().map(|error| if error.is_nan() { Vec3::ZERO } else { heat(part(*error)) });

@@ -9,8 +9,8 @@ use glam::{DAffine3, DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
-    ChildOf, DynamicObject, GlobalTransform, Hidden, MaterialTextures, Mesh, Name, Primitive, SceneSettings,
-    StaticObject, propagate_transforms,
+    ChildOf, DynamicObject, GlobalTransform, MaterialTextures, Mesh, Name, Primitive, SceneSettings,
+    StaticObject, hidden_entities, propagate_transforms,
 };
 
 use crate::{BakeError, UnwrappedFrom};
@@ -59,6 +59,7 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
         tracing::warn!("transforms could not be propagated; baking with those found");
     }
     let mut parts: BTreeMap<Entity, Vec<(usize, PlacedPrimitive)>> = BTreeMap::new();
+    let hidden = hidden_entities(world);
     let mut query = world.query_filtered::<(
         Entity,
         &Mesh,
@@ -68,9 +69,9 @@ pub(crate) fn collect(world: &mut World) -> Result<Vec<Object>, BakeError> {
         Option<&Primitive>,
         Option<&ChildOf>,
         Option<&UnwrappedFrom>,
-    ), (With<StaticObject>, Without<DynamicObject>, Without<Hidden>)>();
+    ), (With<StaticObject>, Without<DynamicObject>)>();
     for (entity, mesh, material, textures, transform, primitive, parent, unwrapped) in query.iter(world) {
-        if under_a_dynamic_object(world, parent) {
+        if hidden.contains(&entity) || under_a_dynamic_object(world, parent) {
             continue;
         }
         let (mesh, textures) = UnwrappedFrom::read(unwrapped, mesh, textures);

@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
-use lumbre_scene::{ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Mesh};
+use lumbre_scene::{ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Mesh, hidden_entities};
 
 use super::{Object, under_a_dynamic_object, world_points};
 use crate::BakeOptions;
@@ -20,14 +20,14 @@ pub(crate) struct WantedProbes {
 impl WantedProbes {
     /// Reads the World.
     pub fn of(world: &mut World, objects: &[Object]) -> Self {
-        let mut query = world.query_filtered::<(
-            &Mesh,
-            Option<&GlobalTransform>,
-            Option<&DynamicObject>,
-            Option<&ChildOf>,
-        ), Without<Hidden>>();
+        let hidden = hidden_entities(world);
+        let mut query =
+            world
+                .query::<(Entity, &Mesh, Option<&GlobalTransform>, Option<&DynamicObject>, Option<&ChildOf>)>(
+                );
         let (mut moving, mut any) = (Vec::new(), false);
-        for (mesh, transform, dynamic, parent) in query.iter(world) {
+        let shown = query.iter(world).filter(|object| !hidden.contains(&object.0));
+        for (_, mesh, transform, dynamic, parent) in shown {
             if dynamic.is_some() || under_a_dynamic_object(world, parent) {
                 any = true;
                 let transform = transform.copied().unwrap_or_default();

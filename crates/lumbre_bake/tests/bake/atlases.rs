@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
+use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -55,7 +55,7 @@ fn run(world: &mut World, atlas_size: Option<u32>) -> Result<BakeReport, BakeErr
 type Read = BTreeMap<String, (Vec<DVec3>, String, usize)>;
 
 fn read(world: &mut World) -> Read {
-    let mut query = world.query::<(&Name, &Mesh, &Lightmap, &LightmapError)>();
+    let mut query = world.query::<(&Name, &Mesh, &Lightmap, &TexelErrors)>();
     let read = query.iter(world).map(|(name, mesh, map, errors)| {
         assert_eq!(errors.0.len(), map.image.texels.len());
         let mut values = Vec::new();

@@ -10,7 +10,7 @@ use crate::scene_parts::matt;
 use crate::{common, held_out};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
@@ -62,7 +62,7 @@ struct Texels {
 
 fn baked(mut world: World, options: &BakeOptions) -> (BakeReport, Texels) {
     let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
-    let mut query = world.query::<(&Lightmap, &LightmapError)>();
+    let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
         query.iter(&world).map(|(map, error)| (map.image.clone(), error.0.clone())).collect();
     maps.sort_by(|a, b| a.0.name.cmp(&b.0.name));

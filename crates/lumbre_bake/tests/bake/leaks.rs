@@ -9,7 +9,7 @@ use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DQuat, DVec2, DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Quality, bake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
@@ -88,7 +88,7 @@ struct Found {
 fn look_up(world: &World, entity: Entity) -> Vec<Found> {
     let mesh = &world.get::<Mesh>(entity).expect("it was baked").0;
     let map = &world.get::<Lightmap>(entity).expect("it was baked").image;
-    let errors = &world.get::<LightmapError>(entity).expect("it was baked").0;
+    let errors = &world.get::<TexelErrors>(entity).expect("it was baked").0;
     let mut state = 7u64;
     let mut random = || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

@@ -8,9 +8,7 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::world::World;
 use glam::Vec3;
-use lumbre_bake::{
-    BakeError, BakeOptions, BakeReport, Density, Ended, LightmapError, Progress, Quality, bake,
-};
+use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Ended, Progress, Quality, TexelErrors, bake};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
@@ -32,7 +30,7 @@ fn baked(
 
 /// Light and stated error of every texel that shows a surface, mean of the channels.
 fn texels(world: &mut World) -> Vec<(f32, f32)> {
-    let mut maps = world.query::<(&Lightmap, &LightmapError)>();
+    let mut maps = world.query::<(&Lightmap, &TexelErrors)>();
     let mut found: Vec<_> = maps.iter(world).collect();
     found.sort_by(|a, b| a.0.image.name.cmp(&b.0.image.name));
     let texels = found.iter().flat_map(|(map, errors)| map.image.texels.iter().zip(errors.0.iter()));

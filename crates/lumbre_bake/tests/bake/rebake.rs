@@ -9,7 +9,7 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{
-    BakeOptions, BakeReport, Checkpoint, Density, LightmapError, Probes, Samples, SamplesError, bake, rebake,
+    BakeOptions, BakeReport, Checkpoint, Density, Probes, Samples, SamplesError, TexelErrors, bake, rebake,
 };
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
@@ -66,7 +66,7 @@ fn options() -> BakeOptions {
 
 /// Light and stated error of every texel, by the names of the maps.
 fn texels(world: &mut World) -> (Vec<DVec3>, Vec<f32>) {
-    let mut query = world.query::<(&Lightmap, &LightmapError)>();
+    let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
         query.iter(world).map(|(map, error)| (map.image.clone(), error.0.clone())).collect();
     maps.sort_by(|a, b| a.0.name.cmp(&b.0.name));

@@ -9,7 +9,7 @@ use crate::scene_parts::{grey, run};
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeOptions, Density, LightmapError, Quality};
+use lumbre_bake::{BakeOptions, Density, Quality, TexelErrors};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -210,7 +210,7 @@ fn a_sharp_shadow_across_the_seam_stays_sharp() {
         let report = run(&mut world, &side_of_48());
         let report = if seams { report } else { run(&mut world, &BakeOptions { seams, ..side_of_48() }) };
         let image = world.get::<Lightmap>(floor).unwrap().image.clone();
-        let errors = world.get::<LightmapError>(floor).unwrap().0.clone();
+        let errors = world.get::<TexelErrors>(floor).unwrap().0.clone();
         let exact = |p: DVec3| f64::from(u8::from(p.z > 0.05));
         let off = border()
             .map(|p| {

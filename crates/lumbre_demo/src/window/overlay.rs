@@ -198,6 +198,9 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
     let rest =
         format!("{outside} objects out of view, {pipelines} pipelines{awaited}, {bytes} bytes uploaded");
     ui.label(RichText::new(rest).color(DIM).small());
+    let lines = report.census.lines();
+    let called_for: Vec<_> = lines.iter().filter(|line| line.called_for).map(|line| line.effect).collect();
+    ui.label(RichText::new(format!("the scene calls for {}", called_for.join(", "))).color(DIM).small());
     for note in report.measured.iter().flat_map(|frame| &frame.notes) {
         ui.label(RichText::new(note).color(WARM).small());
     }

@@ -8,7 +8,7 @@ use lumbre_graph::{BufferHandle, BufferRead, LoadOp, PassBuilder, Raster, Textur
 use super::FrameGraph;
 use crate::frame_plan::{Ending, FramePlan};
 use crate::frame_scene::FrameScene;
-use crate::target::DEPTH_FORMAT;
+use crate::target::{DEPTH_FORMAT, Viewport};
 
 /// The textures of a frame. A pass that writes one moves its handle on, so that later passes read what it wrote.
 pub struct Board {
@@ -18,8 +18,10 @@ pub struct Board {
     pub depth: TextureHandle,
     /// The target: holds the picture from [`Stage::Picture`](super::Stage::Picture) on.
     pub target: TextureHandle,
-    /// Width and height of all three, in texels.
+    /// Width and height of the frame in texels: of `linear` and `depth`, and of the part of `target` that the frame fills.
     pub size: [u32; 2],
+    /// That part, if it is not all of the target.
+    pub viewport: Option<Viewport>,
     /// Format of `linear`.
     pub linear_format: wgpu::TextureFormat,
     /// Samples per pixel of `depth` and of what is lit.
@@ -34,8 +36,13 @@ pub struct Board {
 }
 
 impl Board {
-    pub(crate) fn new(graph: &mut FrameGraph<'_>, plan: &FramePlan, target: TextureDescriptor) -> Self {
-        let size = [target.size.width, target.size.height];
+    pub(crate) fn new(
+        graph: &mut FrameGraph<'_>,
+        plan: &FramePlan,
+        target: TextureDescriptor,
+        viewport: Option<Viewport>,
+    ) -> Self {
+        let size = viewport.map_or([target.size.width, target.size.height], |viewport| viewport.size);
         let described = |format| TextureDescriptor::new_2d(size[0], size[1], format);
         let samples = plan.samples;
         let mut linear = graph.texture("linear frame", described(plan.linear_format));
@@ -52,6 +59,7 @@ impl Board {
             depth: graph.texture("depth", described(DEPTH_FORMAT).samples(samples)),
             target: graph.import_texture("target", target),
             size,
+            viewport,
             linear_format: plan.linear_format,
             samples,
             multisampled: (samples > 1)

@@ -14,6 +14,7 @@ use crate::error::EffectError;
 use crate::facts::SceneFacts;
 use crate::frame_plan::FrameShape;
 use crate::shader::{self, DisplayVariant};
+use crate::target::Viewport;
 use crate::{Display, FrameOptions, Gpu, RenderError};
 
 /// The pass and its pipelines.
@@ -24,18 +25,31 @@ pub(super) struct DisplayPass {
     key: Option<Key>,
 }
 
-type Key = (DisplayVariant, wgpu::TextureFormat);
-
-fn key(frame: &FrameShape) -> Key {
-    (DisplayVariant::new(frame.display, frame.target_format), frame.target_format)
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Key {
+    variant: DisplayVariant,
+    format: wgpu::TextureFormat,
+    /// The frame fills a part of the target.
+    viewport: bool,
 }
+
+impl Key {
+    fn of(frame: &FrameShape) -> Self {
+        let variant = DisplayVariant::new(frame.display, frame.target_format);
+        Self { variant, format: frame.target_format, viewport: frame.viewport.is_some() }
+    }
+}
+
+/// The uniform of a frame of exposure 1 that fills its target.
+const UNEXPOSED: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 
 #[derive(Debug)]
 struct OnDevice {
     layout: wgpu::BindGroupLayout,
     pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
     uniform: wgpu::Buffer,
-    exposure: f32,
+    /// What the uniform holds: the exposure, and the viewport's corner.
+    written: [f32; 4],
 }
 
 impl Effect for DisplayPass {
@@ -57,29 +71,39 @@ impl Effect for DisplayPass {
 
     fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
-        Ok(!frame.display_pass || device.make(gpu, key(frame), false)?)
+        Ok(!frame.display_pass || device.make(gpu, Key::of(frame), false)?)
     }
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.key = None;
         if frame.display_pass {
             let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
-            device.make(gpu, key(frame), true)?;
-            device.expose(gpu, frame.exposure);
-            self.key = Some(key(frame));
+            device.make(gpu, Key::of(frame), true)?;
+            let [x, y] = frame.viewport.map_or([0, 0], |viewport| viewport.origin);
+            device.write(gpu, [frame.exposure, x as f32, y as f32, 0.0]);
+            self.key = Some(Key::of(frame));
         }
         Ok(())
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
-        let linear = board.linear;
+        let (linear, viewport) = (board.linear, board.viewport);
+        let load = match viewport {
+            None => LoadOp::Clear(wgpu::Color::BLACK),
+            Some(Viewport { clear: Some(color), .. }) => LoadOp::Clear(color),
+            Some(Viewport { clear: None, .. }) => LoadOp::Load,
+        };
         graph
             .raster_pass(self.name())
             .calls_for(board.has_display_pass(), "use for a linear frame")
             .samples(&linear)
-            .color(&mut board.target, LoadOp::Clear(wgpu::Color::BLACK))
+            .color(&mut board.target, load)
             .run(move |context| {
                 let view = context.resources.view(&linear)?;
+                if let Some(Viewport { origin: [x, y], size: [width, height], .. }) = viewport {
+                    context.pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
+                    context.pass.set_scissor_rect(x, y, width, height);
+                }
                 if let (Some(device), Some(key)) = (&self.device, &self.key) {
                     device.draw(context.resources.device, context.pass, key, view);
                 }
@@ -112,10 +136,10 @@ impl OnDevice {
         });
         let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("exposure"),
-            contents: bytemuck::bytes_of(&[1.0_f32; 4]),
+            contents: bytemuck::bytes_of(&UNEXPOSED),
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         });
-        Self { layout, pipelines: HashMap::new(), uniform, exposure: 1.0 }
+        Self { layout, pipelines: HashMap::new(), uniform, written: UNEXPOSED }
     }
 
     /// Makes the pipeline for a target, or begins to; whether it is there.
@@ -128,11 +152,11 @@ impl OnDevice {
         Ok(pipeline.is_there(wait)?)
     }
 
-    /// Writes the exposure if it changed.
-    fn expose(&mut self, gpu: &Gpu, exposure: f32) {
-        if exposure != self.exposure {
-            self.exposure = exposure;
-            gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&exposure));
+    /// Writes the exposure and the viewport's corner if they changed.
+    fn write(&mut self, gpu: &Gpu, numbers: [f32; 4]) {
+        if numbers != self.written {
+            self.written = numbers;
+            gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&numbers));
         }
     }
 
@@ -162,9 +186,11 @@ impl OnDevice {
 fn make(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
-    (variant, format): Key,
+    Key { variant, format, viewport }: Key,
 ) -> Result<wgpu::RenderPipeline, RenderError> {
-    let module = shader::compile(device, "display", &variant.flags())?;
+    let mut flags = variant.flags();
+    flags.push(("VIEWPORT", viewport));
+    let module = shader::compile(device, "display", &flags)?;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("display"),
         bind_group_layouts: &[Some(layout)],

@@ -10,8 +10,8 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{Material, PolygonLight};
 use lumbre_scene::{
-    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, MaterialTextures, Mesh, Name, Primitive,
-    StaticObject,
+    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, MaterialTextures, Mesh, Name, Primitive,
+    StaticObject, hidden_entities,
 };
 
 use super::emissive_faces::{Face, MAXIMUM_POLYGONS, faces};
@@ -51,11 +51,15 @@ impl Emitters {
         if self.world != Some(world.id()) {
             *self = Self { world: Some(world.id()), ..Self::default() };
         }
+        let hidden = hidden_entities(world);
         let mut query = world.query_filtered::<(
             (Entity, &Mesh, &Material, &GlobalTransform, Option<&MaterialTextures>),
             (Has<StaticObject>, Option<&Primitive>),
-        ), (With<EmissiveLight>, Without<Hidden>)>();
-        let mut found: Vec<_> = query.iter(world).filter(|(emitter, _)| emitter.3.0.is_finite()).collect();
+        ), With<EmissiveLight>>();
+        let shown =
+            |emitter: Entity, place: &GlobalTransform| place.0.is_finite() && !hidden.contains(&emitter);
+        let mut found: Vec<_> =
+            query.iter(world).filter(|(emitter, _)| shown(emitter.0, emitter.3)).collect();
         found.sort_by_key(|(emitter, _)| emitter.0.index_u32());
         let mut polygons = Vec::new();
         let mut known = HashMap::new();
@@ -135,7 +139,7 @@ fn name(world: &World, entity: Entity, primitive: Option<&Primitive>) -> String 
 mod tests {
     use lumbre_mesh::shapes;
     use lumbre_optics::Surface;
-    use lumbre_scene::{Transform, update_transforms};
+    use lumbre_scene::{Hidden, Transform, update_transforms};
 
     use super::*;
 

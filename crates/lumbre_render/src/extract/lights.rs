@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, SpotCone};
-use lumbre_scene::{GlobalTransform, Name};
+use lumbre_scene::{GlobalTransform, LightCensus, Name, light_place, shines};
 
 use super::emitters::{EmissivePolygon, Emitters};
 use crate::growable_buffer::GrowableBuffer;
@@ -51,6 +51,8 @@ pub(crate) struct ShadowCounts {
 /// What the shaders need to know of a frame's lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LightSet {
+    /// What they count as in the census.
+    pub census: LightCensus,
     /// Sum of the ambient lights, which are in no class.
     pub ambient: Vec3,
     /// Lights of all classes.
@@ -148,7 +150,11 @@ impl LightSet {
         let mut query = world.query::<(&Light, Option<&GlobalTransform>)>();
         let mut found: Vec<&Light> = query
             .iter(world)
-            .filter(|(light, transform)| place(light, *transform).is_some_and(|place| shines(light, &place)))
+            .filter(|(light, transform)| {
+                let shines = shines(light, *transform);
+                set.census.lights_off += usize::from(!shines);
+                shines
+            })
             .map(|(light, _)| light)
             .collect();
         found.sort_by_key(|light| light.bake == BakeMode::Static);
@@ -227,6 +233,7 @@ impl LightSet {
     /// Counts a light, and says of which class it is; an ambient one is of none. Baked lights are to come last: where numbers run out, the same
     /// lights have to go without one wherever they are counted.
     fn add(&mut self, light: &Light) -> Option<LightClass> {
+        self.census.add(light);
         if light.kind == LightKind::Ambient {
             self.ambient += light.ambient;
             return None;
@@ -379,9 +386,11 @@ pub(crate) fn extract_lights(
     let mut found: Vec<_> = query
         .iter(world)
         .filter_map(|(entity, light, transform)| {
-            let place = place(light, transform);
+            let place = light_place(light, transform);
             left_out.extend(fault(world, entity, light, place.as_ref()));
-            place.filter(|place| shines(light, place)).map(|place| (entity, light, place))
+            let shines = shines(light, transform);
+            scene.set.census.lights_off += usize::from(!shines);
+            place.filter(|_| shines).map(|place| (entity, light, place))
         })
         .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
@@ -440,21 +449,6 @@ fn fault(world: &World, entity: Entity, light: &Light, place: Option<&GlobalTran
         }
         (Ok(()), Some(_)) => format!("light \"{name}\": its transform is not finite"),
     })
-}
-
-/// Where a light stands; an ambient one needs no place.
-fn place(light: &Light, transform: Option<&GlobalTransform>) -> Option<GlobalTransform> {
-    transform.copied().or_else(|| (light.kind == LightKind::Ambient).then(GlobalTransform::default))
-}
-
-/// Whether a light adds anything; one whose numbers are out of range is left out rather than let into a frame.
-fn shines(light: &Light, transform: &GlobalTransform) -> bool {
-    let colors = [light.ambient, light.diffuse, light.specular];
-    let placed = transform.0.is_finite();
-    placed
-        && light.enabled
-        && colors.iter().any(|color| *color != Vec3::ZERO)
-        && light.validate("light").is_ok()
 }
 
 #[cfg(test)]

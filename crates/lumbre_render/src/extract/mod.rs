@@ -4,8 +4,8 @@ mod camera;
 mod emissive_faces;
 mod emitters;
 mod lights;
+mod lit_pass;
 mod objects;
-mod traits;
 
 pub(crate) use camera::{CameraView, ViewVolume, find_camera};
 pub(crate) use emitters::Emitters;
@@ -14,5 +14,5 @@ pub(crate) use lights::PolygonReach;
 pub(crate) use lights::{
     KnownLights, LightClass, LightCounts, LightReach, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
 };
+pub(crate) use lit_pass::LitPass;
 pub(crate) use objects::{Object, Objects};
-pub(crate) use traits::{LitPass, Traits};

@@ -10,9 +10,11 @@ use bevy_ecs::world::WorldId;
 use glam::{DAffine3, DVec3};
 use lumbre_mesh::TextureCoordinateSet;
 use lumbre_optics::{Material, ReflectionModel, Shading};
-use lumbre_scene::{GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh, Name};
+use lumbre_scene::{
+    Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh, Name,
+    ObjectCensus, ObjectTraits, StaticObject, with_descendants,
+};
 
-use super::Traits;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{MaterialData, ObjectData};
 use crate::mesh_buffers::{MeshBuffers, MeshKey};
@@ -27,7 +29,11 @@ pub(crate) struct Object {
     pub mesh: MeshKey,
     pub texture_set: Option<Arc<TextureSet>>,
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
-    pub traits: Traits,
+    pub traits: ObjectTraits,
+    /// Of its mesh.
+    triangles: usize,
+    /// It is in the census.
+    counted: bool,
     /// Why it cannot be drawn, by name.
     fault: Option<String>,
     pub mirrored: bool,
@@ -52,15 +58,20 @@ type ObjectQuery<'w, 's> = Query<
         Option<Ref<'static, MaterialTextures>>,
         Option<Ref<'static, Lightmap>>,
         (Option<&'static Shading>, Option<&'static ReflectionModel>),
+        (Has<StaticObject>, Has<DynamicObject>, Has<EmissiveLight>),
     ),
-    Without<Hidden>,
 >;
 
 /// Meshes that nothing says the look of.
-type Unfinished<'w, 's> = Query<'w, 's, Entity, (With<Mesh>, Without<Material>, Without<Hidden>)>;
+type Unfinished<'w, 's> = Query<'w, 's, Entity, (With<Mesh>, Without<Material>)>;
+type HiddenBranches<'w, 's> = (Query<'w, 's, Entity, With<Hidden>>, Query<'w, 's, &'static Children>);
 type Names<'w, 's> = Query<'w, 's, &'static Name>;
-type Extraction =
-    SystemState<(ObjectQuery<'static, 'static>, Unfinished<'static, 'static>, Names<'static, 'static>)>;
+type Extraction = SystemState<(
+    ObjectQuery<'static, 'static>,
+    Unfinished<'static, 'static>,
+    HiddenBranches<'static, 'static>,
+    Names<'static, 'static>,
+)>;
 
 /// All objects, and their GPU buffers.
 pub(crate) struct Objects {
@@ -69,6 +80,8 @@ pub(crate) struct Objects {
     /// By slot; `None` is free.
     pub objects: Vec<Option<Object>>,
     free: Vec<usize>,
+    /// Of the objects that can be drawn.
+    pub census: ObjectCensus,
     pub transforms: GrowableBuffer<ObjectData>,
     pub materials: GrowableBuffer<MaterialData>,
     frame: u64,
@@ -88,6 +101,7 @@ impl Objects {
             slots: HashMap::new(),
             objects: Vec::new(),
             free: Vec::new(),
+            census: ObjectCensus::default(),
             transforms: GrowableBuffer::new("objects"),
             materials: GrowableBuffer::new("materials"),
             frame: 0,
@@ -98,6 +112,22 @@ impl Objects {
 
     /// Brings the slots up to date for a frame seen from `eye`. What cannot be drawn is `left_out`, each with a sentence.
     pub fn extract(
+        &mut self,
+        world: &mut World,
+        gpu: &Gpu,
+        resources: (&mut MeshBuffers, &mut Textures, &mut TextureSets),
+        eye: DVec3,
+        left_out: &mut Vec<String>,
+    ) -> Result<(), RenderError> {
+        let updated = self.update(world, gpu, resources, eye, left_out);
+        if updated.is_err() {
+            // Half of it is of this frame: the next one begins anew.
+            *self = Self { frame: self.frame, stale: true, ..Self::new() };
+        }
+        updated
+    }
+
+    fn update(
         &mut self,
         world: &mut World,
         gpu: &Gpu,
@@ -116,19 +146,21 @@ impl Objects {
             self.origin = eye;
         }
         let Some((id, mut state)) = self.state.take() else { return Ok(()) };
-        if let Ok((query, unfinished, names)) = state.get(world) {
+        if let Ok((query, unfinished, (hidden, children), names)) = state.get(world) {
+            let hidden = with_descendants(hidden.iter(), &children);
             let named = |entity: Entity, fault: &str| {
                 let name = names.get(entity).map_or_else(|_| entity.to_string(), ToString::to_string);
                 format!("object \"{name}\": {fault}")
             };
-            let unfinished = unfinished.iter().map(|entity| named(entity, "it has a Mesh and no Material"));
+            let unfinished = unfinished.iter().filter(|entity| !hidden.contains(entity));
+            let unfinished = unfinished.map(|entity| named(entity, "it has a Mesh and no Material"));
             left_out.extend(unfinished);
-            for (entity, mesh, material, transform, maps, lightmap, (shading, reflection)) in query.iter() {
+            let shown = query.iter().filter(|object| !hidden.contains(&object.0));
+            for (entity, mesh, material, transform, maps, lightmap, choices, marks) in shown {
                 if !transform.0.is_finite() {
                     left_out.push(named(entity, "its transform is not finite"));
                     continue;
                 }
-                let choices = (shading.copied(), reflection.copied());
                 let (slot, new) = self.slot(entity);
                 let remeshed = new || mesh.is_changed();
                 let transformed = new || moved || transform.is_changed();
@@ -136,7 +168,7 @@ impl Objects {
                 let map_changed = lightmap.as_ref().is_some_and(Ref::is_changed);
                 let maps = maps.map(Ref::into_inner);
                 let lightmap = lightmap.map(Ref::into_inner);
-                let traits = Traits::new(&material, maps, &mesh.0, lightmap.is_some(), choices);
+                let traits = ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks));
                 let normal_map =
                     maps.and_then(|maps| maps.normal.as_ref()).map(|map| match map.texture.tex_coord {
                         0 => TextureCoordinateSet::First,
@@ -179,8 +211,8 @@ impl Objects {
                         None => None,
                     };
                 }
-                object.traits = traits;
                 object.seen = self.frame;
+                object.count(&mut self.census, traits, mesh.0.triangle_count());
                 self.objects[slot] = Some(object);
             }
         }
@@ -204,11 +236,14 @@ impl Objects {
     /// Frees the slots of entities that are gone, and what only they used.
     fn release(&mut self, meshes: &mut MeshBuffers, textures: &mut Textures, sets: &mut TextureSets) {
         let (frame, objects, free) = (self.frame, &mut self.objects, &mut self.free);
+        let census = &mut self.census;
         let before = self.slots.len();
         self.slots.retain(|_, slot| {
             let alive = objects[*slot].as_ref().is_some_and(|object| object.seen == frame);
             if !alive {
-                objects[*slot] = None;
+                if let Some(mut object) = objects[*slot].take() {
+                    object.leave(census);
+                }
                 free.push(*slot);
             }
             alive
@@ -231,13 +266,15 @@ impl Objects {
 }
 
 impl Object {
-    fn new(entity: Entity, mesh: MeshKey, traits: Traits) -> Self {
+    fn new(entity: Entity, mesh: MeshKey, traits: ObjectTraits) -> Self {
         Self {
             entity,
             mesh,
             texture_set: None,
             lightmap: None,
             traits,
+            triangles: 0,
+            counted: false,
             fault: None,
             mirrored: false,
             world_from_mesh: DAffine3::IDENTITY,
@@ -245,6 +282,25 @@ impl Object {
             half_size: DVec3::ZERO,
             radius: 0.0,
             seen: 0,
+        }
+    }
+
+    /// Takes new traits, in the census too.
+    fn count(&mut self, census: &mut ObjectCensus, traits: ObjectTraits, triangles: usize) {
+        let drawn = self.fault.is_none();
+        if (self.traits, self.triangles, self.counted) != (traits, triangles, drawn) {
+            self.leave(census);
+            (self.traits, self.triangles, self.counted) = (traits, triangles, drawn);
+            if drawn {
+                census.add(&traits, triangles);
+            }
+        }
+    }
+
+    /// Leaves the census.
+    fn leave(&mut self, census: &mut ObjectCensus) {
+        if std::mem::take(&mut self.counted) {
+            census.remove(&self.traits, self.triangles);
         }
     }
 

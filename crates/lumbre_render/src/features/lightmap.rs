@@ -4,5 +4,5 @@ use super::Subject;
 use crate::shader::{Feature, Variant};
 
 pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
-    variant.set(Feature::Lightmap, subject.object.uses_lightmap(subject.frame.lightmaps));
+    variant.set(Feature::Lightmap, subject.frame.lightmaps && subject.object.is_lit_by_lightmap());
 }

@@ -12,7 +12,7 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     let LightSet { every, unbounded, inverse_square, ranged, .. } = &frame.lights;
     let listed = if clustered { unbounded } else { every };
     // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
-    let lightmapped = object.uses_lightmap(frame.lightmaps);
+    let lightmapped = frame.lightmaps && object.is_lit_by_lightmap();
     let left =
         |of: &LightCounts| of.all > of.dynamic && (!lightmapped || object.specular || of.static_ambient);
     variant.set(Feature::DynamicLights, listed.dynamic > 0);

@@ -12,9 +12,9 @@ mod textures;
 mod two_sided;
 
 use lumbre_optics::{ReflectionModel, Shading};
-use lumbre_scene::SceneSettings;
+use lumbre_scene::{ObjectTraits, SceneSettings};
 
-use crate::extract::{LightSet, Traits};
+use crate::extract::LightSet;
 use crate::frame_plan::Ending;
 use crate::shader::{DisplayVariant, Feature, Variant};
 use crate::{Display, FrameOptions};
@@ -60,7 +60,7 @@ impl FrameFeatures {
 
 /// An object in a frame, as the subjects are asked about it.
 struct Subject<'a> {
-    object: &'a Traits,
+    object: &'a ObjectTraits,
     settings: &'a SceneSettings,
     frame: &'a FrameFeatures,
     shading: Shading,
@@ -76,7 +76,7 @@ impl Subject<'_> {
 }
 
 /// The variant that draws an object in such a frame.
-pub(crate) fn variant(object: &Traits, settings: &SceneSettings, frame: &FrameFeatures) -> Variant {
+pub(crate) fn variant(object: &ObjectTraits, settings: &SceneSettings, frame: &FrameFeatures) -> Variant {
     let shading = frame.shading.or(object.shading).unwrap_or(settings.shading);
     let reflection = frame.reflection.or(object.reflection).unwrap_or(settings.reflection);
     let subject = Subject { object, settings, frame, shading, lit: !object.unlit };

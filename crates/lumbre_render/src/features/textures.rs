@@ -1,7 +1,8 @@
 //! The textures of a material, and the sets of coordinates that they and the lightmap read.
 
+use lumbre_scene::ObjectTraits;
+
 use super::Subject;
-use crate::extract::Traits;
 use crate::shader::{Feature, Variant};
 use crate::texture_sets;
 
@@ -15,7 +16,7 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
 }
 
 /// The variant with the coordinates of the textures that are left in it.
-pub(super) fn coordinates(object: &Traits, mut variant: Variant) -> Variant {
+pub(super) fn coordinates(object: &ObjectTraits, mut variant: Variant) -> Variant {
     let read = |second: bool| {
         let slots = (0..).zip(texture_sets::features(object.texture_mask));
         slots

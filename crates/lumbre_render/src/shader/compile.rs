@@ -16,7 +16,7 @@ pub(crate) fn compile(
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(root),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
+        source: wgpu::ShaderSource::Wgsl((&*source).into()),
     });
     match pollster::block_on(scope.pop()) {
         None => Ok(module),
@@ -26,13 +26,15 @@ pub(crate) fn compile(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use lumbre_optics::{ReflectionModel, Shading};
 
     use super::to_wgsl;
     use crate::shader::{Feature, Variant};
 
     /// The WGSL of a variant, which naga accepts.
-    fn valid(variant: &Variant) -> String {
+    fn valid(variant: &Variant) -> Arc<str> {
         let source = to_wgsl("forward", &variant.flags()).unwrap();
         let module = match naga::front::wgsl::parse_str(&source) {
             Ok(module) => module,

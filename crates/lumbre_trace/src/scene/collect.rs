@@ -7,8 +7,8 @@ use glam::{DAffine3, DVec3};
 use lumbre_mesh::{TextureCoordinateSet, TriangleMesh};
 use lumbre_optics::{Light, LightKind, Material, ReflectionModel};
 use lumbre_scene::{
-    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Medium, Mesh,
-    Name, Primitive, Quadric, SceneSettings, StaticObject,
+    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Lightmap, MaterialTextures, Medium, Mesh, Name,
+    Primitive, Quadric, SceneSettings, StaticObject, hidden_entities,
 };
 
 use super::emissive_polygons::{EmissivePolygon, emissive_polygons};
@@ -67,10 +67,11 @@ pub(crate) fn collect(
     lightmaps: bool,
 ) -> Result<Collected, TraceError> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-    let query = world.query_filtered::<Found<'static>, Without<Hidden>>();
+    let hidden = hidden_entities(world);
+    let query = world.query::<Found<'static>>();
     let lamps = world.query::<FoundLight<'static>>();
     let world = &*world;
-    let mut found: Vec<_> = query.iter_manual(world).collect();
+    let mut found: Vec<_> = query.iter_manual(world).filter(|object| !hidden.contains(&object.0)).collect();
     found.sort_by_key(|(entity, ..)| entity.index_u32());
     let mut collected = Collected {
         settings,

@@ -1,0 +1,149 @@
+//! What a World calls for: the one record that decides which passes and shader variants exist, and that is printed. Not those decisions.
+//!
+//! ```text
+//!  components ──► ObjectTraits, one object ──► ObjectCensus, all of them ─┐
+//!  lights     ──► LightCensus ────────────────────────────────────────────┼──► Census ──► lines
+//!  SceneSettings ─────────────────────────────────────────────────────────┘
+//! ```
+
+mod lights;
+mod lines;
+mod object;
+mod object_census;
+
+use std::collections::BTreeMap;
+
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use lumbre_optics::{ReflectionModel, Shading};
+use serde::Serialize;
+
+pub use lights::{LightCensus, light_place, shines};
+pub use lines::CensusLine;
+pub use object::{Mobility, ObjectComponents, ObjectItem, ObjectTraits, shown_objects};
+pub use object_census::ObjectCensus;
+
+use crate::SceneSettings;
+
+/// Counts of what is in a World. Lights that are off and meshes that are hidden count only as such.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Census {
+    /// The lights that shine.
+    #[serde(flatten)]
+    pub lights: LightCensus,
+    /// Whether there is global ambient light.
+    pub global_ambient: bool,
+    /// Whether there is a sky.
+    pub sky: bool,
+    /// Entities with a mesh that is shown.
+    pub meshes: usize,
+    /// Triangles of all shown meshes.
+    pub triangles: usize,
+    /// Meshes that the baker lights.
+    pub static_objects: usize,
+    /// Meshes that move.
+    pub dynamic_objects: usize,
+    /// Meshes that are lit by a lightmap.
+    pub lightmapped: usize,
+    /// Meshes with a texture of any kind.
+    pub textured: usize,
+    /// Meshes with a base colour texture.
+    pub base_color_textures: usize,
+    /// Meshes with an emissive texture.
+    pub emissive_textures: usize,
+    /// Meshes with a metallic-roughness texture.
+    pub metallic_roughness_textures: usize,
+    /// Meshes with a normal texture.
+    pub normal_textures: usize,
+    /// Meshes with an occlusion texture.
+    pub occlusion_textures: usize,
+    /// Meshes with vertex colours.
+    pub vertex_colors: usize,
+    /// Meshes that are cut out by alpha.
+    pub alpha_mask: usize,
+    /// Meshes that are blended.
+    pub alpha_blend: usize,
+    /// Meshes that are lit from both sides.
+    pub two_sided: usize,
+    /// Of these, those with a material of its own on the back.
+    pub back_materials: usize,
+    /// Meshes that take no light.
+    pub unlit: usize,
+    /// Meshes that emit light.
+    pub emissive: usize,
+    /// Emissive meshes whose faces light others in real time.
+    pub emissive_lights: usize,
+    /// Meshes with a highlight.
+    pub specular: usize,
+    /// Meshes that mirror.
+    pub mirrors: usize,
+    /// Meshes that light passes through.
+    pub transmission: usize,
+    /// Meshes shaded per face.
+    pub flat: usize,
+    /// Meshes shaded per vertex.
+    pub gouraud: usize,
+    /// Meshes shaded per fragment.
+    pub phong: usize,
+    /// Lit meshes with a specular model of their own.
+    pub own_reflection: usize,
+    /// Lit meshes with a highlight, by the name of their specular model; models that nothing uses are missing.
+    pub reflection_models: BTreeMap<&'static str, usize>,
+    /// Whether there is fog.
+    pub fog: bool,
+}
+
+impl Census {
+    /// Counts what is in a World. Global transforms must be up to date.
+    pub fn of(world: &mut World) -> Self {
+        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let objects = ObjectCensus::of(&shown_objects(world));
+        Self::new(&objects, LightCensus::of(world), &settings)
+    }
+
+    /// What objects and lights come to under the settings of their scene.
+    pub fn new(objects: &ObjectCensus, lights: LightCensus, settings: &SceneSettings) -> Self {
+        let [base_color, emissive, metallic_roughness, normal, occlusion] = objects.textures;
+        let two_sided = |count| if settings.two_sided { count } else { 0 };
+        let highlights = ReflectionModel::ALL
+            .iter()
+            .map(|model| (model.name(), objects.highlights_of(*model, settings.reflection)))
+            .filter(|(_, count)| *count > 0)
+            .collect();
+        let shaded = |rate| objects.shaded(rate, settings.shading);
+        Self {
+            lights,
+            global_ambient: settings.ambient != Vec3::ZERO,
+            sky: settings.sky != Vec3::ZERO,
+            meshes: objects.meshes,
+            triangles: objects.triangles,
+            static_objects: objects.static_objects,
+            dynamic_objects: objects.dynamic_objects,
+            lightmapped: objects.lightmapped,
+            textured: objects.textured,
+            base_color_textures: base_color,
+            emissive_textures: emissive,
+            metallic_roughness_textures: metallic_roughness,
+            normal_textures: normal,
+            occlusion_textures: occlusion,
+            vertex_colors: objects.vertex_colors,
+            alpha_mask: objects.alpha_mask,
+            alpha_blend: objects.alpha_blend,
+            two_sided: two_sided(objects.double_sided),
+            back_materials: two_sided(objects.back_materials),
+            unlit: objects.unlit,
+            emissive: objects.glowing + two_sided(objects.glowing_behind),
+            emissive_lights: objects.emissive_lights,
+            specular: objects.highlights.iter().sum(),
+            mirrors: objects.mirrors,
+            transmission: objects.transmission,
+            flat: shaded(Shading::Flat),
+            gouraud: shaded(Shading::Gouraud),
+            phong: shaded(Shading::Phong),
+            own_reflection: objects.reflection[1..].iter().sum(),
+            reflection_models: highlights,
+            fog: settings.fog.is_some(),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! What is hidden: a [`Hidden`] entity and all that hangs from it. Not what lies outside of a view.
+
+use bevy_ecs::entity::EntityHashSet;
+use bevy_ecs::prelude::*;
+
+use crate::Hidden;
+
+/// The entities whose meshes are hidden: those with [`Hidden`], and all below them in the hierarchy.
+pub fn hidden_entities(world: &mut World) -> EntityHashSet {
+    let mut state =
+        bevy_ecs::system::SystemState::<(Query<Entity, With<Hidden>>, Query<&Children>)>::new(world);
+    // Queries are there in every World; only resources may be missing.
+    state.get(world).map(|(hidden, children)| with_descendants(hidden.iter(), &children)).unwrap_or_default()
+}
+
+/// These entities and all that hang from them.
+pub fn with_descendants(
+    entities: impl Iterator<Item = Entity>,
+    children: &Query<&Children>,
+) -> EntityHashSet {
+    let mut found = EntityHashSet::default();
+    let mut stack: Vec<Entity> = entities.collect();
+    while let Some(entity) = stack.pop() {
+        if found.insert(entity) {
+            stack.extend(children.get(entity).into_iter().flatten());
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_hangs_from_a_hidden_entity_is_hidden() {
+        let mut world = World::new();
+        assert!(hidden_entities(&mut world).is_empty());
+        let top = world.spawn_empty().id();
+        let hidden = world.spawn((Hidden, ChildOf(top))).id();
+        let child = world.spawn(ChildOf(hidden)).id();
+        let below = world.spawn((Hidden, ChildOf(child))).id();
+        world.spawn(ChildOf(top));
+        let mut found: Vec<Entity> = hidden_entities(&mut world).into_iter().collect();
+        found.sort();
+        let mut expected = vec![hidden, child, below];
+        expected.sort();
+        assert_eq!(found, expected);
+        world.entity_mut(hidden).remove::<Hidden>();
+        assert_eq!(hidden_entities(&mut world).into_iter().collect::<Vec<_>>(), [below]);
+    }
+}
