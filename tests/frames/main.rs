@@ -7,6 +7,7 @@ mod baked;
 mod balls;
 mod changes;
 mod conformance;
+mod constant_colors;
 mod degenerate;
 mod display;
 mod documents;

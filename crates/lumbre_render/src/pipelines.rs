@@ -150,7 +150,7 @@ pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
         .into_iter()
         .filter(|attribute| match attribute {
             Attribute::Position => true,
-            Attribute::Normal => lit,
+            Attribute::Normal => lit && (variant.has(Feature::Lights) || variant.shading != Shading::Phong),
             Attribute::Uv0 => variant.has(Feature::Uv0),
             Attribute::Uv1 => variant.has(Feature::Uv1),
             Attribute::Color => variant.has(Feature::VertexColor),

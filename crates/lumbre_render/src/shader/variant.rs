@@ -128,6 +128,10 @@ features! {
     ShadowCascades = 49 => "SHADOW_CASCADES",
     /// Filters shadows by the size of a light.
     SoftShadows = 50 => "SOFT_SHADOWS",
+    /// Loops over lights of any kind, and so needs points and normals.
+    Lights = 51 => "LIGHTS",
+    /// Has one colour all over, which the vertex stage makes.
+    Constant = 52 => "CONSTANT",
 }
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
@@ -160,6 +164,18 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::ShadowCubes as u64
     | Feature::ShadowCascades as u64
     | Feature::SoftShadows as u64;
+
+/// Features that make a colour differ from place to place on a surface, or from its front to its back.
+const VARYING: u64 = Feature::Lights as u64
+    | Feature::Lightmap as u64
+    | Feature::VertexColor as u64
+    | Feature::BaseColorTexture as u64
+    | Feature::EmissiveTexture as u64
+    | Feature::MetallicRoughnessTexture as u64
+    | Feature::OcclusionTexture as u64
+    | Feature::Alpha as u64
+    | Feature::TwoSided as u64
+    | Feature::Fog as u64;
 
 /// A variant of the forward shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -244,7 +260,14 @@ impl Variant {
                 | Feature::ShadowCascades as u64
                 | Feature::SoftShadows as u64);
         }
+        self.bits &= !(Feature::Lights as u64 | Feature::Constant as u64);
+        self.set(Feature::Lights, listed || clusters);
         if !listed && !clusters {
+            if self.has(Feature::Lit) && !self.has(Feature::ClampVertices) {
+                // How often nothing is evaluated makes no difference.
+                self.shading = Shading::Phong;
+                self.bits &= !(Feature::Modulated as u64);
+            }
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
                 | Feature::LocalViewer as u64
@@ -268,6 +291,8 @@ impl Variant {
                 | Feature::FresnelConductor as u64
                 | Feature::FresnelNormalReflectance as u64);
         }
+        let evaluated_once = !self.has(Feature::Lit) || self.shading == Shading::Phong;
+        self.set(Feature::Constant, evaluated_once && self.bits & VARYING == 0);
         self
     }
 
