@@ -69,9 +69,10 @@ fn any_light(random: &mut Random, world: &mut World) {
         3 => 30.0,
         _ => random.within(0.3, 4.0) as f32,
     };
-    let attenuation = match random.within(0.0, 4.0) as u32 {
+    let attenuation = match random.within(0.0, 5.0) as u32 {
         0 => Attenuation { range, constant: 0.5, linear: 0.2, quadratic: 0.1, clamp: false },
         1 => Attenuation { range, clamp: true, ..Attenuation::INVERSE_SQUARE },
+        2 => Attenuation { range, constant: 1.0, linear: 0.0, quadratic: 1.2, clamp: false },
         _ => Attenuation { range, ..Attenuation::INVERSE_SQUARE },
     };
     let cone = match random.within(0.0, 5.0) as u32 {

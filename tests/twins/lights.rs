@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use glam::Vec3;
+use glam::{DVec4, Vec3};
 use lumbre_optics::*;
 use lumbre_tests::kernel::{Kernel, Type};
 
@@ -49,23 +49,58 @@ fn attenuation() -> Twin {
         .range(0.0, 1.001e30)
 }
 
-/// 1/range², squared distance.
+/// Constant, 1/range², squared distance.
 fn squares(sequence: &mut Sequence) -> Vec<f32> {
     let range = sequence.decades(-2.0, 4.0);
     let distance = if sequence.next() < 0.7 { range * sequence.next() } else { sequence.decades(-4.0, 4.0) };
-    vec![1.0 / (range * range), distance * distance]
+    let constant = if sequence.next() < 0.5 { 0.0 } else { sequence.decades(-6.0, 6.0) };
+    vec![constant, 1.0 / (range * range), distance * distance]
 }
 
-fn attenuation_inverse_square() -> Twin {
-    Twin::new("attenuation", "attenuate_inverse_square", &[], &[Type::Number; 2], Type::Number)
-        .expect(|x| attenuate_inverse_square(x[0], x[1]))
-        .within(|x| lights::attenuate_inverse_square(x[0], x[1]))
+fn attenuation_quadratic() -> Twin {
+    Twin::new("attenuation", "attenuate_quadratic", &[], &[Type::Number; 3], Type::Number)
+        .expect(|x| attenuate_quadratic(x[0], x[1], x[2]))
+        .within(|x| lights::attenuate_quadratic(x[0], x[1], x[2]))
         .random(squares)
         .corners(product(&[
+            &[0.0, 1e-30, 1e-4, 0.833_333_3, 1e6],
             &[1e-30, 1e-6, 0.111_111_11, 1.0, 1e18],
             &[0.0, 1e-30, 1e-4, 0.999_999, 1.0, 8.999_999, 9.0, 1e6, 1e36],
         ]))
         .range(0.0, 1.001e4)
+}
+
+/// A smooth cone about some axis, and a direction, half of them near the cone's edge.
+fn smooth_cones(sequence: &mut Sequence) -> Vec<f32> {
+    let outer = f64::from(sequence.next());
+    let inner = outer + (1.0 - outer) * f64::from(sequence.next());
+    let cosines = SpotCosines { smooth_cone: true, outer, inner_or_exponent: inner };
+    let axis = sequence.unit().as_dvec3();
+    let beside = safe_normalize(axis.cross(sequence.unit().as_dvec3()));
+    let near = outer + f64::from(sequence.decades(-7.0, -1.0) * (2.0 * sequence.next() - 1.0));
+    let cosine = if sequence.next() < 0.5 { near } else { f64::from(sequence.between(-1.0, 1.0)) };
+    let cosine = cosine.clamp(-1.0, 1.0);
+    let to_light = -(axis * cosine + beside * (1.0 - cosine * cosine).sqrt());
+    let cone = cosines.smooth_cone_about(axis).unwrap_or_default();
+    [cone.x, cone.y, cone.z, cone.w, to_light.x, to_light.y, to_light.z].map(|number| number as f32).to_vec()
+}
+
+fn smooth_spot() -> Twin {
+    let cone = |x: &[f64]| DVec4::new(x[0], x[1], x[2], x[3]);
+    Twin::new("spot", "smooth_spot_factor", &[], &[Type::Vector4, Type::Vector], Type::Number)
+        .expect(move |x| smooth_spot_factor(cone(x), vector(x, 4)))
+        .within(move |x| lights::smooth_spot_factor(cone(x), vector(x, 4)))
+        .random(smooth_cones)
+        .corners(product(&[
+            &[0.0, 1e-3],
+            &[0.0],
+            &[0.0, 1.0, 1e3],
+            &[1.0, 0.0, -0.5, -999.0],
+            &[0.0, 1e-30],
+            &[0.0],
+            &[-1.0, -0.999_5, 0.0, 1.0],
+        ]))
+        .range(0.0, 1.0)
 }
 
 fn spots() -> [Twin; 2] {
@@ -176,7 +211,7 @@ fn light(kind: LightKind, spot: u32) -> Twin {
 }
 
 pub fn twins() -> Vec<Twin> {
-    let mut all = vec![attenuation(), attenuation_inverse_square()];
+    let mut all = vec![attenuation(), attenuation_quadratic(), smooth_spot()];
     all.extend(spots());
     all.push(light(LightKind::Directional, 0));
     all.push(light(LightKind::Directional, 1));

@@ -113,17 +113,17 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
     window * if clamp_to_one { factor.min(1.0) } else { factor }
 }
 
-/// [`attenuate`] by the inverse square law, (0, 0, 1) and not clamped to 1, from `inverse_range_squared` in 1/m² and the square of the
-/// distance in m²: what a loop over many lights has at hand. For ranges from 10⁻⁹ to 10¹⁵ m.
+/// c times [`attenuate`] for coefficients (a, 0, c), not clamped to 1: the inverse square law, where `constant` = a/c in m² is 0. From `inverse_range_squared`
+/// in 1/m² and the square of the distance in m²: what a loop over many lights has at hand. For ranges from 10⁻⁹ to 10¹⁵ m.
 ///
 /// # Error of the f32 twin
 ///
-/// At most 8 u of the factor, and 4 u (d/range)⁴ of the factor without its window: the division is 5 u, the difference before it 1 u, and
-/// under a centimetre the divisor, the square of a rounded constant, 2 u; the fourth power is off by 3 u of itself.
-pub fn attenuate_inverse_square(inverse_range_squared: f64, distance_squared: f64) -> f64 {
+/// At most 9 u of the factor, and 4 u (d/range)⁴ of the factor without its window: the division is 5 u, the difference before it and the sum in the divisor
+/// 1 u each, and under a centimetre the divisor, the square of a rounded constant, 2 u; the fourth power is off by 3 u of itself.
+pub fn attenuate_quadratic(constant: f64, inverse_range_squared: f64, distance_squared: f64) -> f64 {
     let ratio_squared = (distance_squared * inverse_range_squared).clamp(0.0, 1.0);
     let window = 1.0 - ratio_squared * ratio_squared;
-    window / distance_squared.max(MINIMUM_DISTANCE * MINIMUM_DISTANCE)
+    window / (constant + distance_squared).max(MINIMUM_DISTANCE * MINIMUM_DISTANCE)
 }
 
 /// [`attenuate`], or nothing where the formula itself has no value: 1/0 at the light or for coefficients that are all 0, a negative or
@@ -194,17 +194,24 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_square_is_the_general_law() {
-        for range in [1e-3f32, 0.02, 3.0, 1e9] {
-            let general = Attenuation { range, ..Attenuation::INVERSE_SQUARE };
+    fn the_quadratic_law_is_the_general_one() {
+        for (range, constant, quadratic) in [1e-3f32, 0.02, 3.0, 1e9]
+            .into_iter()
+            .flat_map(|range| [(range, 0.0, 1.0), (range, 1.0, 1.2), (range, 1e-6, 40.0)])
+        {
+            let unlimited = triple(constant, 0.0, quadratic);
+            let general = Attenuation { range, ..unlimited };
             let inverse_range_squared = f64::from(range).powi(-2);
+            let (constant, quadratic) = (f64::from(constant), f64::from(quadratic));
             for part in [0.0, 1e-6, 0.1, 0.5, 0.9, 0.999, 1.0, 1.001, 5.0] {
                 let distance = part * f64::from(range);
                 let expected = general.factor(distance);
-                let got = attenuate_inverse_square(inverse_range_squared, distance * distance);
+                let got =
+                    attenuate_quadratic(constant / quadratic, inverse_range_squared, distance * distance)
+                        / quadratic;
                 // A few roundings of 2⁻⁵³ of the factor without its window, from which 1 - (d/range)⁴ cancels.
-                let unwindowed = Attenuation::INVERSE_SQUARE.factor(distance);
-                assert!((got - expected).abs() <= 2e-15 * unwindowed, "{range} {part}: {got} {expected}");
+                let unwindowed = unlimited.factor(distance);
+                assert!((got - expected).abs() <= 2e-15 * unwindowed, "{general:?} {part}: {got} {expected}");
             }
         }
     }

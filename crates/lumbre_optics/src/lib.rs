@@ -81,7 +81,7 @@ mod viewer;
 
 pub use angle::quarter_angle;
 pub use attenuation::{
-    Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, attenuate_inverse_square,
+    Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, attenuate_quadratic,
     try_attenuate,
 };
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
@@ -138,7 +138,7 @@ pub use snell::{
 pub use specular_antialiasing::{
     FILTER_VARIANCE, FilteredLobe, LARGEST_WIDENING, filtered_lobe, lobe_widening,
 };
-pub use spot::{MINIMUM_COSINE_DIFFERENCE, SpotCone, SpotCosines, spot_factor};
+pub use spot::{MINIMUM_COSINE_DIFFERENCE, SpotCone, SpotCosines, smooth_spot_factor, spot_factor};
 pub use torrance_sparrow::{
     MINIMUM_VIEW_COSINE, geometric_attenuation, torrance_sparrow, torrance_sparrow_geometry,
 };

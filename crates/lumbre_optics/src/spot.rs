@@ -1,6 +1,6 @@
 //! Spot cones: how a light narrows around its axis. Not the distance: that is `attenuation`.
 
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 
 use crate::normalization::try_normalize;
 use crate::power::safe_pow;
@@ -103,6 +103,27 @@ pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine
     if outer < cosine { safe_pow(cosine, inner_or_exponent) } else { 0.0 }
 }
 
+/// [`spot_factor`] of a smooth cone, from [`SpotCosines::smooth_cone_about`] its axis and the unit direction from the point to the light: what a loop over
+/// many lights has at hand.
+///
+/// # Error of the f32 twin
+///
+/// Of the linear function 6 u times the sum of its terms' sizes, which is at most 2/width + 1 for a width of .001 or more; its square, twice that times the function,
+/// and 1 u.
+pub fn smooth_spot_factor(cone: DVec4, to_light: DVec3) -> f64 {
+    let angular = (cone.w - cone.truncate().dot(to_light)).clamp(0.0, 1.0);
+    angular * angular
+}
+
+impl SpotCosines {
+    /// A smooth cone about a unit axis, along which it shines, as [`smooth_spot_factor`] takes it: the axis divided by the width between the two cosines, and what
+    /// the linear function is at a right angle. Nothing of OpenGL's cone.
+    pub fn smooth_cone_about(&self, axis: DVec3) -> Option<DVec4> {
+        let scale = (self.inner_or_exponent - self.outer).max(MINIMUM_COSINE_DIFFERENCE).recip();
+        self.smooth_cone.then(|| (axis * scale).extend(-self.outer * scale))
+    }
+}
+
 impl SpotCone {
     /// The factor in the direction `from_light` of a light that shines along `axis`, both of any length; or nothing where there is none:
     /// an axis or a direction of length 0, angles that are not from 0 to π/2 (or π, as a cutoff), an inner angle beyond the outer one,
@@ -133,6 +154,23 @@ mod tests {
     fn factor(cone: SpotCone, cosine: f64) -> f64 {
         let SpotCosines { smooth_cone, outer, inner_or_exponent } = cone.cosines();
         spot_factor(smooth_cone, outer, inner_or_exponent, cosine)
+    }
+
+    #[test]
+    fn a_smooth_cone_about_its_axis_is_the_same_cone() {
+        let axis = DVec3::new(0.6, -0.8, 0.0);
+        for (inner, outer) in [(0.0, 0.4), (0.3, 0.3), (0.2, FRAC_PI_2), (0.0, 0.0)] {
+            let cone = SpotCone::Smooth { inner, outer };
+            let linear = cone.cosines().smooth_cone_about(axis).unwrap();
+            for step in 0..=200 {
+                let angle = PI as f64 * f64::from(step) / 200.0;
+                let from_light = axis * angle.cos() + DVec3::Z * angle.sin();
+                let expected = factor(cone, axis.dot(from_light));
+                let got = smooth_spot_factor(linear, -from_light);
+                assert!((got - expected).abs() < 1e-12, "{inner} {outer} at {angle}: {got} {expected}");
+            }
+        }
+        assert_eq!(SpotCone::Exponent { cutoff: 0.5, exponent: 2.0 }.cosines().smooth_cone_about(axis), None);
     }
 
     #[test]

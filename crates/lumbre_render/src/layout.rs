@@ -1,10 +1,10 @@
 //! The bytes that shaders read. Layout twins of shaders/frame.wesl and shaders/optics/evaluate_light.wesl, field by field.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, UVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3, Vec4};
 use lumbre_optics::{
-    DEFAULT_IOR, Fresnel, LARGEST_COEFFICIENT, LARGEST_INTENSITY, Light, LightKind, Material, PolygonLight,
-    SpotCone, SpotCosines, Surface,
+    Attenuation, DEFAULT_IOR, Fresnel, LARGEST_COEFFICIENT, LARGEST_INTENSITY, Light, LightKind, Material,
+    PolygonLight, SpotCone, SpotCosines, Surface,
 };
 use lumbre_scene::{GlobalTransform, MaterialTextures, TextureReference};
 
@@ -277,23 +277,37 @@ impl LightData {
 pub(crate) struct InverseSquareLightData {
     position: Vec3,
     inverse_range_squared: f32,
+    /// Divided by the quadratic coefficient.
     color: Vec3,
-    padding: f32,
+    /// The constant coefficient by the quadratic one, m².
+    constant: f32,
+    /// As `smooth_spot_factor` takes it.
+    cone: Vec4,
 }
 
 impl InverseSquareLightData {
     /// A light that adds nothing.
-    pub const BLACK: Self =
-        Self { position: Vec3::ZERO, inverse_range_squared: 1.0, color: Vec3::ZERO, padding: 0.0 };
+    pub const BLACK: Self = Self {
+        position: Vec3::ZERO,
+        inverse_range_squared: 1.0,
+        color: Vec3::ZERO,
+        constant: 0.0,
+        cone: Vec4::W,
+    };
 
     /// A light in frame space.
     pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
-        let range = f64::from(light.attenuation.range);
+        let Attenuation { range, constant, quadratic, .. } = light.attenuation;
+        let range = f64::from(range);
         Self {
             position: (transform.translation() - origin).as_vec3(),
             inverse_range_squared: (1.0 / (range * range)) as f32,
-            color: light.diffuse,
-            padding: 0.0,
+            color: light.diffuse / quadratic,
+            constant: constant / quadratic,
+            cone: light
+                .spot
+                .and_then(|cone| cone.cosines().smooth_cone_about(transform.forward()))
+                .map_or(Vec4::W, |cone| cone.as_vec4()),
         }
     }
 }
@@ -325,7 +339,7 @@ mod tests {
         assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 4 * 16);
         assert_eq!(size_of::<SurfaceMapsData>(), 2 * 32);
         assert_eq!(size_of::<LightData>(), 96);
-        assert_eq!(size_of::<InverseSquareLightData>(), 32);
+        assert_eq!(size_of::<InverseSquareLightData>(), 48);
         assert_eq!(size_of::<ClusterGridData>(), 48);
     }
 }

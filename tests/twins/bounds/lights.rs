@@ -1,6 +1,6 @@
 //! Bounds of distance, cones, and a light as a point meets it.
 
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 use lumbre_optics::{MAXIMUM_DISTANCE, MINIMUM_COSINE_DIFFERENCE, UNLIMITED_RANGE};
 
 use super::powers::{self, Off};
@@ -16,11 +16,11 @@ pub fn attenuate(coefficients: DVec3, clamp_to_one: bool, range: f64, distance: 
     U * factor * ((13.0 + 2.0 * roundings) * window + (28.0 + 4.0 * roundings) * ratio.powi(4)) + FLUSHED
 }
 
-/// attenuate_inverse_square: 8 u of it, and 4 u (d/range)⁴ times the factor without its window.
-pub fn attenuate_inverse_square(inverse_range_squared: f64, distance_squared: f64) -> f64 {
-    let factor = lumbre_optics::attenuate_inverse_square(0.0, distance_squared);
+/// attenuate_quadratic: 9 u of it, and 4 u (d/range)⁴ times the factor without its window.
+pub fn attenuate_quadratic(constant: f64, inverse_range_squared: f64, distance_squared: f64) -> f64 {
+    let factor = lumbre_optics::attenuate_quadratic(constant, 0.0, distance_squared);
     let fourth_power = (distance_squared * inverse_range_squared).min(1.0).powi(2);
-    U * factor * (8.0 * (1.0 - fourth_power) + 4.0 * fourth_power) + FLUSHED
+    U * factor * (9.0 * (1.0 - fourth_power) + 4.0 * fourth_power) + FLUSHED
 }
 
 /// spot_factor for a cosine that may be off. Smooth: 15 u, and twice the cosine's error over the width. Exponent: `safe_pow`, and
@@ -40,6 +40,14 @@ pub fn spot_factor(smooth_cone: bool, outer: f64, inner_or_exponent: f64, cosine
         if value > 0.0 || open { powers::safe_pow(clamped, Off::exact(inner_or_exponent)) } else { 0.0 };
     let other = if outer < clamped.value { 0.0 } else { inside };
     Allowed::from(error).or(open, || Numbers::from_slice(&[other]))
+}
+
+/// smooth_spot_factor: of the linear function 6 u of its terms' sizes; the square, twice that times the function, and 1 u.
+pub fn smooth_spot_factor(cone: DVec4, to_light: DVec3) -> f64 {
+    let value = lumbre_optics::smooth_spot_factor(cone, to_light);
+    let sizes = cone.w.abs() + cone.truncate().abs().dot(to_light.abs());
+    let angular = 6.0 * U * sizes;
+    angular * (2.0 * value.sqrt() + angular) + U * value + FLUSHED
 }
 
 /// evaluate_light: direction, attenuation and spot factor. The direction is a difference made unit; the distance its length, 12 u;

@@ -14,7 +14,7 @@ use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight, light_size};
 use crate::{LightLists, RenderError};
 
 /// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
-pub(crate) const UNIFORM_LIGHTS: u32 = 2047;
+pub(crate) const UNIFORM_LIGHTS: u32 = 1364;
 /// Most inverse-square lights that 16 bits number, beside a black one; more of them are listed as other lights with a range are.
 pub(crate) const NUMBERED_LIGHTS: usize = 65_535;
 /// From so many lights with a range on they are listed by clusters: with two, finding the cluster costs about what it saves.
@@ -67,9 +67,10 @@ pub(crate) struct LightSet {
 pub(crate) enum LightClass {
     /// It has no range, or is directional, or a polygon: it is in the lists of objects.
     Unbounded,
-    /// A point light without a cone or a shadow, of one colour, with the inverse square within a range: what most lights of a game are.
+    /// A point light without a shadow, with a smooth cone or without one, of one colour, with the inverse square within a range, with or without a constant term
+    /// beside it: what most lights of a game are.
     InverseSquare,
-    /// Any other point light with a range: with a cone, an attenuation of its own, or colours that differ.
+    /// Any other point light with a range: with a shadow, OpenGL's cone, a linear attenuation, or colours that differ.
     Ranged,
 }
 
@@ -80,12 +81,14 @@ impl LightClass {
         if light.kind != LightKind::Point || !range.is_finite() {
             return Self::Unbounded;
         }
-        let inverse_square = (constant, linear, quadratic, clamp) == (0.0, 0.0, 1.0, false);
+        // Numbers whose quotients are as good as they are.
+        let inverse_square =
+            linear == 0.0 && !clamp && (1e-3..=1e3).contains(&quadratic) && (0.0..=1e3).contains(&constant);
         let one_color = light.ambient == Vec3::ZERO && light.specular == light.diffuse;
-        let everywhere = cone(light).is_none();
-        // What `attenuate_inverse_square` takes.
+        let narrowed = cone(light).is_some_and(|cone| !matches!(cone, SpotCone::Smooth { .. }));
+        // What `attenuate_quadratic` takes.
         let usual_range = (1e-9..=1e15).contains(&range);
-        match inverse_square && one_color && everywhere && usual_range && !light.shadow {
+        match inverse_square && one_color && !narrowed && usual_range && !light.shadow {
             true => Self::InverseSquare,
             false => Self::Ranged,
         }
@@ -501,15 +504,24 @@ mod tests {
         let ranged = Attenuation { range: 3.0, ..Attenuation::INVERSE_SQUARE };
         let lamp = Light { attenuation: ranged, ..Light::point(Vec3::ONE) };
         assert_eq!(LightClass::of(&lamp), LightClass::InverseSquare);
-        let cone = Some(SpotCone::Smooth { inner: 0.1, outer: 0.2 });
-        let constant = Attenuation { constant: 0.1, ..ranged };
+        let smooth = Some(SpotCone::Smooth { inner: 0.1, outer: 0.2 });
+        let softened = Attenuation { constant: 0.1, quadratic: 1.2, ..ranged };
+        for other in [Light { spot: smooth, ..lamp.clone() }, Light { attenuation: softened, ..lamp.clone() }]
+        {
+            assert_eq!(LightClass::of(&other), LightClass::InverseSquare, "{other:?}");
+        }
+        let cone = Some(SpotCone::Exponent { cutoff: 0.2, exponent: 3.0 });
+        let linear = Attenuation { linear: 0.1, ..ranged };
+        let faint = Attenuation { quadratic: 1e-6, ..ranged };
         let clamped = Attenuation { clamp: true, ..ranged };
         let tiny = Attenuation { range: 1e-12, ..ranged };
         for other in [
             Light { spot: cone, ..lamp.clone() },
             Light { ambient: Vec3::X, ..lamp.clone() },
             Light { specular: Vec3::ZERO, ..lamp.clone() },
-            Light { attenuation: constant, ..lamp.clone() },
+            Light { shadow: true, ..lamp.clone() },
+            Light { attenuation: linear, ..lamp.clone() },
+            Light { attenuation: faint, ..lamp.clone() },
             Light { attenuation: clamped, ..lamp.clone() },
             Light { attenuation: tiny, ..lamp.clone() },
         ] {

@@ -20,6 +20,7 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     let reads = |of: &LightCounts| clustered && (of.dynamic > 0 || left(of));
     variant.set(Feature::InverseSquareClusters, reads(inverse_square));
     variant.set(Feature::UniformLights, reads(inverse_square) && inverse_square.all <= UNIFORM_LIGHTS);
+    variant.set(Feature::InverseSquareSpots, reads(inverse_square) && inverse_square.spot);
     variant.set(Feature::RangedClusters, reads(ranged));
     for kinds in [Some(listed), clustered.then_some(ranged)].into_iter().flatten() {
         variant.set(Feature::DirectionalLights, kinds.directional);

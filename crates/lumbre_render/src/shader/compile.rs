@@ -73,7 +73,7 @@ mod tests {
             | Feature::FogDepthCue => vec![Feature::Fog],
             Feature::Fog => vec![Feature::FogLinear],
             Feature::ClampVertices => vec![Feature::Clamp],
-            Feature::UniformLights => vec![Feature::InverseSquareClusters],
+            Feature::UniformLights | Feature::InverseSquareSpots => vec![Feature::InverseSquareClusters],
             Feature::ShadowCubes | Feature::ShadowCascades | Feature::SoftShadows => vec![Feature::Shadows],
             Feature::DisplaySrgb | Feature::DisplayClamp | Feature::EncodeSrgb | Feature::DecodeSrgb => {
                 vec![Feature::Display]
@@ -135,7 +135,7 @@ mod tests {
         // Clusters alone: of inverse-square lights nothing is asked that they do not have; with others, all is there.
         let clusters = [Feature::Lit, Feature::InverseSquareClusters, Feature::UniformLights];
         let lean = valid(&variant(Shading::Phong, &clusters));
-        assert!(lean.contains("cluster_lists") && lean.contains("attenuate_inverse_square"), "{lean}");
+        assert!(lean.contains("cluster_lists") && lean.contains("attenuate_quadratic"), "{lean}");
         for word in ["evaluate_light(", "spot_factor", "attenuate(", "for (", "array<LightParameters>"] {
             assert!(!lean.contains(word), "{word} is left in:\n{lean}");
         }

@@ -132,6 +132,8 @@ features! {
     Lights = 51 => "LIGHTS",
     /// Has one colour all over, which the vertex stage makes.
     Constant = 52 => "CONSTANT",
+    /// Some of a cluster's inverse-square lights have a cone.
+    InverseSquareSpots = 53 => "INVERSE_SQUARE_SPOTS",
 }
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
@@ -155,6 +157,7 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::InverseSquareClusters as u64
     | Feature::UniformLights as u64
     | Feature::RangedClusters as u64
+    | Feature::InverseSquareSpots as u64
     | Feature::Display as u64
     | Feature::DisplaySrgb as u64
     | Feature::DisplayClamp as u64
@@ -244,7 +247,7 @@ impl Variant {
         self.bits &= !(Feature::Clusters as u64);
         self.set(Feature::Clusters, clusters);
         if !self.has(Feature::InverseSquareClusters) {
-            self.bits &= !(Feature::UniformLights as u64);
+            self.bits &= !(Feature::UniformLights as u64 | Feature::InverseSquareSpots as u64);
         }
         let listed = self.has(Feature::DynamicLights) || self.has(Feature::StaticLights);
         if !listed && !self.has(Feature::RangedClusters) {
