@@ -13,7 +13,7 @@ use lumbre_scene::{Camera, EmissiveLight, Mesh, SceneSettings, Transform};
 use lumbre_tests::compare::{Difference, compare};
 use lumbre_tests::scenes::{ball, every_light};
 use lumbre_tests::twin::{self, TwinOptions};
-use lumbre_trace::{Picture, TraceOptions, encode_srgb, tone_curve, trace};
+use lumbre_trace::{Picture, TraceOptions, trace};
 
 use crate::adapter::{draw, linear, shown};
 
@@ -162,7 +162,7 @@ fn a_picture_is_shown_as_a_frame_is() {
         if inside.is_none() {
             continue;
         }
-        let own = encode_srgb(tone_curve(*radiance)) * 255.0;
+        let own = lumbre_trace::shown(*radiance) * 255.0;
         for channel in 0..3 {
             worst = worst.max((own[channel] - f64::from(pixel[channel])).abs());
         }

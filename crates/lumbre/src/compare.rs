@@ -5,7 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use glam::DVec3;
-use lumbre::trace::{compare, encode_srgb, tone_curve};
+use lumbre::optics::decode_srgb;
+use lumbre::trace::{compare, shown};
 
 use crate::arguments::Compare;
 use crate::loading::extension;
@@ -77,7 +78,7 @@ pub fn run(asked: &Compare) -> anyhow::Result<()> {
 
 impl Read {
     fn shown(&self, pixel: DVec3) -> DVec3 {
-        if self.is_light { encode_srgb(tone_curve(pixel)) } else { pixel }
+        if self.is_light { shown(pixel) } else { pixel }
     }
 }
 
@@ -99,8 +100,7 @@ fn read(path: &Path) -> anyhow::Result<Read> {
 
 /// From sRGB's curve to light.
 fn decoded(color: DVec3) -> DVec3 {
-    let channel = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    DVec3::new(channel(color.x), channel(color.y), channel(color.z))
+    color.map(decode_srgb)
 }
 
 /// Black, violet, red, yellow, white: the brighter the farther apart, in any print.

@@ -10,8 +10,7 @@ use glam::{DVec2, DVec3};
 use lumbre::bake::Progress;
 use lumbre::render::Display;
 use lumbre::trace::{
-    Ended, Integrator, Metering, Picture, TraceOptions, TraceReport, Tracer, draw_tree, encode_srgb,
-    tone_curve,
+    Ended, Integrator, Metering, Picture, TraceOptions, TraceReport, Tracer, draw_tree, shown,
 };
 
 use crate::arguments::{Exposure, Trace};
@@ -189,7 +188,7 @@ fn write_picture(
         match display {
             Display::Linear => color,
             Display::Clamp => color.clamp(DVec3::ZERO, DVec3::ONE),
-            Display::Srgb => encode_srgb(tone_curve(color)),
+            Display::Srgb => shown(color),
         }
     };
     let (width, height) = (picture.width, picture.height);

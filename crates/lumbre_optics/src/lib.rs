@@ -74,6 +74,7 @@ mod shading;
 mod snell;
 mod specular_antialiasing;
 mod spot;
+mod tone_curve;
 mod torrance_sparrow;
 mod two_sided;
 mod validation;
@@ -139,6 +140,7 @@ pub use specular_antialiasing::{
     FILTER_VARIANCE, FilteredLobe, LARGEST_WIDENING, filtered_lobe, lobe_widening,
 };
 pub use spot::{MINIMUM_COSINE_DIFFERENCE, SpotCone, SpotCosines, smooth_spot_factor, spot_factor};
+pub use tone_curve::{decode_srgb, decode_srgb_byte, encode_srgb, tone_curve};
 pub use torrance_sparrow::{
     MINIMUM_VIEW_COSINE, geometric_attenuation, torrance_sparrow, torrance_sparrow_geometry,
 };

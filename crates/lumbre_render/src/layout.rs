@@ -124,13 +124,8 @@ pub(crate) struct CoordinatesData {
 impl CoordinatesData {
     fn new(texture: Option<&TextureReference>) -> Self {
         let Some(texture) = texture else { return Self::default() };
-        let (sin, cos) = texture.rotation.sin_cos();
-        let (scale, offset) = (texture.scale, texture.offset);
-        // KHR_texture_transform: translation * rotation * scale, with its clockwise-looking matrix (v points down).
-        Self {
-            u: [cos * scale.x, sin * scale.y, offset.x, texture.tex_coord as f32],
-            v: [-sin * scale.x, cos * scale.y, offset.y, 0.0],
-        }
+        let [u, v] = texture.transform();
+        Self { u: u.extend(texture.tex_coord as f32).to_array(), v: v.extend(0.0).to_array() }
     }
 
     /// With a number that its shader reads in `v.w`.

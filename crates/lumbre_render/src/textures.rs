@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use half::f16;
+use lumbre_optics::{decode_srgb_byte, encode_srgb};
 use lumbre_scene::{Image, LightmapImage, Mipmap, Sampler, Wrap};
 
 use crate::mip_level::{MipLevel, box_filter_2d};
@@ -184,11 +185,10 @@ fn halved(level: &MipLevel, srgb: bool) -> MipLevel {
     let MipLevel { width, height, rgba: texels } = level;
     let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
     let decode = |byte: u8, channel: usize| {
-        let value = f32::from(byte) / 255.0;
-        if srgb && channel < 3 { srgb_to_linear(value) } else { value }
+        if srgb && channel < 3 { decode_srgb_byte(byte) as f32 } else { f32::from(byte) / 255.0 }
     };
     let encode = |value: f32, channel: usize| {
-        let value = if srgb && channel < 3 { linear_to_srgb(value) } else { value };
+        let value = if srgb && channel < 3 { encode_srgb(f64::from(value)) as f32 } else { value };
         (value * 255.0).round() as u8
     };
     let mut result = Vec::with_capacity(4 * half_width as usize * half_height as usize);
@@ -205,16 +205,6 @@ fn halved(level: &MipLevel, srgb: bool) -> MipLevel {
         }
     }
     MipLevel { width: half_width, height: half_height, rgba: result }
-}
-
-/// IEC 61966-2-1.
-fn srgb_to_linear(value: f32) -> f32 {
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-}
-
-/// IEC 61966-2-1.
-fn linear_to_srgb(value: f32) -> f32 {
-    if value <= 0.003_130_8 { value * 12.92 } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

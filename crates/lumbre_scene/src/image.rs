@@ -111,3 +111,23 @@ pub struct TextureReference {
     /// Factor per axis.
     pub scale: Vec2,
 }
+
+impl TextureReference {
+    /// The rows of its transform: u' = row · (u, v, 1). `KHR_texture_transform`: scaled, then rotated, then moved; v runs down, so that the rotation's matrix
+    /// looks clockwise.
+    pub fn transform(&self) -> [Vec3; 2] {
+        // Most are not turned, and a bake asks for each of its rays.
+        let (sine, cosine) = if self.rotation == 0.0 { (0.0, 1.0) } else { self.rotation.sin_cos() };
+        let Self { scale, offset, .. } = self;
+        [
+            Vec3::new(cosine * scale.x, sine * scale.y, offset.x),
+            Vec3::new(-sine * scale.x, cosine * scale.y, offset.y),
+        ]
+    }
+
+    /// Where it reads for these coordinates of a mesh.
+    pub fn transformed(&self, uv: Vec2) -> Vec2 {
+        let [u, v] = self.transform();
+        Vec2::new(u.dot(uv.extend(1.0)), v.dot(uv.extend(1.0)))
+    }
+}

@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
+use lumbre_optics::decode_srgb;
 use rayon::prelude::*;
 
 /// Pixels per degree of a monitor of 0.7 m and 3840 pixels, seen from 0.7 m.
@@ -45,8 +46,7 @@ pub fn mean_flip(reference: &Picture, test: &Picture) -> f64 {
 }
 
 fn linear(color: DVec3) -> DVec3 {
-    let channel = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    DVec3::from(color.to_array().map(channel))
+    color.map(decode_srgb)
 }
 
 /// Linear sRGB to XYZ.

@@ -66,7 +66,7 @@ mod trace;
 pub use branch::{Branch, BranchLamp, BranchLight, BranchPoint, Kind};
 pub use branch_drawing::{TreeFormat, draw_tree};
 pub use comparison::{Comparison, compare};
-pub use display::{encode_srgb, tone_curve};
+pub use display::shown;
 pub use error::TraceError;
 pub use filter::Filter;
 pub use metering::Metering;

@@ -7,7 +7,7 @@ use lumbre_optics::{
 };
 
 use crate::geometry::{Meeting, Place, SpaceRay};
-use crate::scene::{Object, Scene, sample_color, sample_lightmap, sample_linear, transform};
+use crate::scene::{Object, Scene, sample_color, sample_lightmap, sample_linear};
 
 /// One point of a surface, seen along a ray.
 #[derive(Clone, Debug)]
@@ -82,7 +82,7 @@ impl SurfacePoint {
         let mapped = object.textures.normal.as_ref().map(|map| {
             let uv = object.coordinates(map.texture.tex_coord, vertices, weights);
             let texel = sample_linear(&map.texture, uv).truncate();
-            let [u, v] = transform(&map.texture);
+            let [u, v] = map.texture.transform().map(|row| row.as_dvec3());
             let tangent: DVec4 = (0..3)
                 .map(|corner| {
                     let own = shape.tangents.get(vertices[corner]).map_or(DVec4::ZERO, |own| own.as_dvec4());

@@ -14,7 +14,7 @@ use crate::TraceError;
 use crate::branch::{Branch, Kind};
 use crate::camera_ray::CameraRays;
 use crate::direct_light::Lighting;
-use crate::display::{encode_srgb, tone_curve};
+use crate::display::shown;
 use crate::film::{Film, FilterSampler, PixelSum, Sample};
 use crate::geometry::{Crossing, SpaceRay};
 use crate::medium::MediumStack;
@@ -402,8 +402,7 @@ fn busy_pixels(film: &Film, threshold: f64, tracer: &Tracer) -> Vec<bool> {
     let width = film.width;
     let height = film.pixels.len() / width;
     let exposure = f64::from(tracer.camera.exposure);
-    let shown: Vec<DVec3> =
-        film.pixels.iter().map(|pixel| encode_srgb(tone_curve(pixel.mean() * exposure))).collect();
+    let shown: Vec<DVec3> = film.pixels.iter().map(|pixel| shown(pixel.mean() * exposure)).collect();
     let differs = |at: usize, other: usize| (shown[at] - shown[other]).abs().max_element() > threshold;
     let mut busy = vec![false; shown.len()];
     for y in 0..height {

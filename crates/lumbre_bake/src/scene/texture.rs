@@ -1,17 +1,12 @@
 //! Reads a material's texture at a point, bilinearly, as glTF wraps and transforms it. No mip levels: patches average.
 
-use std::sync::LazyLock;
-
 use glam::{Vec2, Vec4};
+use lumbre_optics::decode_srgb_byte;
 use lumbre_scene::{TextureReference, Wrap};
 
 /// RGBA at texture coordinates; colour channels decoded from sRGB if asked.
 pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
-    let (sine, cosine) = texture.rotation.sin_cos();
-    let scaled = uv * texture.scale;
-    // KHR_texture_transform: translation * rotation * scale, with its rotation matrix's sign.
-    let uv =
-        texture.offset + Vec2::new(cosine * scaled.x + sine * scaled.y, -sine * scaled.x + cosine * scaled.y);
+    let uv = texture.transformed(uv);
     if !uv.is_finite() {
         return Vec4::ONE;
     }
@@ -25,7 +20,8 @@ pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
         let y = wrap(low.y + dy, image.height, texture.sampler.wrap_v);
         let first = 4 * (y * image.width as usize + x);
         let Some(&[r, g, b, a]) = image.rgba.get(first..first + 4) else { return Vec4::ONE };
-        let channel = |value: u8| if srgb { linear(value) } else { f32::from(value) / 255.0 };
+        let channel =
+            |value: u8| if srgb { decode_srgb_byte(value) as f32 } else { f32::from(value) / 255.0 };
         Vec4::new(channel(r), channel(g), channel(b), f32::from(a) / 255.0)
     };
     let top = read(0.0, 0.0).lerp(read(1.0, 0.0), fraction.x);
@@ -48,19 +44,6 @@ fn wrap(index: f32, size: u32, wrap: Wrap) -> usize {
     };
     (wrapped as usize).min(last)
 }
-
-/// IEC 61966-2-1.
-fn linear(value: u8) -> f32 {
-    LINEAR[usize::from(value)]
-}
-
-/// Of every value: the power takes longer than the rest of a sample.
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|value| {
-        let v = value as f32 / 255.0;
-        if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-    })
-});
 
 #[cfg(test)]
 mod tests {

@@ -39,7 +39,7 @@ fn draw(name: &str, size: u32, pattern: Pattern) -> Drawn {
     }
     let mut rgba = Vec::with_capacity(4 * texels.len());
     for (color, alpha) in texels {
-        rgba.extend((color / tint).to_array().map(encode_srgb));
+        rgba.extend((color / tint).to_array().map(srgb_byte));
         rgba.push((alpha * 255.0f64).round() as u8);
     }
     let texture = TextureReference {
@@ -53,11 +53,9 @@ fn draw(name: &str, size: u32, pattern: Pattern) -> Drawn {
     Drawn { texture, tint: tint.as_vec3() }
 }
 
-/// Linear [0, 1] to a byte of sRGB (IEC 61966-2-1).
-fn encode_srgb(linear: f64) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
+/// Linear [0, 1] to a byte of sRGB.
+fn srgb_byte(linear: f64) -> u8 {
+    (lumbre_optics::encode_srgb(linear.clamp(0.0, 1.0)) * 255.0).round() as u8
 }
 
 /// Where a point is in a wall of stones laid in rows, every other row shifted by half: the stone's column and row, and the
@@ -221,6 +219,6 @@ mod tests {
 
     #[test]
     fn srgb_encoding_at_known_points() {
-        assert_eq!([0.0, 1.0, 0.5, 0.216].map(encode_srgb), [0, 255, 188, 128]);
+        assert_eq!([0.0, 1.0, 0.5, 0.216].map(srgb_byte), [0, 255, 188, 128]);
     }
 }

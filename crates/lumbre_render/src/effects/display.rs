@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_graph::LoadOp;
+use lumbre_optics::{decode_srgb, encode_srgb, tone_curve};
 use wgpu::util::DeviceExt;
 
 use super::{Board, Effect, FrameGraph, Stage};
@@ -234,32 +235,6 @@ pub fn display_color(display: Display, target: wgpu::TextureFormat, exposure: f3
         (false, true) => within.map(decode_srgb).as_vec3(),
         (false, false) => shown.as_vec3(),
     }
-}
-
-/// Khronos PBR Neutral tone mapper (Khronos 3D Commerce, 2024). Twin: shaders/tone_curve.wesl.
-fn tone_curve(radiance: DVec3) -> DVec3 {
-    let (compression_start, desaturation) = (0.8 - 0.04, 0.15);
-    let mut color = radiance.max(DVec3::ZERO);
-    let darkest = color.min_element();
-    color -= if darkest < 0.08 { darkest - 6.25 * darkest * darkest } else { 0.04 };
-    let peak = color.max_element();
-    if peak < compression_start {
-        return color;
-    }
-    let span = 1.0 - compression_start;
-    let compressed = 1.0 - span * span / (peak + span - compression_start);
-    let white = 1.0 - 1.0 / (desaturation * (peak - compressed) + 1.0);
-    (color * (compressed / peak)).lerp(DVec3::splat(compressed), white)
-}
-
-/// IEC 61966-2-1, of a value in [0, 1].
-fn encode_srgb(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// The inverse.
-fn decode_srgb(encoded: f64) -> f64 {
-    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

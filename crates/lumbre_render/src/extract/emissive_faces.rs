@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 use lumbre_mesh::{TriangleMesh, weld_positions};
+use lumbre_optics::decode_srgb_byte;
 use lumbre_scene::{MaterialTextures, TextureReference, Wrap};
 
 /// Most polygons of one object: every point that it reaches evaluates them all.
@@ -154,11 +155,7 @@ fn mean_texel(mesh: &TriangleMesh, triangle: &[u32; 3], texture: &TextureReferen
 
 /// The texel at texture coordinates, linear RGB; 1 where there is none.
 fn texel(texture: &TextureReference, uv: Vec2) -> Vec3 {
-    let (sine, cosine) = texture.rotation.sin_cos();
-    let scaled = uv * texture.scale;
-    // KHR_texture_transform: translation * rotation * scale, with its rotation matrix's sign.
-    let turned = Vec2::new(cosine * scaled.x + sine * scaled.y, -sine * scaled.x + cosine * scaled.y);
-    let uv = texture.offset + turned;
+    let uv = texture.transformed(uv);
     if !uv.is_finite() {
         return Vec3::ONE;
     }
@@ -175,15 +172,9 @@ fn texel(texture: &TextureReference, uv: Vec2) -> Vec3 {
     let y = wrapped(uv.y, texture.sampler.wrap_v, image.height);
     let first = 4 * (y * image.width as usize + x);
     match image.rgba.get(first..first + 3) {
-        Some(&[r, g, b]) => Vec3::new(linear(r), linear(g), linear(b)),
+        Some(&[r, g, b]) => DVec3::from([r, g, b].map(decode_srgb_byte)).as_vec3(),
         _ => Vec3::ONE,
     }
-}
-
-/// IEC 61966-2-1.
-fn linear(code: u8) -> f32 {
-    let value = f32::from(code) / 255.0;
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

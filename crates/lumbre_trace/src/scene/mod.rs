@@ -16,7 +16,7 @@ use crate::geometry::{Crossing, Geometry, Place};
 pub(crate) use collect::PlacedLight;
 pub(crate) use emissive_polygons::EmissivePolygon;
 pub(crate) use object::{Object, Passage};
-pub(crate) use texture::{sample_color, sample_lightmap, sample_linear, transform};
+pub(crate) use texture::{sample_color, sample_lightmap, sample_linear};
 
 /// The scene.
 #[derive(Debug)]

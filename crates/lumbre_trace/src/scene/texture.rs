@@ -1,17 +1,8 @@
 //! Textures as a ray meets them: the first level, filtered as magnified, in f64. Not mip levels: pixels are sampled more than once instead.
 
 use glam::{DVec2, DVec3, DVec4};
+use lumbre_optics::decode_srgb_byte;
 use lumbre_scene::{LightmapImage, TextureReference, Wrap};
-
-/// The rows of a texture's transform: u' = row·(u, v, 1). `KHR_texture_transform`: scaled, then rotated, then moved; v runs down.
-pub(crate) fn transform(texture: &TextureReference) -> [DVec3; 2] {
-    let (sine, cosine) = f64::from(texture.rotation).sin_cos();
-    let (scale, offset) = (texture.scale.as_dvec2(), texture.offset.as_dvec2());
-    [
-        DVec3::new(cosine * scale.x, sine * scale.y, offset.x),
-        DVec3::new(-sine * scale.x, cosine * scale.y, offset.y),
-    ]
-}
 
 /// The four channels at coordinates of the texture's own set, as they are stored.
 pub(crate) fn sample_linear(texture: &TextureReference, uv: DVec2) -> DVec4 {
@@ -20,7 +11,7 @@ pub(crate) fn sample_linear(texture: &TextureReference, uv: DVec2) -> DVec4 {
 
 /// The same of a picture of colours, which is stored with sRGB's curve; alpha has none.
 pub(crate) fn sample_color(texture: &TextureReference, uv: DVec2) -> DVec4 {
-    sample(texture, uv, from_srgb)
+    sample(texture, uv, decode_srgb_byte)
 }
 
 fn sample(texture: &TextureReference, uv: DVec2, decode: impl Fn(u8) -> f64) -> DVec4 {
@@ -28,7 +19,7 @@ fn sample(texture: &TextureReference, uv: DVec2, decode: impl Fn(u8) -> f64) -> 
     if image.rgba.len() < 4 {
         return DVec4::ONE;
     }
-    let [u, v] = transform(texture).map(|row| row.dot(uv.extend(1.0)));
+    let [u, v] = texture.transform().map(|row| row.as_dvec3().dot(uv.extend(1.0)));
     let (width, height) = (i64::from(image.width), i64::from(image.height));
     let texel = |x: i64, y: i64| {
         let column = wrapped(x, width, texture.sampler.wrap_u);
@@ -60,12 +51,6 @@ fn wrapped(at: i64, size: i64, wrap: Wrap) -> i64 {
             if at < size { at } else { 2 * size - 1 - at }
         }
     }
-}
-
-/// IEC 61966-2-1, of one byte.
-fn from_srgb(byte: u8) -> f64 {
-    let encoded = f64::from(byte) / 255.0;
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
 /// A lightmap: E/π, bilinear, clamped to its edge.
