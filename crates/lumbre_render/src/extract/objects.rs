@@ -30,6 +30,7 @@ pub(crate) struct Object {
     pub texture_set: Option<Arc<TextureSet>>,
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
     pub traits: ObjectTraits,
+    optional: Optional,
     /// Of its mesh.
     triangles: usize,
     /// It is in the census.
@@ -45,6 +46,16 @@ pub(crate) struct Object {
     /// Of the sphere around the same middle.
     pub radius: f64,
     seen: u64,
+}
+
+/// What an object's components say that may be absent: their removal leaves no other mark.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Optional {
+    maps: bool,
+    lightmap: bool,
+    choices: (Option<Shading>, Option<ReflectionModel>),
+    /// It is static, it moves, it lights others.
+    marks: (bool, bool, bool),
 }
 
 type ObjectQuery<'w, 's> = Query<
@@ -168,7 +179,13 @@ impl Objects {
                 let map_changed = lightmap.as_ref().is_some_and(Ref::is_changed);
                 let maps = maps.map(Ref::into_inner);
                 let lightmap = lightmap.map(Ref::into_inner);
-                let traits = ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks));
+                let (shading, reflection) = choices;
+                let optional = Optional {
+                    maps: maps.is_some(),
+                    lightmap: lightmap.is_some(),
+                    choices: (shading.copied(), reflection.copied()),
+                    marks,
+                };
                 let normal_map =
                     maps.and_then(|maps| maps.normal.as_ref()).map(|map| match map.texture.tex_coord {
                         0 => TextureCoordinateSet::First,
@@ -176,13 +193,16 @@ impl Objects {
                     });
                 let mut object = match self.objects[slot].take() {
                     Some(object) => object,
-                    None => Object::new(entity, meshes.insert(&mesh.0, normal_map), traits),
+                    None => Object::new(
+                        entity,
+                        meshes.insert(&mesh.0, normal_map),
+                        ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks)),
+                    ),
                 };
-                // A component that was removed leaves no change behind: compare presence too.
-                let rematerialized = new
-                    || material.is_changed()
-                    || maps_changed
-                    || object.traits.texture_mask != traits.texture_mask;
+                // A component that was removed leaves no change behind.
+                let rematerialized =
+                    new || material.is_changed() || maps_changed || object.optional.maps != optional.maps;
+                let restated = remeshed || rematerialized || map_changed || object.optional != optional;
                 self.stale |= !new && (remeshed || rematerialized || map_changed);
                 if remeshed || rematerialized {
                     object.mesh = meshes.insert(&mesh.0, normal_map);
@@ -212,7 +232,11 @@ impl Objects {
                     };
                 }
                 object.seen = self.frame;
-                object.count(&mut self.census, traits, mesh.0.triangle_count());
+                if restated {
+                    let traits = ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks));
+                    object.count(&mut self.census, traits, mesh.0.triangle_count());
+                    object.optional = optional;
+                }
                 self.objects[slot] = Some(object);
             }
         }
@@ -273,6 +297,7 @@ impl Object {
             texture_set: None,
             lightmap: None,
             traits,
+            optional: Optional::default(),
             triangles: 0,
             counted: false,
             fault: None,
