@@ -22,7 +22,8 @@ Examples:
   lumbre bake room.glb -o room.baked.glb         bake its radiosity into lightmaps
   lumbre render room.baked.glb -o room.png       draw it without a window
   lumbre trace room.glb -o room.png              the same by ray tracing: mirrors, glass, shadows
-  lumbre explain room.glb                        what it calls for, and what it does not"
+  lumbre explain room.glb                        what it calls for, and what it does not
+  lumbre cost -o report                          what accuracy costs in time, on this machine"
 )]
 pub struct Arguments {
     /// What to do; without it, a file is shown, or the demo level played.
@@ -84,6 +85,24 @@ Examples:
         after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --measure\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
     )]
     Explain(Explain),
+    /// Measure what accuracy costs in time: a page with plots and pictures, and the same as JSON and CSV.
+    #[command(after_help = "\
+Studies:
+  shading      flat, Gouraud and Phong shading
+  lamps        many lights, and how they are found
+  effects      every effect of a scene, switched off in turn
+  bake         the error that a bake is asked for
+  transport    from the frame to the truth
+  reflection   reflection models against Phong's
+  lightmaps    density and format of lightmaps
+  precision    f32 on the device against f64
+
+Examples:
+  lumbre cost -o report --quick
+  lumbre cost room.glb -o report --study effects --study bake
+  lumbre cost -o report --resume
+  lumbre cost --compare before/cost.json after/cost.json")]
+    Cost(Cost),
 }
 
 /// How files are read.
@@ -371,6 +390,43 @@ pub struct Compare {
 }
 
 #[derive(Args, Debug)]
+pub struct Cost {
+    /// Scenes to measure: .glb or .gltf; without any the studies make their own.
+    #[arg(value_name = "IN.glb", conflicts_with = "compare")]
+    pub inputs: Vec<PathBuf>,
+    /// Where the report goes: index.html, cost.json, cost.csv, pictures, scenes.
+    #[arg(short, long, value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
+    pub output: Option<PathBuf>,
+    /// Fewer points and rounds: about a minute on two cores, instead of five.
+    #[arg(long)]
+    pub quick: bool,
+    /// Only this study; may be given several times.
+    #[arg(long = "study", value_name = "NAME")]
+    pub studies: Vec<String>,
+    /// Keeps the studies that DIR holds already, if they are of this machine, these scenes and settings.
+    #[arg(long)]
+    pub resume: bool,
+    /// Width and height of the pictures in pixels; 480x270 without this, with --quick 320x180.
+    #[arg(long, value_name = "WxH", value_parser = picture_size, allow_negative_numbers = true)]
+    pub size: Option<(u32, u32)>,
+    /// Of everything that draws random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    pub seed: u32,
+    /// Says nothing of how far it is.
+    #[arg(long)]
+    pub quiet: bool,
+    /// Says what differs between two reports instead; exit status 1 if a count or an error of the second is larger, or a point is gone.
+    #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "studies", "resume", "size", "seed", "quiet"])]
+    pub compare: Option<Vec<PathBuf>>,
+    /// Counts, errors and times that differ by less than this factor count as equal.
+    #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, requires = "compare", allow_negative_numbers = true)]
+    pub factor: f64,
+    /// Exit status 1 also for times that grew, by more than the factor and with quartiles that lie apart.
+    #[arg(long, requires = "compare")]
+    pub times: bool,
+}
+
+#[derive(Args, Debug)]
 pub struct Explain {
     /// The scene: .glb or .gltf, baked or not.
     pub input: PathBuf,
@@ -449,10 +505,10 @@ fn gltf_file(text: &str) -> Result<PathBuf, String> {
         .is_some_and(|extension| ["glb", "gltf"].iter().any(|known| extension.eq_ignore_ascii_case(known)));
     match is_named_so || path.exists() {
         true => Ok(path),
-        false => {
-            Err("neither a .glb or .gltf file nor a command: play, bake, render, trace, compare, explain"
-                .into())
-        }
+        false => Err(
+            "neither a .glb or .gltf file nor a command: play, bake, render, trace, compare, explain, cost"
+                .into(),
+        ),
     }
 }
 
@@ -538,6 +594,23 @@ fn size(text: &str) -> Result<(u32, u32), String> {
             Ok((width, height))
         }
         _ => Err("WxH is wanted, each from 1 to 32768, like 1280x720".into()),
+    }
+}
+
+/// Sizes that a page can show, and that FLIP is defined for.
+fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    match size(text) {
+        Ok((width, height)) if (8..=4096).contains(&width) && (8..=4096).contains(&height) => {
+            Ok((width, height))
+        }
+        _ => Err("WxH is wanted, each from 8 to 4096, like 480x270".into()),
+    }
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value >= 1.0 && value.is_finite() => Ok(value),
+        _ => Err("a number of at least 1 is wanted, like 1.1".into()),
     }
 }
 

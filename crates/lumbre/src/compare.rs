@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use glam::DVec3;
 use lumbre::optics::decode_srgb;
-use lumbre::trace::{compare, shown};
+use lumbre::trace::{compare, heat_color, shown};
 
 use crate::arguments::Compare;
 use crate::loading::extension;
@@ -51,7 +51,7 @@ pub fn run(asked: &Compare) -> anyhow::Result<()> {
     let linear = [light(&reference, &shown[0]), light(&test, &shown[1])];
     let found = compare(reference.width as usize, [&linear[0], &linear[1]], shown);
     if let Some(output) = &asked.output {
-        let bytes: Vec<u8> = found.map.iter().flat_map(|value| heat(*value)).collect();
+        let bytes: Vec<u8> = found.map.iter().flat_map(|value| heat_color(*value)).collect();
         let image = image::RgbImage::from_raw(reference.width, reference.height, bytes);
         let image = image.context("the heat map has another size than the pictures")?;
         write_file(output, |path| Ok(image.save(path)?))?;
@@ -101,17 +101,4 @@ fn read(path: &Path) -> anyhow::Result<Read> {
 /// From sRGB's curve to light.
 fn decoded(color: DVec3) -> DVec3 {
     color.map(decode_srgb)
-}
-
-/// Black, violet, red, yellow, white: the brighter the farther apart, in any print.
-fn heat(value: f64) -> [u8; 3] {
-    const STOPS: [[f64; 3]; 5] =
-        [[0.0, 0.0, 0.02], [0.34, 0.06, 0.43], [0.74, 0.21, 0.33], [0.98, 0.56, 0.04], [0.99, 1.0, 0.64]];
-    let place = value.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
-    let below = (place as usize).min(STOPS.len() - 2);
-    let part = place - below as f64;
-    [0, 1, 2].map(|channel| {
-        let (low, high) = (STOPS[below][channel], STOPS[below + 1][channel]);
-        (255.0 * (low + (high - low) * part)).round() as u8
-    })
 }

@@ -4,6 +4,8 @@
 //!    level.glb ─► scene ─► bake ─► level.baked.glb ─► scene ─► render ─► frame
 //!                   │  └─► trace ─► reference picture            │
 //!                 optics, mesh, rays                           graph
+//!
+//!    cost: studies of all of these, and their page
 //! ```
 //!
 //! ```
@@ -17,6 +19,7 @@
 //! ```
 
 pub use lumbre_bake as bake;
+pub use lumbre_cost as cost;
 pub use lumbre_demo as demo;
 pub use lumbre_graph as graph;
 pub use lumbre_mesh as mesh;

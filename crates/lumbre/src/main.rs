@@ -4,6 +4,7 @@ mod arguments;
 mod bake;
 mod bake_record;
 mod compare;
+mod cost;
 mod explain;
 mod interruption;
 mod lightmap_report;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Some(Command::Trace(options)) => trace::run(&options),
         Some(Command::Compare(options)) => compare::run(&options),
         Some(Command::Explain(options)) => explain::run(&options),
+        Some(Command::Cost(options)) => cost::run(&options),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

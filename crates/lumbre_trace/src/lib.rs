@@ -48,6 +48,7 @@ mod film;
 mod filter;
 pub mod flip;
 mod geometry;
+mod heat;
 mod interface;
 mod light_sampling;
 mod lobe_sampling;
@@ -69,6 +70,7 @@ pub use comparison::{Comparison, compare};
 pub use display::shown;
 pub use error::TraceError;
 pub use filter::Filter;
+pub use heat::heat_color;
 pub use metering::Metering;
 pub use options::{
     Cut, DEFAULT_DEPTH, DEFAULT_PATHS, DEFAULT_WEIGHT, Ended, Integrator, MAXIMUM_DEPTH, MAXIMUM_SAMPLES,

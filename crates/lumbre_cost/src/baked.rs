@@ -1,0 +1,126 @@
+//! Scenes that are baked for a study, and how far the texels of one bake are from those of another. Not the studies.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Probes, bake};
+use lumbre_scene::{GlobalTransform, Hidden, Lightmap, LightmapImage, Mesh, StaticObject};
+
+use crate::scene_file::SceneFile;
+use crate::{Conditions, CostError, ErrorOf};
+
+/// A World with its lightmaps, and what its bake says of itself.
+pub struct Baked {
+    /// The World.
+    pub world: World,
+    /// What the bake says.
+    pub report: BakeReport,
+}
+
+/// What the bakes of a study have in common: as many texels along a metre as give about `texels` in all, no probes.
+///
+/// # Errors
+/// [`CostError::Load`].
+pub fn bake_options(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    texels: f64,
+) -> Result<BakeOptions, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let area = static_area(&mut world);
+    // Two digits are as good, and shorter on the command line.
+    let exact = (texels / area.max(1e-12)).sqrt();
+    let unit = 10f64.powf(exact.log10().floor() - 1.0);
+    let density = Density::TexelsPerMeter((exact / unit).round() * unit);
+    Ok(BakeOptions { density, probes: Probes::Never, resolution_error: false, ..BakeOptions::default() })
+}
+
+/// Square metres of what is baked.
+fn static_area(world: &mut World) -> f64 {
+    let mut objects = world
+        .query_filtered::<(&Mesh, &GlobalTransform), (With<StaticObject>, Without<Hidden>)>();
+    let area = |(mesh, place): (&Mesh, &GlobalTransform)| {
+        let corner = |index: u32| {
+            let point = mesh.0.positions.get(index as usize).copied().unwrap_or(Vec3::ZERO);
+            place.0.transform_point3(point.as_dvec3())
+        };
+        let triangles = mesh.0.indices.as_chunks::<3>().0.iter();
+        triangles
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(corner);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .filter(|area| area.is_finite())
+            .sum::<f64>()
+    };
+    objects.iter(world).map(area).sum()
+}
+
+/// Bakes a scene. `told` are the shares of the study that are done before and after.
+///
+/// # Errors
+/// [`CostError::Bake`], [`CostError::Load`], [`CostError::Interrupted`].
+pub fn bake_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    options: &BakeOptions,
+    [before, after]: [f64; 2],
+) -> Result<Baked, CostError> {
+    let mut world = scene.open(conditions.aspect())?;
+    let report = bake(&mut world, options, &mut |progress| {
+        match conditions.tell(before + f64::from(progress.fraction) * (after - before)) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
+    })?;
+    Ok(Baked { world, report })
+}
+
+/// Lightmaps with the standard error of every texel, by name.
+pub type Maps = BTreeMap<String, (Arc<LightmapImage>, Arc<[f32]>)>;
+
+/// The lightmaps of a World that has just been baked.
+pub fn maps_of(world: &mut World) -> Maps {
+    let mut maps = world.query::<(&Lightmap, &LightmapError)>();
+    let named = maps
+        .iter(world)
+        .map(|(map, errors)| (map.image.name.clone(), (Arc::clone(&map.image), Arc::clone(&errors.0))));
+    named.collect()
+}
+
+/// How far texels are from those of a reference of the same maps: root mean square and largest difference, relative to the reference's mean, over the texels
+/// that show a surface in both; and what the reference's own errors leave open. Nothing where the maps are not the same.
+pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
+    let (mut squares, mut open, mut sum, mut largest, mut count) = (0.0, 0.0, 0.0, 0.0_f64, 0.0);
+    for (name, (wanted, wanted_errors)) in reference {
+        let (texels, errors) = found.get(name)?;
+        if texels.texels.len() != wanted.texels.len() {
+            return None;
+        }
+        let pairs = texels.texels.iter().zip(&wanted.texels).zip(errors.iter().zip(wanted_errors.iter()));
+        for ((texel, expected), (error, expected_error)) in pairs {
+            if !(error.is_finite() && expected_error.is_finite()) {
+                continue;
+            }
+            let apart = (*texel - *expected).as_dvec3();
+            squares += apart.length_squared() / 3.0;
+            largest = largest.max(apart.abs().max_element());
+            open += f64::from(*expected_error).powi(2);
+            sum += f64::from(expected.element_sum()) / 3.0;
+            count += 1.0;
+        }
+    }
+    if count == 0.0 {
+        return None;
+    }
+    let mean = (sum / count).max(f64::MIN_POSITIVE);
+    Some(ErrorOf {
+        relative_rmse: (squares / count).sqrt() / mean,
+        largest: largest / mean,
+        flip: None,
+        uncertainty: (open / count).sqrt() / mean,
+    })
+}

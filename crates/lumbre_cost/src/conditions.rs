@@ -1,0 +1,68 @@
+//! What every study is run under: the device, the effort, the sizes, and who is told how far it is. Not what is studied.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use lumbre_render::Gpu;
+
+use crate::CostError;
+use crate::rounds::Rounds;
+
+/// Who is told how much of a study is done, 0 to 1, or nothing new, and says whether to go on. Called from any thread.
+pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;
+
+/// What every study is run under.
+#[derive(Clone, Copy)]
+pub struct Conditions<'a> {
+    /// The device that draws.
+    pub gpu: &'a Gpu,
+    /// Fewer points and rounds.
+    pub quick: bool,
+    /// Width and height of the pictures in pixels.
+    pub size: (u32, u32),
+    /// Of everything that draws random numbers.
+    pub seed: u32,
+    /// The folder of the report: scenes that a study makes are written below it.
+    pub folder: &'a Path,
+    /// Scenes that were given; without any a study makes its own.
+    pub files: &'a [PathBuf],
+    /// Who is told.
+    pub listener: &'a Listener<'a>,
+}
+
+impl Conditions<'_> {
+    /// Width by height.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.size.0) / f64::from(self.size.1)
+    }
+
+    /// Tells how much of the study is done.
+    ///
+    /// # Errors
+    /// [`CostError::Interrupted`] if somebody asked for an end.
+    pub fn tell(&self, fraction: f64) -> Result<(), CostError> {
+        match (self.listener)(Some(fraction)) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(CostError::Interrupted),
+        }
+    }
+
+    /// Rounds for about so many seconds, a sixth of them if it has to be quick.
+    pub fn rounds(&self, seconds: f64) -> Rounds {
+        match self.quick {
+            true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 6.0) },
+            false => Rounds { warm_up: 2, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
+        }
+    }
+
+    /// The first of two in a full report, the second in a quick one.
+    pub fn unless_quick<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    /// The pictures' size as the command line has it.
+    pub fn size_text(&self) -> String {
+        format!("{}x{}", self.size.0, self.size.1)
+    }
+}

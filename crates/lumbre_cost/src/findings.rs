@@ -1,0 +1,137 @@
+//! Sentences about what was found, from the points alone: which series is the cheapest for which error, where that changes, and that it is not known
+//! where the times do not decide.
+
+use crate::fronts::{Stretch, stretches};
+use crate::{Point, Spread};
+
+/// Who is the cheapest for which error that may be left, as sentences. `what` names the error, as in "error of the picture"; nothing for less than
+/// two series that have times and errors.
+pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
+    let mut series: Vec<&str> = Vec::new();
+    for point in points.iter().filter(|point| point.error.is_some() && point.milliseconds.is_some()) {
+        if !series.contains(&point.series.as_str()) {
+            series.push(&point.series);
+        }
+    }
+    if series.len() < 2 {
+        return None;
+    }
+    let found = stretches(points);
+    let won: Vec<&str> = found
+        .iter()
+        .filter(|stretch| stretch.cheapest.len() == 1)
+        .map(|stretch| stretch.cheapest[0].series.as_str())
+        .collect();
+    let mut sentences: Vec<String> = found.iter().map(|stretch| sentence(stretch, what)).collect();
+    let contends = |name: &str| found.iter().any(|s| s.cheapest.iter().any(|point| point.series == name));
+    let never: Vec<&str> = series.iter().copied().filter(|name| !contends(name)).collect();
+    if !never.is_empty() {
+        sentences.push(format!("{} never the cheapest.", listed_with(&never, "is", "are", "and")));
+    }
+    if won.is_empty() {
+        sentences.push("The times do not decide anywhere.".to_owned());
+    }
+    Some(sentences.join(" "))
+}
+
+fn sentence(stretch: &Stretch<'_>, what: &str) -> String {
+    let range = match stretch.to {
+        to if to.is_infinite() => format!("From {} on", percent(stretch.from)),
+        to => format!("From {} up to {}", percent(stretch.from), percent(to)),
+    };
+    let told = |point: &&Point| format!("{} ({})", point.series, cost_of(point));
+    match &stretch.cheapest[..] {
+        [only] => format!("{range} {what} the cheapest is {}.", told(only)),
+        several => {
+            let names: Vec<String> = several.iter().map(told).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            format!("{range} {what} the times do not decide between {}.", listed(&names, "and"))
+        }
+    }
+}
+
+/// A point's time and error, with its label.
+pub fn cost_of(point: &Point) -> String {
+    let time = point.milliseconds.map_or(String::new(), |time| format!("{}, ", milliseconds(&time)));
+    let error = point.error.map_or(String::new(), |error| format!("{}, ", percent(error.relative_rmse)));
+    format!("{time}{error}{}", point.label)
+}
+
+/// How much longer the first takes than the second, as a factor with its range, from times of the same rounds; nothing without any.
+pub fn ratio_of(first: &[f64], second: &[f64]) -> Option<Spread> {
+    let ratios: Vec<f64> = first.iter().zip(second).map(|(a, b)| a / b.max(1e-9)).collect();
+    Spread::of(&ratios)
+}
+
+/// Whether a factor is told apart from 1: `Some(true)` above, `Some(false)` below, nothing where the quartiles hold 1.
+pub fn is_above_one(ratio: &Spread) -> Option<bool> {
+    match (ratio.rounds > 1, ratio.lower > 1.0, ratio.upper < 1.0) {
+        (true, true, _) => Some(true),
+        (true, _, true) => Some(false),
+        _ => None,
+    }
+}
+
+/// A number with about three digits.
+pub fn rounded(value: f64) -> String {
+    let size = value.abs();
+    match size {
+        _ if value == 0.0 => "0".to_owned(),
+        _ if size >= 1e6 || size < 1e-3 => format!("{value:.1e}"),
+        _ if size >= 100.0 => format!("{value:.0}"),
+        _ if size >= 10.0 => format!("{value:.1}"),
+        _ if size >= 1.0 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
+}
+
+/// A share as per cent.
+pub fn percent(share: f64) -> String {
+    format!("{} %", rounded(100.0 * share))
+}
+
+/// A time with half of its quartiles' range.
+pub fn milliseconds(time: &Spread) -> String {
+    match time.rounds {
+        1 => format!("{} ms", rounded(time.median)),
+        _ => format!("{} ± {} ms", rounded(time.median), rounded(time.half_width())),
+    }
+}
+
+/// "a", "a and b", "a, b and c".
+pub fn listed(names: &[&str], word: &str) -> String {
+    match names {
+        [] => String::new(),
+        [only] => (*only).to_owned(),
+        [first @ .., last] => format!("{} {word} {last}", first.join(", ")),
+    }
+}
+
+/// The names and a verb for one or for several.
+pub fn listed_with(names: &[&str], one: &str, several: &str, word: &str) -> String {
+    format!("{} {}", listed(names, word), if names.len() == 1 { one } else { several })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_about_three_digits() {
+        let shown = [0.0, 1234567.0, 123.4, 12.34, 1.234, 0.1234, 0.0001].map(rounded);
+        assert_eq!(shown, ["0", "1.2e6", "123", "12.3", "1.23", "0.123", "1.0e-4"]);
+        assert_eq!(
+            (percent(0.0123), listed(&["a", "b", "c"], "and")),
+            ("1.23 %".into(), "a, b and c".into())
+        );
+    }
+
+    #[test]
+    fn a_factor_is_told_from_one_by_its_quartiles() {
+        let ratio = |first: &[f64], second: &[f64]| ratio_of(first, second).as_ref().and_then(is_above_one);
+        assert_eq!(ratio(&[2.0, 2.1, 2.2], &[1.0, 1.0, 1.0]), Some(true));
+        assert_eq!(ratio(&[1.0, 1.0, 1.0], &[2.0, 2.1, 2.2]), Some(false));
+        assert_eq!(ratio(&[0.9, 1.0, 1.1], &[1.0, 1.0, 1.0]), None);
+        assert_eq!(ratio(&[2.0], &[1.0]), None);
+    }
+}

@@ -1,0 +1,171 @@
+//! The folder of a report: `cost.json` with everything, `cost.csv` as a table, `index.html` to read, and pictures and scenes below it. Nothing
+//! stands half-written under its final name.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::{Rgb32FImage, RgbImage};
+use lumbre_trace::heat_color;
+
+use crate::measured::Measured;
+use crate::page::{Images, page};
+use crate::picture::Picture;
+use crate::table::write_table;
+use crate::{CostError, CostReport, Point};
+
+/// The file that holds everything.
+pub const REPORT: &str = "cost.json";
+/// The table.
+pub const TABLE: &str = "cost.csv";
+/// The page.
+pub const PAGE: &str = "index.html";
+
+/// A report's folder.
+#[derive(Clone, Debug)]
+pub struct Folder {
+    path: PathBuf,
+}
+
+impl Folder {
+    /// Makes it if it is not there.
+    ///
+    /// # Errors
+    /// [`CostError::File`].
+    pub fn open(path: &Path) -> Result<Self, CostError> {
+        let failed = |source| CostError::File { path: path.to_owned(), source };
+        fs::create_dir_all(path).map_err(failed)?;
+        // Commands and links are meant from here, wherever the program runs.
+        Ok(Self { path: path.canonicalize().map_err(failed)? })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The report that it holds, if it holds one.
+    ///
+    /// # Errors
+    /// [`CostError::File`], [`CostError::NotAReport`].
+    pub fn report(&self) -> Result<Option<CostReport>, CostError> {
+        let path = self.path.join(REPORT);
+        if path.exists() { read_report(&path).map(Some) } else { Ok(None) }
+    }
+
+    /// Writes a study's pictures.
+    ///
+    /// # Errors
+    /// [`CostError::File`], [`CostError::Picture`].
+    pub fn write_pictures(&self, measured: &Measured) -> Result<(), CostError> {
+        for (name, picture) in &measured.pictures {
+            let path = self.path.join(name);
+            if let Some(folder) = path.parent() {
+                fs::create_dir_all(folder)
+                    .map_err(|source| CostError::File { path: folder.to_owned(), source })?;
+            }
+            self.write_light(name, picture)?;
+        }
+        // What belongs together is shown with one exposure: that of the reference.
+        let points = measured.study.points.iter();
+        for files in points.filter_map(|point| point.picture.as_ref()) {
+            let (Some(picture), Some(reference)) =
+                (measured.pictures.get(&files.picture), measured.pictures.get(&files.reference))
+            else {
+                continue;
+            };
+            let exposure = reference.exposure();
+            self.write_shown(&files.picture, picture, exposure)?;
+            self.write_shown(&files.reference, reference, exposure)?;
+        }
+        for (name, heat) in &measured.heat {
+            let width = measured.pictures.get(name).map_or(1, |picture| picture.width);
+            let bytes = heat.iter().flat_map(|value| heat_color(*value)).collect();
+            self.write_bytes(&format!("{name}.heat"), width, bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the report, its table and its page.
+    ///
+    /// # Errors
+    /// [`CostError::File`], [`CostError::Table`], [`CostError::Plot`].
+    pub fn write(&self, report: &CostReport) -> Result<(), CostError> {
+        let path = self.path.join(REPORT);
+        let text = serde_json::to_string_pretty(report)
+            .map_err(|source| CostError::NotAReport { path: path.clone(), source })?;
+        self.replace(REPORT, (text + "\n").as_bytes())?;
+        let table =
+            write_table(report).map_err(|source| CostError::Table { path: self.path.join(TABLE), source })?;
+        self.replace(TABLE, &table)?;
+        let images = |name: &str| fs::read(self.path.join(format!("{name}.png"))).ok();
+        self.replace(PAGE, page(report, &images as &Images<'_>)?.as_bytes())
+    }
+
+    fn write_light(&self, name: &str, picture: &Picture) -> Result<(), CostError> {
+        let path = self.path.join(format!("{name}.exr"));
+        let floats = picture.radiance.iter().flat_map(|pixel| pixel.as_vec3().to_array()).collect();
+        let image = Rgb32FImage::from_raw(picture.width as u32, picture.height() as u32, floats);
+        let image = image.ok_or_else(|| CostError::Sizes { point: name.to_owned() })?;
+        image.save(&path).map_err(|source| CostError::Picture { path, source })
+    }
+
+    fn write_shown(&self, name: &str, picture: &Picture, exposure: f64) -> Result<(), CostError> {
+        let byte = |value: f64| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
+        let shown = picture.shown(exposure);
+        let bytes = shown.iter().flat_map(|pixel| pixel.to_array().map(byte)).collect();
+        self.write_bytes(name, picture.width, bytes)
+    }
+
+    fn write_bytes(&self, name: &str, width: usize, bytes: Vec<u8>) -> Result<(), CostError> {
+        let path = self.path.join(format!("{name}.png"));
+        let height = bytes.len() / (3 * width.max(1));
+        let image = RgbImage::from_raw(width as u32, height as u32, bytes);
+        let image = image.ok_or_else(|| CostError::Sizes { point: name.to_owned() })?;
+        image.save(&path).map_err(|source| CostError::Picture { path, source })
+    }
+
+    fn replace(&self, name: &str, bytes: &[u8]) -> Result<(), CostError> {
+        let path = self.path.join(name);
+        let beside = self.path.join(format!(".{}.{name}", std::process::id()));
+        let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &path));
+        written.map_err(|source| {
+            // Half-written; if it cannot be removed either, the first error is the one to tell.
+            let _ = fs::remove_file(&beside);
+            CostError::File { path, source }
+        })
+    }
+}
+
+/// Reads a report from its file, or from the folder that holds it.
+///
+/// # Errors
+/// [`CostError::File`], [`CostError::NotAReport`].
+pub fn read_report(path: &Path) -> Result<CostReport, CostError> {
+    let path = if path.is_dir() { path.join(REPORT) } else { path.to_owned() };
+    let text = fs::read_to_string(&path).map_err(|source| CostError::File { path: path.clone(), source })?;
+    serde_json::from_str(&text).map_err(|source| CostError::NotAReport { path, source })
+}
+
+/// Reads a picture of light that a report keeps, by the name that a point has for it.
+///
+/// # Errors
+/// [`CostError::Picture`].
+pub fn read_picture(folder: &Path, name: &str) -> Result<Picture, CostError> {
+    let path = folder.join(format!("{name}.exr"));
+    let image = image::open(&path).map_err(|source| CostError::Picture { path, source })?.into_rgb32f();
+    let radiance = image.pixels().map(|pixel| glam::Vec3::from(pixel.0).as_dvec3()).collect();
+    Ok(Picture { width: image.width() as usize, radiance })
+}
+
+/// Whether the pictures of a point are there.
+pub fn has_pictures(folder: &Path, point: &Point) -> bool {
+    let Some(files) = &point.picture else { return true };
+    let names = [
+        format!("{}.exr", files.picture),
+        format!("{}.png", files.picture),
+        format!("{}.heat.png", files.picture),
+        format!("{}.exr", files.reference),
+        format!("{}.png", files.reference),
+    ];
+    names.iter().all(|name| folder.join(name).exists())
+}

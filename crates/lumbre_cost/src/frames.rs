@@ -1,0 +1,138 @@
+//! Frames that are drawn again and again, side by side: their times, their counts, and the picture that each makes. Not the scenes.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use bevy_ecs::world::World;
+use lumbre_render::{Display, FrameOptions, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
+
+use crate::picture::Picture;
+use crate::rounds::{Work, in_rounds, milliseconds_since};
+use crate::{Conditions, CostError, Spread};
+
+/// A scene, and how a frame of it is drawn.
+pub struct Frame {
+    /// The scene.
+    pub world: World,
+    /// How it is drawn.
+    pub options: FrameOptions,
+}
+
+/// What was measured of a frame.
+pub struct DrawnFrame {
+    /// Milliseconds of each round, from the call until the device has finished.
+    pub times: Vec<f64>,
+    /// What it shows, in 32-bit floats and without exposure.
+    pub picture: Picture,
+    /// Vertices that were shaded.
+    pub vertex_invocations: u64,
+    /// Fragments that were shaded.
+    pub fragment_invocations: u64,
+    /// What the renderer says of it.
+    pub statistics: Statistics,
+}
+
+impl DrawnFrame {
+    /// The median and the quartiles of its times.
+    pub fn spread(&self) -> Option<Spread> {
+        Spread::of(&self.times)
+    }
+
+    /// Counts that do not depend on the hour.
+    pub fn counts(&self) -> BTreeMap<String, f64> {
+        let counts = [
+            ("vertex invocations", self.vertex_invocations as f64),
+            ("fragment invocations", self.fragment_invocations as f64),
+            ("triangles", self.statistics.triangles as f64),
+            ("draw calls", self.statistics.draws as f64),
+        ];
+        counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect()
+    }
+}
+
+/// Draws every frame once for its picture, and then all in turn for about `seconds` (see [`Conditions::rounds`]). `told` are the shares of the
+/// study that are done before and after.
+///
+/// # Errors
+/// [`CostError::Render`], [`CostError::Interrupted`].
+pub fn draw_frames(
+    conditions: &Conditions<'_>,
+    mut frames: Vec<Frame>,
+    seconds: f64,
+    told: [f64; 2],
+) -> Result<Vec<DrawnFrame>, CostError> {
+    let (gpu, (width, height)) = (conditions.gpu, conditions.size);
+    let [before, after] = told;
+    let mut drawn = Vec::new();
+    let mut renderer = Renderer::new(gpu);
+    let count = frames.len() as f64;
+    for frame in &mut frames {
+        conditions.tell(before + 0.3 * (after - before) * drawn.len() as f64 / count)?;
+        drawn.push(picture_of(conditions, &mut renderer, &mut frame.world, &frame.options)?);
+    }
+    let target = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
+    let target = target.target();
+    let mut work: Vec<Work<'_>> = Vec::new();
+    for frame in &mut frames {
+        let mut renderer = Renderer::new(gpu);
+        let target = &target;
+        work.push(Box::new(move || {
+            let begun = Instant::now();
+            renderer.render(&mut frame.world, target, &frame.options)?;
+            renderer.wait()?;
+            Ok(milliseconds_since(begun))
+        }));
+    }
+    let go_on = |share: f64| conditions.tell(before + (0.3 + 0.7 * share) * (after - before));
+    let times = in_rounds(&mut work, conditions.rounds(seconds), &go_on)?;
+    for (drawn, times) in drawn.iter_mut().zip(times) {
+        drawn.times = times;
+    }
+    Ok(drawn)
+}
+
+fn picture_of(
+    conditions: &Conditions<'_>,
+    renderer: &mut Renderer,
+    world: &mut World,
+    options: &FrameOptions,
+) -> Result<DrawnFrame, CostError> {
+    let (width, height) = conditions.size;
+    let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::LinearFloat)?;
+    let options = FrameOptions {
+        display: Display::Linear,
+        exposure: Some(1.0),
+        full_precision: true,
+        measure: Measure::TimeAndInvocations,
+        ..options.clone()
+    };
+    let report = renderer.render(world, &target.target(), &options)?;
+    let measured = renderer.wait()?.cloned().unwrap_or_default();
+    let invocations = measured.passes.iter().filter_map(|pass| pass.invocations);
+    let (vertex, fragment) = invocations
+        .fold((0, 0), |(vertex, fragment), found| (vertex + found.vertex, fragment + found.fragment));
+    let radiance = target.read_linear(conditions.gpu)?;
+    Ok(DrawnFrame {
+        times: Vec::new(),
+        picture: Picture {
+            width: width as usize,
+            radiance: radiance.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(),
+        },
+        vertex_invocations: vertex,
+        fragment_invocations: fragment,
+        statistics: report.statistics,
+    })
+}
+
+/// A frame for its picture alone.
+///
+/// # Errors
+/// [`CostError::Render`].
+pub fn draw_picture(
+    conditions: &Conditions<'_>,
+    world: &mut World,
+    options: &FrameOptions,
+) -> Result<Picture, CostError> {
+    let mut renderer = Renderer::new(conditions.gpu);
+    Ok(picture_of(conditions, &mut renderer, world, options)?.picture)
+}

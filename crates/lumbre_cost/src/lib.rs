@@ -1,0 +1,63 @@
+//! What accuracy costs in time: studies that measure milliseconds and error of the same choice, side by side, and the page that shows them. Not
+//! the command line, and nothing that draws or bakes: that is measured here.
+//!
+//! ```text
+//!   files, or scenes ─► studies/… ─► Measured: Study (points, findings) + pictures
+//!                        │  frames: interleaved rounds          │
+//!                        │  traced: references in f64           ▼
+//!                        │                        folder: cost.json, cost.csv, index.html, pictures/*.exr
+//!                        └─ fronts ─► findings: sentences           │
+//!                                                                   └─► comparison: two reports, what changed
+//! ```
+//!
+//! - A [`Point`] has a time (median and quartiles over interleaved rounds), an error against the study's reference, counts that do not depend
+//!   on the hour, the command that makes it again, and its picture.
+//! - Findings are worked out from the points; where the quartiles of two times overlap they say that it is not decided.
+//!
+//! ```
+//! use lumbre_cost::{CostReport, Point, Spread, Study, compare_reports};
+//!
+//! let frame = |ms: [f64; 3]| Point { label: "frame".into(), milliseconds: Spread::of(&ms), ..Point::default() };
+//! let report = |ms| CostReport {
+//!     studies: vec![Study { name: "shading".into(), points: vec![frame(ms)], ..Study::default() }],
+//!     ..CostReport::default()
+//! };
+//! let changes = compare_reports(&report([1.0, 1.1, 1.2]), &report([2.0, 2.1, 2.2]), 1.1);
+//! assert!(changes.iter().any(|change| change.is_slower()));
+//! ```
+
+mod baked;
+mod comparison;
+mod conditions;
+mod error;
+mod findings;
+mod folder;
+mod frames;
+mod fronts;
+mod machine;
+mod measured;
+mod page;
+mod picture;
+mod plot;
+mod report;
+mod rounds;
+mod run;
+mod scene_file;
+mod scenes;
+mod spread;
+mod studies;
+mod table;
+mod traced;
+
+pub use comparison::{Change, What, compare_reports};
+pub use conditions::{Conditions, Listener};
+pub use error::CostError;
+pub use findings::cheapest_by_error;
+pub use folder::{PAGE, REPORT, TABLE, read_picture, read_report};
+pub use fronts::{Stretch, pareto_front, stretches};
+pub use page::{Images, page};
+pub use picture::{Compared, Picture, compared};
+pub use report::{CostReport, ErrorOf, ErrorOver, Machine, Plot, Point, PointPicture, Quantity, Settings, Study};
+pub use run::{CostOptions, CostProgress, measure};
+pub use spread::Spread;
+pub use studies::{STUDIES, StudyKind, studies_named};

@@ -1,0 +1,24 @@
+//! What a report was measured on.
+
+use lumbre_render::Gpu;
+
+use crate::Machine;
+
+/// This machine with this device.
+pub fn machine(gpu: &Gpu) -> Machine {
+    let optimized = if cfg!(debug_assertions) { "development profile" } else { "release profile" };
+    Machine {
+        processor: processor(),
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+        adapter: gpu.describe(),
+        version: format!("Lumbre {}, {optimized}", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// The processor's name where the system tells it in a file, as Linux does; its architecture elsewhere.
+fn processor() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let named = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    named.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
+}

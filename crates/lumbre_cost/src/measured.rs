@@ -1,0 +1,95 @@
+//! What a study hands over: the study as data, and the pictures that its points name. Not their files.
+
+use std::collections::BTreeMap;
+
+use crate::picture::{Compared, Picture, compared};
+use crate::{CostError, ErrorOf, ErrorOver, Point, PointPicture, Study};
+
+/// A study that is finished.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// The study.
+    pub study: Study,
+    /// Its pictures and references, by the names that its points have for them.
+    pub pictures: BTreeMap<String, Picture>,
+    /// Where a picture differs from its reference: FLIP of every pixel, by the name of the picture.
+    pub heat: BTreeMap<String, Vec<f64>>,
+}
+
+impl Measured {
+    /// Keeps a reference picture; points name it by what is returned.
+    pub fn keep_reference(&mut self, name: &str, picture: Picture) -> String {
+        let name = self.file_name(name);
+        self.pictures.insert(name.clone(), picture);
+        name
+    }
+
+    /// Adds a point with its picture. The error is that of the picture against a reference that was kept, unless the point has one of something
+    /// that the picture only shows.
+    ///
+    /// # Errors
+    /// [`CostError::Sizes`], [`CostError::NotFinite`].
+    pub fn add_picture(
+        &mut self,
+        point: Point,
+        picture: Picture,
+        reference: &str,
+        error_of: ErrorOver,
+    ) -> Result<(), CostError> {
+        let found = self.compared(&point, &picture, reference, error_of)?;
+        let name = self.file_name(&format!("{} {}", point.series, point.label));
+        let files = PointPicture { picture: name.clone(), reference: reference.to_owned(), error_of };
+        let error = match (error_of, point.error) {
+            (ErrorOver::Beyond, Some(own)) => ErrorOf { flip: found.error.flip, ..own },
+            (_, own) => ErrorOf { uncertainty: own.map_or(0.0, |own| own.uncertainty), ..found.error },
+        };
+        self.study.points.push(Point { error: Some(error), picture: Some(files), ..point });
+        self.pictures.insert(name.clone(), picture);
+        self.heat.insert(name, found.heat);
+        Ok(())
+    }
+
+    /// Adds a point with the error of a picture against its reference, neither of which is kept.
+    ///
+    /// # Errors
+    /// [`CostError::Sizes`], [`CostError::NotFinite`].
+    pub fn add_error(&mut self, point: Point, picture: &Picture, reference: &Picture) -> Result<(), CostError> {
+        let error = checked(&self.study, &point, compared(reference, picture, ErrorOver::Picture))?.error;
+        self.study.points.push(Point { error: Some(error), ..point });
+        Ok(())
+    }
+
+    fn compared(
+        &self,
+        point: &Point,
+        picture: &Picture,
+        reference: &str,
+        over: ErrorOver,
+    ) -> Result<Compared, CostError> {
+        let wanted = self.pictures.get(reference);
+        checked(&self.study, point, wanted.and_then(|wanted| compared(wanted, picture, over)))
+    }
+
+    /// Below `pictures/STUDY`, of letters, digits and hyphens.
+    fn file_name(&self, name: &str) -> String {
+        let mut plain = String::new();
+        for c in name.to_lowercase().chars() {
+            match c.is_ascii_alphanumeric() {
+                true => plain.push(c),
+                false if !plain.is_empty() && !plain.ends_with('-') => plain.push('-'),
+                false => {}
+            }
+        }
+        format!("pictures/{}/{}", self.study.name, plain.trim_end_matches('-'))
+    }
+}
+
+/// What a comparison found, if it compared pictures of one size and numbers.
+fn checked(study: &Study, point: &Point, found: Option<Compared>) -> Result<Compared, CostError> {
+    let named = || format!("{}, {}", point.series, point.label);
+    let found = found.ok_or_else(|| CostError::Sizes { point: named() })?;
+    match found.error.relative_rmse.is_finite() && found.error.largest.is_finite() {
+        true => Ok(found),
+        false => Err(CostError::NotFinite { study: study.name.clone(), point: named() }),
+    }
+}

@@ -1,0 +1,131 @@
+//! The report as one page of HTML that needs nothing else: plots, pictures and style are in it. Not the numbers.
+
+mod gallery;
+mod tables;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use crate::plot::{PlotSize, SERIES_COLORS, draw_plot, drawn_series};
+use crate::{CostError, CostReport, Plot, Study};
+
+/// The bytes of a PNG by the name that a point has for its picture; nothing where it is not there.
+pub type Images<'a> = dyn Fn(&str) -> Option<Vec<u8>> + 'a;
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// The whole page.
+///
+/// # Errors
+/// [`CostError::Plot`].
+pub fn page(report: &CostReport, images: &Images<'_>) -> Result<String, CostError> {
+    let mut sections = Vec::new();
+    for study in &report.studies {
+        sections.push(section(study, images)?);
+    }
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { "What accuracy costs in time" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { "What accuracy costs in time" }
+                    p {
+                        "Every choice has two prices: milliseconds, and how far the result is from a named reference. Times are medians over rounds in which all choices of a study take turns, with their quartiles as lines; errors are relative root mean squares. "
+                        "Measured on this machine, at these settings:"
+                    }
+                    (tables::conditions(report))
+                }
+                nav aria-label="Studies" {
+                    h2 { "What was found" }
+                    ol {
+                        @for study in &report.studies {
+                            li {
+                                a href=(format!("#{}", study.name)) { (study.title) }
+                                @if let Some(first) = study.findings.first() { ": " (first) }
+                            }
+                        }
+                    }
+                }
+                main { @for section in &sections { (section) } }
+                footer {
+                    p { "The same numbers stand in " code { "cost.json" } " and " code { "cost.csv" } ", pictures of light in " code { "pictures" } ". Commands are meant to be run in the folder of this page." }
+                }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+fn section(study: &Study, images: &Images<'_>) -> Result<Markup, CostError> {
+    let mut plots = Vec::new();
+    for plot in &study.plots {
+        // A plot without a point is one whose quantities no file called for.
+        if !drawn_series(study, plot).is_empty() {
+            plots.push(plot_figure(study, plot)?);
+        }
+    }
+    Ok(html! {
+        section id=(study.name) {
+            h2 { (study.title) }
+            p { (study.question) }
+            p class="reference" { "Errors are against " (study.reference) "." }
+            @if !study.findings.is_empty() {
+                ul class="findings" { @for finding in &study.findings { li { (finding) } } }
+            }
+            @for plot in &plots { (plot) }
+            (gallery::viewer(study, images))
+            (tables::points(study))
+            @if !study.notes.is_empty() {
+                ul class="notes" { @for note in &study.notes { li { (note) } } }
+            }
+            p class="effort" { (format!("This study took {:.1} s.", study.seconds)) }
+        }
+    })
+}
+
+fn plot_figure(study: &Study, plot: &Plot) -> Result<Markup, CostError> {
+    let drawing = |size, class: &str| -> Result<Markup, CostError> {
+        let svg = draw_plot(study, plot, size)?;
+        let label = format!("{}: {} over {}", plot.title, plot.up.title(), plot.across.title());
+        Ok(html! { div class=(class) role="img" aria-label=(label) { (PreEscaped(svg)) } })
+    };
+    let (wide, narrow) = (drawing(PlotSize::Wide, "wide")?, drawing(PlotSize::Narrow, "narrow")?);
+    Ok(html! {
+        figure class="plot" {
+            figcaption { (plot.title) }
+            (wide)
+            (narrow)
+            ul class="legend" {
+                @for (place, series) in drawn_series(study, plot) {
+                    li { (legend_mark(place)) (series) }
+                }
+                @if plot.front {
+                    li { span class="front" {} "not beaten in both" }
+                }
+            }
+        }
+    })
+}
+
+/// The mark that a plot has for a series.
+fn legend_mark(series: usize) -> Markup {
+    let color = format!("var(--series-{})", series % SERIES_COLORS);
+    html! {
+        svg class="mark" viewBox="0 0 12 12" aria-hidden="true" {
+            @match series % 4 {
+                0 => { circle cx="6" cy="6" r="4" fill=(color) {} }
+                1 => { rect x="3" y="3" width="6" height="6" fill=(color) {} }
+                2 => { path d="M6 1 L10.5 9 H1.5 Z" fill=(color) {} }
+                _ => { circle cx="6" cy="6" r="4" fill="none" stroke=(color) stroke-width="2" {} }
+            }
+        }
+    }
+}

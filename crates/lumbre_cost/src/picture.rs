@@ -1,0 +1,91 @@
+//! Pictures of light, and how far one is from another. Not their drawing.
+
+use glam::DVec3;
+use lumbre_trace::{Metering, compare, encode_srgb, tone_curve};
+
+use crate::{ErrorOf, ErrorOver};
+
+/// Radiance of every pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Columns.
+    pub width: usize,
+    /// Linear RGB, W/(m² sr), top row first.
+    pub radiance: Vec<DVec3>,
+}
+
+/// A picture against its reference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compared {
+    /// How far it is.
+    pub error: ErrorOf,
+    /// FLIP of every pixel, top row first.
+    pub heat: Vec<f64>,
+}
+
+/// Share of what is lit that has to be white before an exposure is metered.
+const CLIPPED: f64 = 0.02;
+
+impl Picture {
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.radiance.len() / self.width.max(1)
+    }
+
+    /// The factor on radiance that it is shown with: 1, unless too much of it would be white.
+    pub fn exposure(&self) -> f64 {
+        let metering = Metering::of(&self.radiance).filter(|found| found.clipped > CLIPPED);
+        metering.map_or(1.0, |found| f64::from(found.exposure))
+    }
+
+    /// Colours as they are shown with that exposure: tone curve and sRGB's encoding, each channel in [0, 1].
+    pub fn shown(&self, exposure: f64) -> Vec<DVec3> {
+        self.radiance.iter().map(|pixel| encode_srgb(tone_curve(*pixel * exposure))).collect()
+    }
+}
+
+/// How far a picture is from its reference, both shown with the reference's exposure. Nothing if the sizes differ.
+pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Option<Compared> {
+    let same = reference.width == picture.width && reference.radiance.len() == picture.radiance.len();
+    if !same || picture.radiance.is_empty() {
+        return None;
+    }
+    let pairs = reference.radiance.iter().zip(&picture.radiance);
+    let counts =
+        |(a, b): &(&DVec3, &DVec3)| {
+        over != ErrorOver::WhereBothAreLit || (**a != DVec3::ZERO && **b != DVec3::ZERO)
+    };
+    let (wanted, found): (Vec<DVec3>, Vec<DVec3>) = pairs.filter(counts).map(|(a, b)| (*a, *b)).unzip();
+    let exposure = reference.exposure();
+    let shown = [reference.shown(exposure), picture.shown(exposure)];
+    let found = compare(reference.width, [&wanted, &found], shown);
+    let error = ErrorOf {
+        relative_rmse: found.relative_error,
+        largest: found.largest,
+        flip: Some(found.flip),
+        uncertainty: 0.0,
+    };
+    Some(Compared { error, heat: found.map })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(values: &[f64]) -> Picture {
+        Picture { width: 2, radiance: values.iter().map(|value| DVec3::splat(*value)).collect() }
+    }
+
+    #[test]
+    fn black_pixels_count_only_where_they_are_asked_for() {
+        let (reference, picture) = (grey(&[0.5, 0.5, 0.5, 0.0]), grey(&[0.5, 0.4, 0.0, 0.0]));
+        let lit = compared(&reference, &picture, ErrorOver::WhereBothAreLit).expect("the sizes agree").error;
+        // Two pixels are lit in both; one of them is off by a fifth.
+        assert!((lit.relative_rmse - (0.01f64 / 0.5).sqrt()).abs() < 1e-12, "{lit:?}");
+        assert!((lit.largest - 0.1).abs() < 1e-12);
+        let all = compared(&reference, &picture, ErrorOver::Picture).expect("the sizes agree").error;
+        assert!((all.relative_rmse - (0.26f64 / 0.75).sqrt()).abs() < 1e-12, "{all:?}");
+        assert_eq!(compared(&reference, &reference, ErrorOver::Picture).map(|same| same.error.relative_rmse), Some(0.0));
+        assert_eq!(compared(&reference, &grey(&[1.0, 1.0]), ErrorOver::Picture), None);
+    }
+}

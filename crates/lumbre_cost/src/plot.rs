@@ -1,0 +1,311 @@
+//! A study's numbers over a pair of axes, both logarithmic, as SVG that takes its colours from the page around it. Not the page.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::fronts::pareto_front;
+use crate::{CostError, Plot, Point, Quantity, Study};
+
+/// How large a plot is drawn, in pixels: text keeps its size, so that phones get drawings of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlotSize {
+    /// For screens and paper.
+    Wide,
+    /// For phones.
+    Narrow,
+}
+
+impl PlotSize {
+    fn pixels(self) -> (u32, u32) {
+        match self {
+            Self::Wide => (680, 400),
+            Self::Narrow => (350, 320),
+        }
+    }
+}
+
+/// Colours that stand for the page's own: the drawing has numbers, the page replaces them by names of its style sheet.
+const INK: RGBColor = RGBColor(1, 2, 3);
+const GRID: RGBColor = RGBColor(1, 2, 4);
+const FRONT: RGBColor = RGBColor(1, 2, 5);
+/// Series have as many colours, then they begin again.
+pub const SERIES_COLORS: usize = 7;
+
+fn series_color(series: usize) -> RGBColor {
+    RGBColor(2, 2, (series % SERIES_COLORS) as u8)
+}
+
+const FONT: u32 = 13;
+/// Radius of a mark.
+const MARK: i32 = 4;
+
+/// Draws it.
+///
+/// # Errors
+/// [`CostError::Plot`].
+pub fn draw_plot(study: &Study, plot: &Plot, size: PlotSize) -> Result<String, CostError> {
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, size.pixels()).into_drawing_area();
+        draw(&root, study, plot, size).and_then(|()| root.present().map_err(|error| error.to_string())).map_err(
+            |reason| CostError::Plot { title: format!("{}: {}", study.title, plot.title), reason },
+        )?;
+    }
+    Ok(with_colors_of_the_page(&svg))
+}
+
+/// The series that a plot draws, with their places in the study's list, which their colours follow.
+pub fn drawn_series<'a>(study: &'a Study, plot: &Plot) -> Vec<(usize, &'a str)> {
+    let has_numbers = |series: &str| study.of_series(series).any(|point| place(plot, point).is_some());
+    let wanted = |series: &str| plot.series.is_empty() || plot.series.iter().any(|name| name == series);
+    let all = study.series().into_iter().enumerate();
+    all.filter(|(_, series)| wanted(series) && has_numbers(series)).collect()
+}
+
+/// A point's two numbers as they are written, if it has both.
+fn place(plot: &Plot, point: &Point) -> Option<(f64, f64)> {
+    let (across, up) = (plot.across.of(point)? * plot.across.shown(), plot.up.of(point)? * plot.up.shown());
+    (across.is_finite() && up.is_finite() && across >= 0.0 && up >= 0.0).then_some((across, up))
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(), String> {
+    let told = |error: DrawingAreaErrorKind<_>| -> String { format!("{error:?}") };
+    let series = drawn_series(study, plot);
+    let points: Vec<(usize, &Point, (f64, f64))> = series
+        .iter()
+        .flat_map(|(color, name)| {
+            study.of_series(name).filter_map(|point| Some((*color, point, place(plot, point)?)))
+        })
+        .collect();
+    if points.is_empty() {
+        return Err("no point has both numbers".to_owned());
+    }
+    let (most_across, most_up) = if size == PlotSize::Wide { (9, 7) } else { (5, 6) };
+    let across = Axis::of(points.iter().flat_map(|(_, point, at)| reach(&plot.across, point, at.0)), most_across);
+    let up = Axis::of(points.iter().map(|(.., at)| at.1), most_up);
+    let text = |color: &RGBColor| ("sans-serif", FONT).into_font().color(color);
+    let mut chart = ChartBuilder::on(root)
+        .margin(8)
+        .margin_right(16)
+        .x_label_area_size(44)
+        .y_label_area_size(62)
+        .build_cartesian_2d(
+            (across.from..across.to).log_scale().with_key_points(across.ticks.clone()),
+            (up.from..up.to).log_scale().with_key_points(up.ticks.clone()),
+        )
+        .map_err(told)?;
+    chart
+        .configure_mesh()
+        .x_desc(plot.across.title())
+        .y_desc(plot.up.title())
+        .x_labels(across.ticks.len())
+        .y_labels(up.ticks.len())
+        .x_label_formatter(&|value| tick_label(*value))
+        .y_label_formatter(&|value| tick_label(*value))
+        .label_style(text(&INK))
+        .axis_desc_style(text(&INK))
+        .axis_style(INK)
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .draw()
+        .map_err(told)?;
+    let onto = |(x, y): (f64, f64)| (x.max(across.from), y.max(up.from));
+
+    let front = if plot.front { pareto_front(points.iter().map(|(_, point, _)| *point)) } else { Vec::new() };
+    let corners: Vec<(f64, f64)> = front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
+    let steps = corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]);
+    chart.draw_series(DashedLineSeries::new(steps, 4, 4, FRONT.stroke_width(1))).map_err(told)?;
+
+    for (color, name) in &series {
+        let own = || points.iter().filter(|(_, point, _)| point.series == *name);
+        let style = series_color(*color);
+        if plot.joined {
+            let mut line: Vec<(f64, f64)> = own().map(|(.., at)| onto(*at)).collect();
+            if plot.across != Quantity::Milliseconds {
+                line.sort_by(|a, b| a.0.total_cmp(&b.0));
+            }
+            chart.draw_series(LineSeries::new(line, style.stroke_width(2))).map_err(told)?;
+        }
+        // Quartiles of times, where they are wider than the mark.
+        for (_, point, at) in own() {
+            let Some(time) = point.milliseconds else { continue };
+            let ends = match (&plot.across, &plot.up) {
+                (Quantity::Milliseconds, _) => [(time.lower, at.1), (time.upper, at.1)],
+                (_, Quantity::Milliseconds) => [(at.0, time.lower), (at.0, time.upper)],
+                _ => continue,
+            };
+            chart.draw_series(LineSeries::new(ends.map(onto), style.stroke_width(1))).map_err(told)?;
+        }
+    }
+    let area = chart.plotting_area();
+    let mut taken: Vec<[i32; 4]> = Vec::new();
+    for (color, _, at) in &points {
+        let (x, y) = area.map_coordinate(&onto(*at));
+        taken.push([x - MARK, y - MARK, x + MARK, y + MARK]);
+        mark(root, *color, (x, y)).map_err(told)?;
+    }
+    for point in front {
+        let Some(at) = place(plot, point) else { continue };
+        let (x, y) = area.map_coordinate(&onto(at));
+        let Some(label) = Label::beside(&point.label, (x, y), size.pixels(), &taken) else { continue };
+        taken.push(label.extent);
+        let style = text(&INK).pos(Pos::new(HPos::Left, VPos::Center));
+        root.draw(&Text::new(point.label.clone(), label.start, style)).map_err(told)?;
+    }
+    Ok(())
+}
+
+/// A number across with the quartiles of its time.
+fn reach(across: &Quantity, point: &Point, at: f64) -> Vec<f64> {
+    match (across, point.milliseconds) {
+        (Quantity::Milliseconds, Some(time)) => vec![time.lower, at, time.upper],
+        _ => vec![at],
+    }
+}
+
+/// A mark: shapes differ as well as colours, for whoever sees no colours and for print.
+fn mark(root: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    let style = series_color(series).filled();
+    let ring = series_color(series).stroke_width(2);
+    match series % 4 {
+        0 => root.draw(&Circle::new((x, y), MARK, style)),
+        1 => root.draw(&Rectangle::new([(x - MARK + 1, y - MARK + 1), (x + MARK - 1, y + MARK - 1)], style)),
+        2 => root.draw(&TriangleMarker::new((x, y), MARK + 1, style)),
+        _ => root.draw(&Circle::new((x, y), MARK, ring)),
+    }
+}
+
+/// Where a name may stand without lying over another or a mark.
+struct Label {
+    start: (i32, i32),
+    extent: [i32; 4],
+}
+
+impl Label {
+    fn beside(text: &str, (x, y): (i32, i32), (width, height): (u32, u32), taken: &[[i32; 4]]) -> Option<Self> {
+        // Of a proportional font nothing is known here: a wide guess.
+        let long = (text.chars().count() as f64 * 0.56 * f64::from(FONT)).ceil() as i32;
+        let high = FONT as i32;
+        let starts = [
+            (x + MARK + 4, y),
+            (x + MARK + 2, y - high + 2),
+            (x + MARK + 2, y + high - 2),
+            (x - MARK - 4 - long, y),
+            (x - long / 2, y - high),
+            (x - long / 2, y + high),
+        ];
+        let fits = |extent: &[i32; 4]| {
+            let inside = extent[0] > 66 && extent[1] > 4 && extent[2] < width as i32 - 4 && extent[3] < height as i32 - 48;
+            let free = |other: &[i32; 4]| {
+                extent[0] >= other[2] || extent[2] <= other[0] || extent[1] >= other[3] || extent[3] <= other[1]
+            };
+            inside && taken.iter().all(free)
+        };
+        let extent = |start: (i32, i32)| [start.0, start.1 - high / 2, start.0 + long, start.1 + high / 2];
+        starts.into_iter().map(|start| Self { start, extent: extent(start) }).find(|label| fits(&label.extent))
+    }
+}
+
+/// A logarithmic axis: its ends and where lines and numbers stand.
+#[derive(Clone, Debug, PartialEq)]
+struct Axis {
+    from: f64,
+    to: f64,
+    ticks: Vec<f64>,
+}
+
+/// Air beyond the outermost numbers, as a factor.
+const AIR: f64 = 1.3;
+/// Numbers below this part of the largest stand on the axis' end.
+const SMALLEST_PART: f64 = 1e-9;
+
+impl Axis {
+    /// Around some numbers, with at most so many ticks; numbers that are 0 stand on its lower end.
+    fn of(numbers: impl Iterator<Item = f64>, most: usize) -> Self {
+        let numbers: Vec<f64> = numbers.collect();
+        let largest = numbers.iter().copied().fold(0.0, f64::max);
+        let largest = if largest > 0.0 { largest } else { 1.0 };
+        let above = numbers.iter().copied().filter(|number| *number > largest * SMALLEST_PART);
+        let smallest = above.fold(largest, f64::min);
+        let below = numbers.iter().any(|number| *number <= largest * SMALLEST_PART);
+        let (mut from, mut to) = (smallest / if below { 4.0 } else { AIR }, largest * AIR);
+        if to / from < 3.0 {
+            let middle = (from * to).sqrt();
+            (from, to) = (middle / 3f64.sqrt(), middle * 3f64.sqrt());
+        }
+        Self { from, to, ticks: ticks(from, to, most) }
+    }
+}
+
+/// Powers of ten and round parts of them within a range: as many as fit.
+fn ticks(from: f64, to: f64, most: usize) -> Vec<f64> {
+    let powers = || from.log10().floor() as i32..=to.log10().ceil() as i32;
+    let with = |digits: &[u32], every: i32| -> Vec<f64> {
+        powers()
+            .filter(|power| power % every == 0)
+            .flat_map(|power| digits.iter().map(move |digit| format!("{digit}e{power}")))
+            // Read from decimals, a tick is the number that it is written as.
+            .filter_map(|text| text.parse::<f64>().ok())
+            .filter(|tick| (from..=to).contains(tick))
+            .collect()
+    };
+    let choices = [
+        with(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 1),
+        with(&[1, 2, 5], 1),
+        with(&[1, 3], 1),
+        with(&[1], 1),
+        with(&[1], 2),
+        with(&[1], 4),
+    ];
+    let fits = |ticks: &&Vec<f64>| ticks.len() <= most;
+    choices.iter().find(fits).or_else(|| choices.last()).cloned().unwrap_or_default()
+}
+
+fn tick_label(value: f64) -> String {
+    if (1e-3..1e6).contains(&value) { format!("{value}") } else { format!("{value:e}") }
+}
+
+fn with_colors_of_the_page(svg: &str) -> String {
+    let hex = |RGBColor(r, g, b): RGBColor| format!("\"#{r:02X}{g:02X}{b:02X}\"");
+    let mut names = vec![
+        (hex(INK), "\"var(--ink)\"".to_owned()),
+        (hex(GRID), "\"var(--grid)\"".to_owned()),
+        (hex(FRONT), "\"var(--front)\"".to_owned()),
+    ];
+    names.extend((0..SERIES_COLORS).map(|at| (hex(series_color(at)), format!("\"var(--series-{at})\""))));
+    names.iter().fold(svg.to_owned(), |svg, (from, to)| svg.replace(from, to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_few() {
+        assert_eq!(ticks(0.9, 11.0, 9), [1.0, 2.0, 5.0, 10.0]);
+        assert_eq!(ticks(2.5, 6.5, 9), [3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(ticks(1e-6, 1e3, 6), [1e-6, 1e-4, 1e-2, 1.0, 1e2]);
+        assert_eq!([0.001, 0.3, 1e-5, 1e6].map(tick_label), ["0.001", "0.3", "1e-5", "1e6"]);
+    }
+
+    #[test]
+    fn an_axis_holds_its_numbers_and_zeros_stand_on_its_end() {
+        let axis = Axis::of([0.0, 2.0, 8.0].into_iter(), 9);
+        assert!(axis.from < 2.0 && axis.from > 0.0 && axis.to > 8.0, "{axis:?}");
+        let narrow = Axis::of([5.0].into_iter(), 9);
+        assert!(narrow.to / narrow.from >= 2.99 && narrow.ticks.len() > 1, "{narrow:?}");
+    }
+
+    #[test]
+    fn names_do_not_lie_over_each_other() {
+        let first = Label::beside("depth 3", (200, 100), (680, 400), &[]).expect("there is room");
+        let second = Label::beside("depth 4", (203, 102), (680, 400), &[first.extent]).expect("there is room");
+        let apart = second.extent[1] >= first.extent[3] || second.extent[3] <= first.extent[1]
+            || second.extent[0] >= first.extent[2] || second.extent[2] <= first.extent[0];
+        assert!(apart, "{:?} {:?}", first.extent, second.extent);
+        assert!(Label::beside("a name that is far too long to stand anywhere in so small a drawing", (175, 100), (350, 320), &[]).is_none());
+    }
+}

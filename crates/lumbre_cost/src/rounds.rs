@@ -1,0 +1,99 @@
+//! Work that is timed in rounds, each of which does all of it once: what else the machine does meets every piece alike. Not the work.
+
+use std::time::{Duration, Instant};
+
+use crate::CostError;
+
+/// How often work is done.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounds {
+    /// Rounds that do not count: pipelines are made, buffers grow, caches fill.
+    pub warm_up: usize,
+    /// Fewest rounds, however long they take: with less there is no spread to speak of.
+    pub fewest: usize,
+    /// Most rounds: what varies after these varies with the hour.
+    pub most: usize,
+    /// After which no further round is begun.
+    pub time: Duration,
+}
+
+/// A piece of work, which answers with its milliseconds.
+pub type Work<'a> = Box<dyn FnMut() -> Result<f64, CostError> + 'a>;
+
+/// Does the work in rounds. Every other round goes backwards, so that none always follows the same one. `go_on` is asked between any two
+/// pieces, with the share of the rounds that is done, 0 to 1.
+///
+/// # Errors
+/// The first error of the work or of `go_on`.
+pub fn in_rounds(
+    work: &mut [Work<'_>],
+    rounds: Rounds,
+    go_on: &dyn Fn(f64) -> Result<(), CostError>,
+) -> Result<Vec<Vec<f64>>, CostError> {
+    for _ in 0..rounds.warm_up {
+        for piece in work.iter_mut() {
+            go_on(0.0)?;
+            piece()?;
+        }
+    }
+    let begun = Instant::now();
+    let mut times: Vec<Vec<f64>> = vec![Vec::new(); work.len()];
+    for round in 0..rounds.most.max(rounds.fewest) {
+        if round >= rounds.fewest && begun.elapsed() >= rounds.time {
+            break;
+        }
+        for step in 0..work.len() {
+            let by_time = begun.elapsed().as_secs_f64() / rounds.time.as_secs_f64().max(1e-9);
+            let by_number = (round * work.len() + step) as f64 / (rounds.fewest * work.len()).max(1) as f64;
+            go_on(by_time.min(by_number).min(1.0))?;
+            let piece = if round % 2 == 0 { step } else { work.len() - 1 - step };
+            times[piece].push(work[piece]()?);
+        }
+    }
+    Ok(times)
+}
+
+/// Milliseconds since a moment.
+pub fn milliseconds_since(begun: Instant) -> f64 {
+    begun.elapsed().as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    #[test]
+    fn rounds_are_interleaved_and_warm_ups_do_not_count() {
+        let order = RefCell::new(Vec::new());
+        let piece = |name: usize| -> Work<'_> {
+            let order = &order;
+            Box::new(move || {
+                order.borrow_mut().push(name);
+                Ok(name as f64)
+            })
+        };
+        let rounds = Rounds { warm_up: 1, fewest: 2, most: 2, time: Duration::ZERO };
+        let times = in_rounds(&mut [piece(0), piece(1), piece(2)], rounds, &|_| Ok(()));
+        assert_eq!(times.ok(), Some(vec![vec![0.0; 2], vec![1.0; 2], vec![2.0; 2]]));
+        assert_eq!(*order.borrow(), [0, 1, 2, 0, 1, 2, 2, 1, 0]);
+    }
+
+    #[test]
+    fn whoever_wants_it_to_end_is_heard() {
+        let rounds = Rounds { warm_up: 0, fewest: 5, most: 5, time: Duration::from_secs(1) };
+        let mut done = 0;
+        let work: Work<'_> = Box::new(|| {
+            done += 1;
+            Ok(1.0)
+        });
+        let asked = RefCell::new(0);
+        let ended = in_rounds(&mut [work], rounds, &|_| {
+            *asked.borrow_mut() += 1;
+            if *asked.borrow() > 3 { Err(CostError::Interrupted) } else { Ok(()) }
+        });
+        assert!(matches!(ended, Err(CostError::Interrupted)));
+        assert_eq!(done, 3);
+    }
+}

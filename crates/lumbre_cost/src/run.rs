@@ -1,0 +1,96 @@
+//! A report from end to end: which studies are still to be done, each of them, and what is kept after each.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use lumbre_render::Gpu;
+
+use crate::folder::{Folder, has_pictures};
+use crate::machine::machine;
+use crate::studies::StudyKind;
+use crate::{Conditions, CostError, CostReport, Settings, Study};
+
+/// What a report is asked for.
+#[derive(Clone, Debug)]
+pub struct CostOptions {
+    /// The scenes; without any the studies make their own.
+    pub files: Vec<PathBuf>,
+    /// The studies, in their order.
+    pub studies: Vec<StudyKind>,
+    /// Fewer points and rounds.
+    pub quick: bool,
+    /// Width and height of the pictures in pixels.
+    pub size: (u32, u32),
+    /// Of everything that draws random numbers.
+    pub seed: u32,
+    /// Keeps the studies that the folder holds already, if they were measured on this machine and with these settings.
+    pub resume: bool,
+}
+
+/// How far a report is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CostProgress {
+    /// The study that is measured.
+    pub study: &'static str,
+    /// Which of the studies that is, from 0.
+    pub number: usize,
+    /// How many there are.
+    pub of: usize,
+    /// How much of it is done, 0 to 1; nothing if there is nothing new to say.
+    pub fraction: Option<f64>,
+}
+
+/// Measures what is asked for into a folder. After each study everything is written, so that an end at any time keeps what is finished. `told` is
+/// called often, from several threads.
+///
+/// # Errors
+/// [`CostError`], the first; [`CostError::Interrupted`] if `told` answers with `Break`.
+pub fn measure(
+    gpu: &Gpu,
+    options: &CostOptions,
+    path: &Path,
+    told: &(dyn Fn(CostProgress) -> ControlFlow<()> + Sync),
+) -> Result<CostReport, CostError> {
+    let folder = Folder::open(path)?;
+    let mut report = CostReport { machine: machine(gpu), settings: settings(options), studies: Vec::new() };
+    let former = if options.resume { folder.report()? } else { None };
+    let former = former.filter(|kept| kept.machine == report.machine && kept.settings == report.settings);
+    let of = options.studies.len();
+    for (number, kind) in options.studies.iter().enumerate() {
+        let kept = former.as_ref().and_then(|former| former.study(kind.name));
+        if let Some(kept) = kept.filter(|study| study.points.iter().all(|p| has_pictures(folder.path(), p))) {
+            report.studies.push(kept.clone());
+            continue;
+        }
+        let listener = |fraction| told(CostProgress { study: kind.name, number, of, fraction });
+        let conditions = Conditions {
+            gpu,
+            quick: options.quick,
+            size: options.size,
+            seed: options.seed,
+            folder: folder.path(),
+            files: &options.files,
+            listener: &listener,
+        };
+        conditions.tell(0.0)?;
+        let begun = Instant::now();
+        let measured = (kind.run)(&conditions)?;
+        folder.write_pictures(&measured)?;
+        let seconds = begun.elapsed().as_secs_f64();
+        report.studies.push(Study { seconds, ..measured.study });
+        folder.write(&report)?;
+    }
+    folder.write(&report)?;
+    Ok(report)
+}
+
+fn settings(options: &CostOptions) -> Settings {
+    let whole = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    Settings {
+        quick: options.quick,
+        size: options.size,
+        seed: options.seed,
+        files: options.files.iter().map(|path| whole(path).display().to_string()).collect(),
+    }
+}

@@ -1,0 +1,102 @@
+//! Scenes as files, those that were given and those that studies make: each is measured as it was read, so that whoever runs a point's command
+//! gets the same.
+
+use std::path::PathBuf;
+
+use bevy_ecs::prelude::*;
+use lumbre_scene::{
+    ActiveCamera, Camera, LoadOptions, add_default_light, default_camera, is_without_light, load_with, save,
+    update_transforms,
+};
+
+use crate::{Conditions, CostError};
+
+/// A scene in a file.
+#[derive(Clone, Debug)]
+pub struct SceneFile {
+    /// What it is called in the report.
+    pub name: String,
+    path: PathBuf,
+    /// The path as commands name it that are run in the report's folder.
+    in_commands: String,
+}
+
+impl SceneFile {
+    /// The files that were given.
+    ///
+    /// # Errors
+    /// [`CostError::File`] where there is none.
+    pub fn given(conditions: &Conditions<'_>) -> Result<Vec<Self>, CostError> {
+        let scene = |path: &PathBuf| {
+            let whole = path.canonicalize();
+            let whole = whole.map_err(|source| CostError::File { path: path.clone(), source })?;
+            let name = path.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+            let in_commands = quoted(&whole.to_string_lossy());
+            Ok(Self { name: name.into_owned(), path: whole, in_commands })
+        };
+        conditions.files.iter().map(scene).collect()
+    }
+
+    /// Writes a scene of a study's own below the report's folder.
+    ///
+    /// # Errors
+    /// [`CostError::File`], [`CostError::Save`].
+    pub fn made(conditions: &Conditions<'_>, name: &str, mut world: World) -> Result<Self, CostError> {
+        let folder = conditions.folder.join("scenes");
+        std::fs::create_dir_all(&folder)
+            .map_err(|source| CostError::File { path: folder.clone(), source })?;
+        let path = folder.join(name).with_extension("glb");
+        save(&mut world, &path)?;
+        Ok(Self { name: name.to_owned(), path, in_commands: format!("scenes/{name}.glb") })
+    }
+
+    /// Reads it. A scene without a camera gets one that sees everything, and one that would be black a light at the camera, as
+    /// `lumbre render` has it.
+    ///
+    /// # Errors
+    /// [`CostError::Load`].
+    pub fn open(&self, aspect: f64) -> Result<World, CostError> {
+        let mut world = World::new();
+        let options = LoadOptions { lenient: true, ..LoadOptions::default() };
+        let report = load_with(&mut world, &self.path, &options)?;
+        update_transforms(&mut world);
+        let active = world.query_filtered::<Entity, (With<Camera>, With<ActiveCamera>)>().iter(&world).next();
+        let first = || report.nodes.iter().copied().find(|node| world.get::<Camera>(*node).is_some());
+        let camera = match active.or_else(first) {
+            Some(camera) => camera,
+            None => {
+                let made = default_camera(&mut world, aspect);
+                world.spawn(made).id()
+            }
+        };
+        world.entity_mut(camera).insert(ActiveCamera);
+        if is_without_light(&mut world) {
+            add_default_light(&mut world, camera);
+        }
+        update_transforms(&mut world);
+        Ok(world)
+    }
+
+    /// Its path in commands that are run in the report's folder.
+    pub fn in_commands(&self) -> &str {
+        &self.in_commands
+    }
+}
+
+/// A word of a shell's command.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+:".contains(c);
+    if word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_with_spaces_are_one_word() {
+        assert_eq!(quoted("/a/room-1.glb"), "/a/room-1.glb");
+        assert_eq!(quoted("a room.glb"), "'a room.glb'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
+}

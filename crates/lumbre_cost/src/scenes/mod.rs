@@ -1,0 +1,9 @@
+//! Scenes that studies make where none are given: each small, each for one question. Not their measuring.
+
+mod ball;
+mod balls_and_lamps;
+mod room;
+
+pub use ball::{Ball, ball, exact_ball};
+pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
+pub use room::{Air, room};

@@ -1,0 +1,172 @@
+//! A furnished room: a window's worth of glowing panel, lamps that are baked and lamps that are not, a shiny ball, a textured floor. Small
+//! enough to bake in a second.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::{DQuat, DVec3, Vec2, Vec3};
+use lumbre_mesh::shapes;
+use lumbre_optics::{BakeMode, Fog, FogMode, Light, Material, SpotCone, Surface};
+use lumbre_scene::{
+    Camera, DynamicObject, EmissiveLight, Image, MaterialTextures, Mesh, Name, Projection, Sampler,
+    SceneSettings, StaticObject, TextureReference, Transform,
+};
+
+/// Inner width, height and depth, metres.
+const SIZE: DVec3 = DVec3::new(5.0, 2.8, 4.0);
+
+/// What is in the room beside surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Air {
+    /// Nothing: what rays know of light is all there is.
+    Clear,
+    /// A little fog, and ambient light in place of what bounces: as a game without lightmaps would have it.
+    Hazy,
+}
+
+/// The room, with effects enough for each to be switched off. Its static lamp and its panel are for the baker; in a frame without lightmaps they
+/// shine all the same.
+pub fn room(air: Air) -> World {
+    let mut world = World::new();
+    let fog = Fog { mode: FogMode::Exponential { density: 0.015 }, color: Vec3::new(0.25, 0.28, 0.32) };
+    let hazy = SceneSettings { ambient: Vec3::splat(0.02), fog: Some(fog), ..SceneSettings::default() };
+    world.insert_resource(if air == Air::Hazy { hazy } else { SceneSettings::default() });
+    walls(&mut world);
+    furniture(&mut world);
+    lights(&mut world);
+    let eye = Transform::from_xyz(0.0, 1.55, 1.9).looking_at(DVec3::new(0.0, 1.0, -1.0), DVec3::Y);
+    let projection = Projection::perspective(1.05);
+    world.spawn((Name::new("camera"), Camera { projection, exposure: 1.0 }, eye));
+    world
+}
+
+fn fixed(
+    world: &mut World,
+    name: &str,
+    mesh: lumbre_mesh::TriangleMesh,
+    material: Material,
+    place: Transform,
+) -> Entity {
+    world.spawn((Name::new(name.to_owned()), Mesh(Arc::new(mesh)), material, place, StaticObject)).id()
+}
+
+fn walls(world: &mut World) {
+    let half = 0.5 * SIZE;
+    let white = || Material::matt(Vec3::splat(0.75));
+    let [width, height, depth] = SIZE.as_vec3().to_array();
+    let side = |rotation: DQuat, x: f64, y: f64, z: f64| Transform::from_xyz(x, y, z).with_rotation(rotation);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let floor = fixed(
+        world,
+        "floor",
+        shapes::plane(width, depth, 8, 8),
+        plastic(Vec3::splat(0.7), 0.35),
+        Transform::IDENTITY,
+    );
+    world
+        .entity_mut(floor)
+        .insert(MaterialTextures { base_color: Some(tiles()), ..MaterialTextures::default() });
+    fixed(
+        world,
+        "ceiling",
+        shapes::plane(width, depth, 4, 4),
+        white(),
+        side(DQuat::from_rotation_x(2.0 * quarter), 0.0, SIZE.y, 0.0),
+    );
+    fixed(
+        world,
+        "back wall",
+        shapes::plane(width, height, 8, 4),
+        white(),
+        side(DQuat::from_rotation_x(quarter), 0.0, half.y, -half.z),
+    );
+    fixed(
+        world,
+        "front wall",
+        shapes::plane(width, height, 4, 4),
+        white(),
+        side(DQuat::from_rotation_x(-quarter), 0.0, half.y, half.z),
+    );
+    let red = Material::matt(Vec3::new(0.65, 0.12, 0.08));
+    fixed(
+        world,
+        "left wall",
+        shapes::plane(height, depth, 4, 8),
+        red,
+        side(DQuat::from_rotation_z(-quarter), -half.x, half.y, 0.0),
+    );
+    let green = Material::matt(Vec3::new(0.15, 0.5, 0.18));
+    fixed(
+        world,
+        "right wall",
+        shapes::plane(height, depth, 4, 8),
+        green,
+        side(DQuat::from_rotation_z(quarter), half.x, half.y, 0.0),
+    );
+}
+
+fn furniture(world: &mut World) {
+    let wood = || Material::matt(Vec3::new(0.45, 0.28, 0.15));
+    let block = shapes::cuboid(Vec3::new(0.9, 0.9, 0.9), 3);
+    let turned = Transform::from_xyz(-1.2, 0.45, -0.8).with_rotation(DQuat::from_rotation_y(0.4));
+    fixed(world, "block", block, wood(), turned);
+    let pillar = shapes::cuboid(Vec3::new(0.35, 2.8, 0.35), 3);
+    fixed(world, "pillar", pillar, Material::matt(Vec3::splat(0.6)), Transform::from_xyz(1.6, 1.4, -1.2));
+    let ball = Mesh(Arc::new(shapes::uv_sphere(0.4, 32, 17)));
+    let place = Transform::from_xyz(0.6, 0.4, -0.4);
+    world.spawn((Name::new("ball"), ball, plastic(Vec3::new(0.2, 0.3, 0.75), 0.25), place, DynamicObject));
+    let mut glass = plastic(Vec3::new(0.5, 0.75, 0.8), 0.2);
+    (glass.alpha, glass.alpha_mode, glass.double_sided) = (0.35, lumbre_optics::AlphaMode::Blend, true);
+    let pane = Mesh(Arc::new(shapes::plane(0.9, 1.2, 1, 1)));
+    let upright = Transform::from_xyz(-0.2, 0.7, 0.1)
+        .with_rotation(DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
+    world.spawn((Name::new("pane"), pane, glass, upright, DynamicObject));
+}
+
+fn lights(world: &mut World) {
+    let panel = Material {
+        front: Surface { emission: Vec3::new(2.4, 2.3, 2.1), ..Surface::default() },
+        ..Material::matt(Vec3::ZERO)
+    };
+    let down = Transform::from_xyz(-0.8, SIZE.y - 0.02, 0.2)
+        .with_rotation(DQuat::from_rotation_x(std::f64::consts::PI));
+    let panel = fixed(world, "panel", shapes::plane(1.2, 0.8, 1, 1), panel, down);
+    world.entity_mut(panel).insert(EmissiveLight);
+    let lamp = Light { bake: BakeMode::Static, radius: 0.05, ..Light::point(Vec3::new(0.5, 0.42, 0.3)) };
+    world.spawn((Name::new("lamp"), lamp, Transform::from_xyz(1.4, 2.2, 0.6)));
+    let moving = |color: Vec3| Light::point(color).with_range(3.0);
+    world.spawn((
+        Name::new("red lamp"),
+        moving(Vec3::new(0.35, 0.05, 0.05)),
+        Transform::from_xyz(-1.9, 0.8, 0.6),
+    ));
+    world.spawn((
+        Name::new("blue lamp"),
+        moving(Vec3::new(0.05, 0.1, 0.35)),
+        Transform::from_xyz(1.2, 0.6, 0.4),
+    ));
+    let torch =
+        Light { shadow: true, ..Light::spot(Vec3::splat(1.6), SpotCone::Smooth { inner: 0.3, outer: 0.5 }) };
+    let aimed = Transform::from_xyz(0.3, 2.5, 1.7).looking_at(DVec3::new(0.4, 0.2, -0.8), DVec3::Y);
+    world.spawn((Name::new("torch"), torch, aimed));
+}
+
+fn plastic(color: Vec3, roughness: f32) -> Material {
+    Material::from_metallic_roughness(color, 0.0, roughness)
+}
+
+/// A chequered floor.
+fn tiles() -> TextureReference {
+    let side = 64;
+    let texel =
+        |x: u32, y: u32| if (x / 8 + y / 8) % 2 == 0 { [225, 220, 210, 255] } else { [150, 145, 140, 255] };
+    let rgba = (0..side).flat_map(|y| (0..side).flat_map(move |x| texel(x, y))).collect();
+    TextureReference {
+        image: Arc::new(Image { name: "tiles".into(), width: side, height: side, rgba }),
+        sampler: Sampler::default(),
+        tex_coord: 0,
+        offset: Vec2::ZERO,
+        rotation: 0.0,
+        scale: Vec2::ONE,
+    }
+}

@@ -1,0 +1,218 @@
+//! Bakes that are asked for less and less error: what they take, what they state, and what is true by a converged bake of the same texels.
+
+use std::time::Duration;
+
+use lumbre_bake::{BakeOptions, Density, Quality};
+use lumbre_render::FrameOptions;
+
+use crate::baked::{bake_options, bake_scene, maps_of, texel_error};
+use crate::findings::{cheapest_by_error, percent, rounded};
+use crate::frames::draw_picture;
+use crate::measured::Measured;
+use crate::scene_file::SceneFile;
+use crate::scenes::{Air, room};
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+
+/// Errors that are asked for, as shares.
+const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01, 0.005];
+const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.01];
+const ASKED: &str = "error asked for, %";
+const STATED: &str = "error stated, % of the mean";
+const FOUND: &str = "error found, % of the mean";
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    let scenes = match conditions.files.is_empty() {
+        true => vec![SceneFile::made(conditions, "room", room(Air::Clear))?],
+        false => SceneFile::given(conditions)?,
+    };
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        let told = [place, place + 1].map(|place| place as f64 / count);
+        of_scene(conditions, scene, told, &mut measured)?;
+    }
+    Ok(measured)
+}
+
+fn study() -> Study {
+    Study {
+        name: "bake".into(),
+        title: "The error that a bake is asked for".into(),
+        question: "Radiosity baked once: what does it take to have less error, what does smoothing save, and is the error that a bake states the true one?".into(),
+        reference: "a converged bake of the same texels with other random numbers and without smoothing; relative to its mean".into(),
+        plots: vec![
+            Plot {
+                title: "Error against time".into(),
+                across: Quantity::Milliseconds,
+                up: Quantity::Error,
+                joined: true,
+                front: true,
+                ..Plot::default()
+            },
+            Plot {
+                title: "What a bake states, and what is found".into(),
+                across: Quantity::Figure(STATED.into()),
+                up: Quantity::Figure(FOUND.into()),
+                ..Plot::default()
+            },
+        ],
+        ..Study::default()
+    }
+}
+
+/// A bake that is measured.
+struct Asked {
+    series: &'static str,
+    label: String,
+    options: BakeOptions,
+    more: &'static str,
+}
+
+fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
+    let errors = conditions.unless_quick(ERRORS, FEW_ERRORS);
+    let label = |error: f64| format!("error {}", percent(error));
+    let mut all: Vec<Asked> = Vec::new();
+    for &error in errors {
+        all.push(Asked { series: "final", label: label(error), options: BakeOptions { error, ..options }, more: "" });
+    }
+    let draft = BakeOptions { quality: Quality::Draft, error: errors[0], ..options };
+    all.push(Asked { series: "draft", label: label(errors[0]), options: draft, more: " --quality draft" });
+    // What bakes without smoothing cannot be asked for on the command line.
+    for &error in errors.iter().take(conditions.unless_quick(3, 1)) {
+        let options = BakeOptions { error, denoise: false, ..options };
+        all.push(Asked { series: "without smoothing", label: label(error), options, more: "" });
+    }
+    all
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let options = bake_options(conditions, scene, conditions.unless_quick(16_000.0, 4_000.0))?;
+    let part = |share: f64| before + share * (after - before);
+    let converged = BakeOptions {
+        quality: Quality::Reference,
+        error: 1e-3,
+        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 5.0))),
+        seed: conditions.seed.wrapping_add(99),
+        denoise: false,
+        ..options
+    };
+    let mut reference = bake_scene(conditions, scene, &converged, [part(0.0), part(0.4)])?;
+    let truth = maps_of(&mut reference.world);
+    let picture = draw_picture(conditions, &mut reference.world, &FrameOptions::default())?;
+    let reference = measured.keep_reference(&format!("{} converged", scene.name), picture);
+
+    let all = asked(conditions, options);
+    let rounds = conditions.unless_quick(3, 1);
+    let mut times: Vec<Vec<f64>> = vec![Vec::new(); all.len()];
+    let mut last = Vec::new();
+    for round in 0..rounds {
+        last.clear();
+        for (place, asked) in all.iter().enumerate() {
+            let share = |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
+            let told = [part(share(place)), part(share(place + 1))];
+            let baked = bake_scene(conditions, scene, &asked.options, told)?;
+            times[place].push(1e3 * baked.report.seconds);
+            last.push(baked);
+        }
+    }
+    let first = measured.study.points.len();
+    for ((asked, mut baked), times) in all.iter().zip(last).zip(&times) {
+        let error = texel_error(&maps_of(&mut baked.world), &truth);
+        let picture = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
+        let report = &baked.report;
+        let mut figures: Vec<(&str, f64)> = vec![(STATED, 100.0 * report.error_of_mean)];
+        figures.extend(error.map(|error| (FOUND, 100.0 * error.relative_rmse)));
+        let counts = [
+            ("rays", report.rays as f64),
+            ("texels", report.texels as f64),
+            ("patches", report.patches as f64),
+            ("form factors", report.form_factors as f64),
+        ];
+        let point = Point {
+            series: named(conditions, scene, asked.series),
+            label: asked.label.clone(),
+            parameters: [(ASKED.to_owned(), 100.0 * asked.options.error)].into(),
+            milliseconds: Spread::of(times),
+            error,
+            counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
+            figures: figures.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+            command: command(scene, asked),
+            picture: None,
+        };
+        measured.add_picture(point, picture, &reference, ErrorOver::Beyond)?;
+    }
+    let points: Vec<&Point> = measured.study.points[first..].iter().collect();
+    let findings = findings(scene, &points);
+    measured.study.findings.extend(findings);
+    if rounds == 1 {
+        measured.study.notes.push("Each bake was timed once: a quick report does not tell times of bakes apart.".into());
+        measured.study.notes.dedup();
+    }
+    Ok(())
+}
+
+/// A series of one scene among several.
+fn named(conditions: &Conditions<'_>, scene: &SceneFile, series: &str) -> String {
+    if conditions.files.len() > 1 { format!("{series}, {}", scene.name) } else { series.to_owned() }
+}
+
+fn command(scene: &SceneFile, asked: &Asked) -> String {
+    if !asked.options.denoise {
+        return "lumbre cost -o again --study bake".into();
+    }
+    let density = match asked.options.density {
+        Density::TexelsPerMeter(density) => format!(" --texels-per-meter {}", rounded(density)),
+        _ => String::new(),
+    };
+    format!(
+        "lumbre bake {} -o baked.glb --error {}{}{density} --probes never --no-resolution-error --no-reuse",
+        scene.in_commands(),
+        asked.options.error,
+        asked.more
+    )
+}
+
+fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
+    let mut findings = Vec::new();
+    let ratios: Vec<f64> = points
+        .iter()
+        .filter_map(|point| Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?))
+        .collect();
+    if let Some(ratio) = Spread::of(&ratios) {
+        let most = ratios.iter().copied().fold(0.0, f64::max);
+        let uncertain = points.iter().filter_map(|point| point.error).map(|error| error.uncertainty).fold(0.0, f64::max);
+        findings.push(format!(
+            "Bakes of {} are off by {} of what they state in the median, by {} at most; the converged bake leaves {} open.",
+            scene.name,
+            rounded(ratio.median),
+            rounded(most),
+            percent(uncertain)
+        ));
+    }
+    findings.extend(cheapest_by_error(points, "of error"));
+    let finals: Vec<&&Point> = points.iter().filter(|point| point.series.starts_with("final")).collect();
+    if let (Some(coarse), Some(fine)) = (finals.first(), finals.last())
+        && let (Some(short), Some(long), Some(much), Some(little)) =
+            (coarse.milliseconds, fine.milliseconds, coarse.error, fine.error)
+        && much.relative_rmse > little.relative_rmse
+    {
+        findings.push(format!(
+            "From {} to {} the error falls from {} to {} for {} times the time.",
+            coarse.label,
+            fine.label,
+            percent(much.relative_rmse),
+            percent(little.relative_rmse),
+            rounded(long.median / short.median)
+        ));
+    }
+    findings
+}

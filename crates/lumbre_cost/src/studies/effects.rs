@@ -1,0 +1,171 @@
+//! Every effect of a scene switched off in turn: what a frame saves without it, and what its picture loses.
+
+use lumbre_render::{FrameOptions, removable_effects};
+use lumbre_scene::Census;
+
+use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded};
+use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::measured::Measured;
+use crate::scene_file::SceneFile;
+use crate::scenes::{Air, room};
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+
+/// Seconds for the frames of each scene of a full report.
+const SECONDS: f64 = 16.0;
+const SAVED: &str = "saved, ms";
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    let scenes = match conditions.files.is_empty() {
+        true => vec![SceneFile::made(conditions, "hazy-room", room(Air::Hazy))?],
+        false => SceneFile::given(conditions)?,
+    };
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        let told = [place, place + 1].map(|place| place as f64 / count);
+        of_scene(conditions, scene, told, &mut measured)?;
+    }
+    Ok(measured)
+}
+
+fn study() -> Study {
+    Study {
+        name: "effects".into(),
+        title: "What each effect costs and gives".into(),
+        question: "Every effect that a scene calls for, left out in turn: how much sooner is the frame there, and how much of the picture is lost?".into(),
+        reference: "the frame with all effects".into(),
+        plots: vec![Plot {
+            title: "Frames without one of their effects".into(),
+            across: Quantity::Milliseconds,
+            up: Quantity::Error,
+            front: true,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    told: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let mut whole = scene.open(conditions.aspect())?;
+    let effects = removable_effects(&Census::of(&mut whole));
+    let mut frames = vec![Frame { world: whole, options: FrameOptions::default() }];
+    for effect in &effects {
+        let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
+        effect.remove(&mut world, &mut options);
+        frames.push(Frame { world, options });
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, told)?;
+    let [whole, without @ ..] = &drawn[..] else { return Ok(()) };
+    let reference = measured.keep_reference(&format!("{} with all", scene.name), whole.picture.clone());
+    let names = std::iter::once("with all effects".to_owned())
+        .chain(effects.iter().map(|effect| format!("without {}", effect.effect)));
+    for (name, frame) in names.zip(&drawn) {
+        let point = point(conditions, scene, name, whole, frame);
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    let points = &measured.study.points[measured.study.points.len() - without.len()..];
+    let effects: Vec<&str> = effects.iter().map(|effect| effect.effect).collect();
+    let findings = findings(&scene.name, &effects, whole, without, points);
+    measured.study.findings.extend(findings);
+    Ok(())
+}
+
+fn point(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    label: String,
+    whole: &DrawnFrame,
+    frame: &DrawnFrame,
+) -> Point {
+    // Of the same rounds: what the machine does besides meets both.
+    let saved = Spread::of(&whole.times.iter().zip(&frame.times).map(|(a, b)| a - b).collect::<Vec<_>>());
+    let figures = saved.map(|saved| {
+        [
+            (SAVED.to_owned(), saved.median),
+            ("saved, lower quartile, ms".to_owned(), saved.lower),
+            ("saved, upper quartile, ms".to_owned(), saved.upper),
+        ]
+    });
+    Point {
+        series: scene.name.clone(),
+        label,
+        milliseconds: frame.spread(),
+        counts: frame.counts(),
+        figures: figures.into_iter().flatten().collect(),
+        command: format!(
+            "lumbre explain {} --measure --size {}",
+            scene.in_commands(),
+            conditions.size_text()
+        ),
+        ..Point::default()
+    }
+}
+
+fn findings(
+    scene: &str,
+    effects: &[&str],
+    whole: &DrawnFrame,
+    without: &[DrawnFrame],
+    points: &[Point],
+) -> Vec<String> {
+    let Some(time) = whole.spread() else { return Vec::new() };
+    // By which factor the frame is slower with it, and what is lost without it.
+    let known: Vec<(&str, Spread, f64)> = effects
+        .iter()
+        .zip(without)
+        .zip(points)
+        .filter_map(|((effect, frame), point)| {
+            Some((*effect, ratio_of(&whole.times, &frame.times)?, point.error?.relative_rmse))
+        })
+        .collect();
+    let mut costly: Vec<_> = known.iter().filter(|(_, ratio, _)| is_above_one(ratio) == Some(true)).collect();
+    costly.sort_by(|a, b| b.1.median.total_cmp(&a.1.median));
+    let mut findings = Vec::new();
+    let share = |ratio: f64| 100.0 * (1.0 - 1.0 / ratio);
+    let told: Vec<String> = costly
+        .iter()
+        .map(|(effect, ratio, error)| {
+            format!(
+                "without {effect} it takes {} % less ({} to {}) and loses {} of the picture",
+                rounded(share(ratio.median)),
+                rounded(share(ratio.lower)),
+                rounded(share(ratio.upper)),
+                percent(*error)
+            )
+        })
+        .collect();
+    if !told.is_empty() {
+        findings.push(format!(
+            "The frame of {scene} takes {}; {}.",
+            crate::findings::milliseconds(&time),
+            told.join("; ")
+        ));
+    }
+    let open: Vec<&str> =
+        known.iter().filter(|(_, ratio, _)| is_above_one(ratio).is_none()).map(|(effect, ..)| *effect).collect();
+    if !open.is_empty() {
+        findings.push(format!("In {scene} the times do not tell whether {} anything.", listed_with(&open, "costs", "cost", "or")));
+    }
+    // What costs the most per loss: the first to go.
+    let worth = |(_, ratio, error): &&&(&str, Spread, f64)| (ratio.median - 1.0) / error.max(1e-9);
+    if let Some((effect, ..)) = costly.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))
+        && costly.len() > 1
+    {
+        findings.push(format!("What saves the most for what is lost in {scene}: to leave out {effect}."));
+    }
+    let unseen: Vec<&str> =
+        known.iter().filter(|(.., error)| *error == 0.0).map(|(effect, ..)| *effect).collect();
+    if !unseen.is_empty() {
+        findings.push(format!("The picture of {scene} is the same to the bit without {}.", listed(&unseen, "or without")));
+    }
+    findings
+}

@@ -1,0 +1,235 @@
+//! Many lamps: all for every fragment, by lists of objects, by clusters; and lamps that end where they bring too little to be seen.
+
+use lumbre_render::{FrameOptions, LightLists};
+
+use crate::findings::{cheapest_by_error, is_above_one, listed, percent, ratio_of, rounded};
+use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::fronts::pareto_front;
+use crate::measured::Measured;
+use crate::scene_file::SceneFile;
+use crate::scenes::{BallsAndLamps, balls_and_lamps};
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
+
+/// How lamps are found, each with what it is called.
+const LISTS: [(LightLists, &str); 3] = [
+    (LightLists::Everything, "every lamp everywhere"),
+    (LightLists::Objects, "lists of objects"),
+    (LightLists::Clusters, "clusters"),
+];
+const MANY: &[u32] = &[1, 4, 16, 64, 256, 1024];
+const FEW: &[u32] = &[1, 16, 128];
+/// Where the lamps of the first part end: the part of white that they bring there.
+const USUAL: f32 = 0.05;
+const THRESHOLDS: &[f32] = &[0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
+const FEW_THRESHOLDS: &[f32] = &[0.1, 0.02, 0.005];
+const LAMPS: &str = "lamps";
+const THRESHOLD: &str = "threshold, % of white";
+const ENDING: &str = "lamps that end, by clusters";
+/// Seconds for the frames of each part of a full report.
+const SECONDS: f64 = 14.0;
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    if !conditions.files.is_empty() {
+        of_files(conditions, &mut measured)?;
+        return Ok(measured);
+    }
+    let times = by_number(conditions, &mut measured)?;
+    measured.study.findings.extend(findings_by_number(&measured.study, &times));
+    by_threshold(conditions, &mut measured)?;
+    Ok(measured)
+}
+
+fn study() -> Study {
+    let lists = || LISTS.map(|(_, name)| name.to_owned()).to_vec();
+    Study {
+        name: "lamps".into(),
+        title: "Many lamps".into(),
+        question: "A frame of balls on a floor under more and more lamps that each reach three metres: what does it cost to ask every lamp everywhere, and what to find those that matter first? And where may a lamp end?".into(),
+        reference: "the same frame with every lamp everywhere; for lamps that end, with lamps that do not".into(),
+        plots: vec![
+            Plot {
+                title: "Time against the number of lamps".into(),
+                across: Quantity::Parameter(LAMPS.into()),
+                up: Quantity::Milliseconds,
+                series: lists(),
+                joined: true,
+                ..Plot::default()
+            },
+            Plot {
+                title: "Where lamps end: error against time".into(),
+                across: Quantity::Milliseconds,
+                up: Quantity::Error,
+                series: vec![ENDING.into()],
+                joined: true,
+                front: true,
+            },
+        ],
+        ..Study::default()
+    }
+}
+
+/// Lamps, with the times of each list.
+type TimesByNumber = Vec<(u32, Vec<DrawnFrame>)>;
+
+fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<TimesByNumber, CostError> {
+    let numbers = conditions.unless_quick(MANY, FEW);
+    let mut frames = Vec::new();
+    for &lamps in numbers {
+        let asked = BallsAndLamps { lamps, threshold: USUAL, seed: conditions.seed };
+        let scene = SceneFile::made(conditions, &format!("lamps-{lamps}"), balls_and_lamps(asked))?;
+        for (light_lists, _) in LISTS {
+            let options = FrameOptions { light_lists, ..FrameOptions::default() };
+            frames.push(Frame { world: scene.open(conditions.aspect())?, options });
+        }
+    }
+    let mut drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.6])?.into_iter();
+    let mut found = Vec::new();
+    for &lamps in numbers {
+        let three: Vec<DrawnFrame> = drawn.by_ref().take(LISTS.len()).collect();
+        for ((_, series), frame) in LISTS.iter().zip(&three) {
+            measured.add_error(point(frame, series, lamps), &frame.picture, &three[0].picture)?;
+        }
+        found.push((lamps, three));
+    }
+    Ok(found)
+}
+
+fn point(frame: &DrawnFrame, series: &str, lamps: u32) -> Point {
+    let lists = frame.statistics.light_lists;
+    let mut counts = frame.counts();
+    counts.insert("lamps in an object's list".into(), f64::from(frame.statistics.lights_per_object));
+    if lists.clustered {
+        let clusters: f64 = lists.clusters.iter().map(|count| f64::from(*count)).product();
+        counts.insert("lamps in a cluster's list".into(), lists.entries as f64 / clusters.max(1.0));
+    }
+    Point {
+        series: series.to_owned(),
+        label: format!("{lamps} {}", if lamps == 1 { "lamp" } else { "lamps" }),
+        parameters: [(LAMPS.to_owned(), f64::from(lamps))].into(),
+        milliseconds: frame.spread(),
+        counts,
+        command: "lumbre cost -o again --study lamps".into(),
+        ..Point::default()
+    }
+}
+
+fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
+    let mut findings = Vec::new();
+    let mut said = Vec::new();
+    for (lamps, _) in times {
+        let here = study.points.iter().filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(*lamps)));
+        let mut here: Vec<&Point> = here.filter(|point| point.milliseconds.is_some()).collect();
+        here.sort_by(|a, b| a.milliseconds.map(|t| t.median).unwrap_or(0.0).total_cmp(&b.milliseconds.map(|t| t.median).unwrap_or(0.0)));
+        let Some(first) = here.first().and_then(|point| point.milliseconds) else { continue };
+        let open = here.iter().filter(|point| point.milliseconds.is_some_and(|time| !first.is_below(&time)));
+        let open: Vec<&str> = open.map(|point| point.series.as_str()).collect();
+        said.push(match &open[..] {
+            [only] => format!("with {lamps} {only}"),
+            several => format!("with {lamps} the times do not decide between {}", listed(several, "and")),
+        });
+    }
+    if !said.is_empty() {
+        findings.push(format!("The cheapest: {}.", said.join("; ")));
+    }
+    if let Some((lamps, three)) = times.last()
+        && let [everything, objects, clusters] = &three[..]
+        && let (Some(all), Some(by_object)) =
+            (ratio_of(&everything.times, &clusters.times), ratio_of(&objects.times, &clusters.times))
+    {
+        let told = |ratio: &crate::Spread, name: &str| match is_above_one(ratio) {
+            Some(_) => format!("{name} takes {} times as long as clusters ({} to {})", rounded(ratio.median), rounded(ratio.lower), rounded(ratio.upper)),
+            None => format!("{name} and clusters are not told apart"),
+        };
+        findings.push(format!(
+            "With {lamps} lamps {}; {}.",
+            told(&all, "asking every lamp everywhere"),
+            told(&by_object, "finding them by lists of objects")
+        ));
+    }
+    let largest = study.points.iter().filter_map(|point| point.error).map(|error| error.relative_rmse).fold(0.0, f64::max);
+    findings.push(format!("The lists leave out nothing that is seen: the pictures differ by {} at most.", percent(largest)));
+    findings
+}
+
+fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
+    let lamps = conditions.unless_quick(256, 64);
+    let thresholds = conditions.unless_quick(THRESHOLDS, FEW_THRESHOLDS);
+    let mut frames = Vec::new();
+    for threshold in [0.0].iter().chain(thresholds) {
+        let asked = BallsAndLamps { lamps, threshold: *threshold, seed: conditions.seed };
+        let name = match *threshold {
+            0.0 => format!("lamps-{lamps}-endless"),
+            threshold => format!("lamps-{lamps}-to-{}", (threshold * 1000.0).round()),
+        };
+        let scene = SceneFile::made(conditions, &name, balls_and_lamps(asked))?;
+        let light_lists = if *threshold == 0.0 { LightLists::Everything } else { LightLists::Clusters };
+        let options = FrameOptions { light_lists, ..FrameOptions::default() };
+        frames.push(Frame { world: scene.open(conditions.aspect())?, options });
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, [0.6, 1.0])?;
+    let [endless, ending @ ..] = &drawn[..] else { return Ok(()) };
+    let reference = measured.keep_reference(&format!("{lamps} endless lamps"), endless.picture.clone());
+    let whole = Point { label: format!("{lamps} lamps without an end"), ..point(endless, "lamps without an end", lamps) };
+    measured.add_picture(whole, endless.picture.clone(), &reference, ErrorOver::Picture)?;
+    let before = measured.study.points.len();
+    for (threshold, frame) in thresholds.iter().zip(ending) {
+        let share = 100.0 * f64::from(*threshold);
+        let mut ended = Point { label: format!("at {} %", rounded(share)), ..point(frame, ENDING, lamps) };
+        ended.parameters.insert(THRESHOLD.into(), share);
+        measured.add_picture(ended, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    let points = &measured.study.points[before..];
+    let told: Vec<String> = pareto_front(points)
+        .iter()
+        .filter_map(|point| {
+            let (ratio, error) = (point.milliseconds?.median / endless.spread()?.median, point.error?);
+            Some(format!("{}: {} of the time, {} of error", point.label, rounded(ratio), percent(error.relative_rmse)))
+        })
+        .collect();
+    measured.study.findings.push(format!("{lamps} lamps that end where they bring little of white, against lamps without an end: {}.", told.join("; ")));
+    Ok(())
+}
+
+/// The lamps of given files by every list.
+fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
+    measured.study.question = "The lamps of each scene: asked everywhere, found by lists of objects, found by clusters.".into();
+    measured.study.plots.truncate(1);
+    measured.study.plots[0] = Plot {
+        title: "Time against the number of lamps".into(),
+        across: Quantity::Parameter(LAMPS.into()),
+        up: Quantity::Milliseconds,
+        ..Plot::default()
+    };
+    let scenes = SceneFile::given(conditions)?;
+    let mut frames = Vec::new();
+    for scene in &scenes {
+        for (light_lists, _) in LISTS {
+            let options = FrameOptions { light_lists, ..FrameOptions::default() };
+            frames.push(Frame { world: scene.open(conditions.aspect())?, options });
+        }
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 1.0])?;
+    for (scene, three) in scenes.iter().zip(drawn.chunks(LISTS.len())) {
+        let before = measured.study.points.len();
+        for ((_, series), frame) in LISTS.iter().zip(three) {
+            let lamps = frame.statistics.lights;
+            let own = Point { label: scene.name.clone(), ..point(frame, series, lamps) };
+            measured.add_error(own, &frame.picture, &three[0].picture)?;
+        }
+        let points: Vec<&Point> = measured.study.points[before..].iter().collect();
+        let largest = points.iter().filter_map(|point| point.error).map(|error| error.relative_rmse).fold(0.0, f64::max);
+        // Their errors are roundings: only the times are weighed.
+        let even: Vec<Point> = points
+            .iter()
+            .map(|point| Point { error: point.error.map(|error| crate::ErrorOf { relative_rmse: largest, ..error }), ..(*point).clone() })
+            .collect();
+        let even: Vec<&Point> = even.iter().collect();
+        measured.study.findings.extend(cheapest_by_error(&even, &format!("of error in {}", scene.name)));
+    }
+    Ok(())
+}

@@ -1,0 +1,205 @@
+//! From the frame to the truth: the same scene as a frame with one thing more at a time, by the ray tree, and by paths; against a converged picture
+//! of all light.
+
+use std::time::Instant;
+
+use lumbre_render::FrameOptions;
+use lumbre_trace::{Integrator, TraceOptions};
+
+use crate::baked::{bake_options, bake_scene};
+use crate::findings::{cheapest_by_error, milliseconds, percent, rounded};
+use crate::frames::{Frame, draw_frames};
+use crate::measured::Measured;
+use crate::rounds::milliseconds_since;
+use crate::scene_file::SceneFile;
+use crate::scenes::{Air, room};
+use crate::traced::{ray_tree, traced};
+use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
+
+/// Paths a pixel.
+const PATHS: &[u32] = &[4, 16, 64];
+const FEW_PATHS: &[u32] = &[4, 16];
+/// Pictures are this part as wide and high as elsewhere: paths take their time.
+const SMALLER: u32 = 3;
+const SECONDS: f64 = 4.0;
+const BAKE: &str = "baked before, ms";
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    let scenes = match conditions.files.is_empty() {
+        true => vec![SceneFile::made(conditions, "room", room(Air::Clear))?],
+        false => SceneFile::given(conditions)?,
+    };
+    let (width, height) = conditions.size;
+    let size = [width, height].map(|side| (side / SMALLER).max(8));
+    let smaller = Conditions { size: (size[0], size[1]), ..*conditions };
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        let told = [place, place + 1].map(|place| place as f64 / count);
+        of_scene(&smaller, scene, told, &mut measured)?;
+    }
+    let note = "Paths of a picture are the first of those of the reference: with a quarter of its paths an error looks a seventh smaller than it is.";
+    measured.study.notes.push(note.into());
+    Ok(measured)
+}
+
+fn study() -> Study {
+    Study {
+        name: "transport".into(),
+        title: "From the frame to the truth".into(),
+        question: "Where does the error of a frame come from: from shadows, from samples, from the light between surfaces? And what does the same error cost by rays?".into(),
+        reference: "all light by paths, with many samples of every pixel".into(),
+        plots: vec![Plot {
+            title: "Error against time".into(),
+            across: Quantity::Milliseconds,
+            up: Quantity::Error,
+            joined: true,
+            front: true,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let part = |share: f64| before + share * (after - before);
+    let series = |name: &str| match conditions.files.len() {
+        0 | 1 => name.to_owned(),
+        _ => format!("{name}, {}", scene.name),
+    };
+    let size = conditions.size_text();
+    let paths = |samples| TraceOptions {
+        size: conditions.size,
+        integrator: Integrator::Path,
+        samples: Some(samples),
+        ..TraceOptions::default()
+    };
+    let most = conditions.unless_quick(512, 96);
+    let (picture, report) = traced(conditions, scene, &paths(most))?;
+    let open = report.standard_error.unwrap_or(0.0);
+    let reference = measured.keep_reference(&format!("{} by {most} paths", scene.name), picture);
+    let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
+    conditions.tell(part(0.5))?;
+
+    let bake = bake_options(conditions, scene, conditions.unless_quick(16_000.0, 4_000.0))?;
+    let baked = bake_scene(conditions, scene, &lumbre_bake::BakeOptions { error: 0.02, ..bake }, [part(0.5), part(0.6)])?;
+    let light = |shadows, multisample| FrameOptions { shadows, multisample, ..FrameOptions::default() };
+    let steps = [
+        ("lamps", light(false, false), " --no-shadows"),
+        ("and shadows", light(true, false), ""),
+        ("and four samples", light(true, true), " --msaa"),
+    ];
+    let mut frames = Vec::new();
+    for (_, options, _) in &steps {
+        frames.push(Frame { world: scene.open(conditions.aspect())?, options: options.clone() });
+    }
+    let bake_time = 1e3 * baked.report.seconds;
+    frames.push(Frame { world: baked.world, options: light(true, true) });
+    let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(0.7)])?;
+    let labels = steps.iter().map(|(label, ..)| *label).chain(["and lightmaps"]);
+    let more = steps.iter().map(|(.., more)| *more).chain([" --msaa"]);
+    let first = measured.study.points.len();
+    for ((label, more), frame) in labels.zip(more).zip(&drawn) {
+        let with_lightmaps = label == "and lightmaps";
+        let file = if with_lightmaps { "baked.glb" } else { scene.in_commands() };
+        let draw = format!("lumbre render {file} -o frame.exr --size {size}{more} --frames 20 --timings times.json");
+        let point = Point {
+            series: series("frame"),
+            label: label.to_owned(),
+            milliseconds: frame.spread(),
+            error: uncertain,
+            counts: frame.counts(),
+            figures: if with_lightmaps { [(BAKE.to_owned(), bake_time)].into() } else { Default::default() },
+            command: match with_lightmaps {
+                true => format!("lumbre bake {} -o baked.glb --error 0.02 --probes never && {draw}", scene.in_commands()),
+                false => draw,
+            },
+            ..Point::default()
+        };
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+
+    let tree = |samples| TraceOptions { samples: Some(samples), ..ray_tree(conditions) };
+    let trees = [1, 4].map(|samples| ("ray tree", tree(samples), samples, format!("--samples {samples}")));
+    let numbers = conditions.unless_quick(PATHS, FEW_PATHS).iter();
+    let all = numbers.map(|n| ("paths", paths(*n), *n, format!("--integrator path --samples {n}")));
+    let all: Vec<_> = trees.into_iter().chain(all).collect();
+    for (place, (name, options, samples, asked)) in all.iter().enumerate() {
+        conditions.tell(part(0.7 + 0.3 * place as f64 / all.len() as f64))?;
+        let mut times = Vec::new();
+        let mut found = None;
+        for _ in 0..conditions.unless_quick(3, 2) {
+            let begun = Instant::now();
+            let one = traced(conditions, scene, options)?;
+            times.push(milliseconds_since(begun));
+            found = Some(one);
+        }
+        let Some((picture, report)) = found else { continue };
+        let point = Point {
+            series: series(name),
+            label: format!("{samples} a pixel"),
+            milliseconds: Spread::of(&times),
+            error: uncertain,
+            counts: [("rays".to_owned(), report.rays as f64)].into(),
+            command: format!("lumbre trace {} -o picture.exr --size {size} {asked}", scene.in_commands()),
+            ..Point::default()
+        };
+        measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
+    }
+    let points: Vec<&Point> = measured.study.points[first..].iter().collect();
+    let findings = findings(&points, open);
+    measured.study.findings.extend(findings);
+    Ok(())
+}
+
+fn findings(points: &[&Point], open: f64) -> Vec<String> {
+    let mut findings = Vec::new();
+    let frames: Vec<&&Point> = points.iter().filter(|point| point.series.starts_with("frame")).collect();
+    let mut said = Vec::new();
+    for pair in frames.windows(2) {
+        let (Some(was), Some(is)) = (pair[0].error, pair[1].error) else { continue };
+        let (Some(short), Some(long)) = (pair[0].milliseconds, pair[1].milliseconds) else { continue };
+        let cost = match (short.is_below(&long), long.is_below(&short)) {
+            (false, false) => "for a time that is not told apart".to_owned(),
+            _ => format!("for {} instead of {}", milliseconds(&long), milliseconds(&short)),
+        };
+        let change = match (was.relative_rmse - is.relative_rmse).abs() > open {
+            true => format!("takes the error from {} to {}", percent(was.relative_rmse), percent(is.relative_rmse)),
+            false => "changes the error by less than the reference leaves open".to_owned(),
+        };
+        said.push(format!("\"{}\" {change} {cost}", pair[1].label));
+    }
+    if !said.is_empty() {
+        findings.push(format!("In the frame, {}.", said.join("; ")));
+    }
+    let best = frames.iter().filter_map(|point| Some((point, point.error?.relative_rmse, point.milliseconds?)));
+    if let Some((frame, error, time)) = best.min_by(|a, b| a.1.total_cmp(&b.1)) {
+        let paths = points.iter().filter(|point| point.series.starts_with("paths"));
+        let reached = paths
+            .filter_map(|point| Some((point, point.error?.relative_rmse, point.milliseconds?)))
+            .filter(|(_, found, _)| *found <= error)
+            .min_by(|a, b| a.2.median.total_cmp(&b.2.median));
+        let paths = match reached {
+            Some((point, _, slow)) => format!(
+                "paths get there with {}, in {}: {} times as long",
+                point.label,
+                milliseconds(&slow),
+                rounded(slow.median / time.median)
+            ),
+            None => "no number of paths that was tried gets there".to_owned(),
+        };
+        let bake = frame.figures.get(BAKE).map_or(String::new(), |ms| format!(", after a bake of {} s", rounded(ms / 1e3)));
+        findings.push(format!("The best frame (\"{}\") is off by {} in {}{bake}; {paths}. The reference leaves {} open.", frame.label, percent(error), milliseconds(&time), percent(open)));
+    }
+    findings.extend(cheapest_by_error(points, "of error"));
+    findings
+}
