@@ -34,7 +34,7 @@ fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time();
-    tracing_subscriber::registry().with(messages_shown()).with(messages).init();
+    tracing_subscriber::registry().with(messages_shown(&arguments)).with(messages).init();
     let outcome = match arguments.command {
         None => play::run(&arguments.play),
         Some(Command::Play(options)) => play::run(&options),
@@ -56,13 +56,15 @@ fn main() -> ExitCode {
     }
 }
 
-/// What `LUMBRE_LOG` says (`debug`, or `lumbre_bake=debug,wgpu_core=info`), or warnings and the progress of a bake.
-fn messages_shown() -> Targets {
+/// What `LUMBRE_LOG` says (`debug`, or `lumbre_bake=debug,wgpu_core=info`), or warnings and the progress of a bake, unless it is one among many.
+fn messages_shown(arguments: &Arguments) -> Targets {
+    let of_bakes =
+        if matches!(arguments.command, Some(Command::Cost(_))) { Level::WARN } else { Level::INFO };
     let stated = std::env::var("LUMBRE_LOG").ok().and_then(|stated| stated.parse().ok());
     stated.unwrap_or_else(|| {
         Targets::new()
             .with_default(Level::WARN)
-            .with_target("lumbre_bake", Level::INFO)
+            .with_target("lumbre_bake", of_bakes)
             .with_targets(["wgpu_hal", "wgpu_core"].map(|noisy| (noisy, Level::ERROR)))
     })
 }

@@ -1,11 +1,12 @@
 //! Sentences about what was found, from the points alone: which series is the cheapest for which error, where that changes, and that it is not known
 //! where the times do not decide.
 
-use crate::fronts::{Stretch, stretches};
+use crate::fronts::stretches;
 use crate::{Point, Spread};
 
-/// Who is the cheapest for which error that may be left, as sentences. `what` names the error, as in "error of the picture"; nothing for less than
-/// two series that have times and errors.
+/// Who is the cheapest for which error that may be left, as sentences: from where on one series alone gets to small errors in the least time, where another
+/// one is at least level for large errors, and what lies between. `what` names the error, as in "error of the picture"; nothing for less than two series
+/// that have times and errors.
 pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
     let mut series: Vec<&str> = Vec::new();
     for point in points.iter().filter(|point| point.error.is_some() && point.milliseconds.is_some()) {
@@ -13,41 +14,100 @@ pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
             series.push(&point.series);
         }
     }
+    let found = stretches(points);
+    let (finest, coarsest) = (found.first()?, found.last()?);
     if series.len() < 2 {
         return None;
     }
-    let found = stretches(points);
-    let won: Vec<&str> = found
-        .iter()
-        .filter(|stretch| stretch.cheapest.len() == 1)
-        .map(|stretch| stretch.cheapest[0].series.as_str())
-        .collect();
-    let mut sentences: Vec<String> = found.iter().map(|stretch| sentence(stretch, what)).collect();
+    let mut sentences = Vec::new();
+    // From the smallest error on: as long as one and the same series wins, or none does.
+    let fine = found.iter().take_while(|stretch| same(&stretch.cheapest, &finest.cheapest)).count();
+    let end = found[fine - 1].to;
+    let range = match end.is_infinite() {
+        true => format!("At every {what} down to {}", percent(finest.from)),
+        false => format!("Below {} {what}, down to {},", percent(end), percent(finest.from)),
+    };
+    sentences.push(match &finest.cheapest[..] {
+        [only] => format!(
+            "{range} {} is the cheapest ({}).",
+            only.series,
+            cost_of(smallest(points, &only.series).unwrap_or(only))
+        ),
+        several => format!("{range} the times do not decide between {}.", names_of(several)),
+    });
+    // From the largest error downwards: as long as one series is among the cheapest.
+    if fine < found.len() {
+        let rest = &found[fine..];
+        let lasting = |point: &&&Point| {
+            rest.iter()
+                .rev()
+                .take_while(|stretch| stretch.cheapest.iter().any(|c| c.series == point.series))
+                .count()
+        };
+        if let Some(winner) = coarsest.cheapest.iter().max_by_key(lasting) {
+            let coarse = lasting(&winner);
+            let stretches = &rest[rest.len() - coarse..];
+            let mut level: Vec<&str> = Vec::new();
+            for point in stretches.iter().flat_map(|stretch| &stretch.cheapest) {
+                if point.series != winner.series && !level.contains(&point.series.as_str()) {
+                    level.push(&point.series);
+                }
+            }
+            let from = stretches[0].from;
+            let level = match level.is_empty() {
+                true => String::new(),
+                false => format!(", in parts of that range level with {}", listed(&level, "and")),
+            };
+            sentences.push(format!("Above {} {} is the cheapest{level}.", percent(from), winner.series));
+            let between = &rest[..rest.len() - coarse];
+            if !between.is_empty() {
+                let all: Vec<&Point> =
+                    between.iter().flat_map(|stretch| stretch.cheapest.iter().copied()).collect();
+                sentences.push(format!(
+                    "Between {} and {} that changes from choice to choice ({}).",
+                    percent(end),
+                    percent(from),
+                    names_of(&all)
+                ));
+            }
+        }
+    }
     let contends = |name: &str| found.iter().any(|s| s.cheapest.iter().any(|point| point.series == name));
     let never: Vec<&str> = series.iter().copied().filter(|name| !contends(name)).collect();
     if !never.is_empty() {
-        sentences.push(format!("{} never the cheapest.", listed_with(&never, "is", "are", "and")));
-    }
-    if won.is_empty() {
-        sentences.push("The times do not decide anywhere.".to_owned());
+        sentences
+            .push(format!("{} never the cheapest.", capitalized(&listed_with(&never, "is", "are", "and"))));
     }
     Some(sentences.join(" "))
 }
 
-fn sentence(stretch: &Stretch<'_>, what: &str) -> String {
-    let range = match stretch.to {
-        to if to.is_infinite() => format!("From {} on", percent(stretch.from)),
-        to => format!("From {} up to {}", percent(stretch.from), percent(to)),
-    };
-    let told = |point: &&Point| format!("{} ({})", point.series, cost_of(point));
-    match &stretch.cheapest[..] {
-        [only] => format!("{range} {what} the cheapest is {}.", told(only)),
-        several => {
-            let names: Vec<String> = several.iter().map(told).collect();
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            format!("{range} {what} the times do not decide between {}.", listed(&names, "and"))
+/// Whether two lists are of the same series.
+fn same(a: &[&Point], b: &[&Point]) -> bool {
+    a.len() == b.len() && a.iter().all(|point| b.iter().any(|other| other.series == point.series))
+}
+
+/// The names of their series, each once.
+fn names_of(points: &[&Point]) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for point in points {
+        if !names.contains(&point.series.as_str()) {
+            names.push(&point.series);
         }
     }
+    listed(&names, "and")
+}
+
+/// The point of a series with the smallest error.
+fn smallest<'a>(points: &[&'a Point], series: &str) -> Option<&'a Point> {
+    let own = points.iter().filter(|point| point.series == series && point.milliseconds.is_some());
+    let known = own.filter_map(|point| Some((*point, point.error?.relative_rmse)));
+    known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(point, _)| point)
+}
+
+/// With its first letter in upper case.
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// A point's time and error, with its label.
@@ -83,6 +143,11 @@ pub fn rounded(value: f64) -> String {
         _ if size >= 1.0 => format!("{value:.2}"),
         _ => format!("{value:.3}"),
     }
+}
+
+/// A count: whole where it is one.
+pub fn counted(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e9 { format!("{value}") } else { rounded(value) }
 }
 
 /// A share as per cent.

@@ -1,5 +1,6 @@
 //! Frames that are drawn again and again, side by side: their times, their counts, and the picture that each makes. Not the scenes.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -16,6 +17,21 @@ pub struct Frame {
     pub world: World,
     /// How it is drawn.
     pub options: FrameOptions,
+    /// Frames of one name share a renderer, and with it what it has compiled, which takes longer than many a frame. Each is then drawn twice in a row, and the
+    /// second one timed: in the first the renderer reads another World. Without a name a frame has a renderer of its own.
+    pub renderer: Option<&'static str>,
+}
+
+impl Frame {
+    /// A frame with a renderer of its own.
+    pub fn new(world: World, options: FrameOptions) -> Self {
+        Self { world, options, renderer: None }
+    }
+
+    /// The same with a renderer in common with all that name it so.
+    pub fn sharing(self, renderer: &'static str) -> Self {
+        Self { renderer: Some(renderer), ..self }
+    }
 }
 
 /// What was measured of a frame.
@@ -72,16 +88,31 @@ pub fn draw_frames(
     }
     let target = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
     let target = target.target();
+    let mut shared: Vec<&'static str> = frames.iter().filter_map(|frame| frame.renderer).collect();
+    shared.sort_unstable();
+    shared.dedup();
+    let shared: Vec<_> = shared.into_iter().map(|name| (name, RefCell::new(Renderer::new(gpu)))).collect();
     let mut work: Vec<Work<'_>> = Vec::new();
-    for frame in &mut frames {
-        let mut renderer = Renderer::new(gpu);
+    for Frame { world, options, renderer } in &mut frames {
+        let named = shared.iter().find(|(name, _)| Some(*name) == *renderer);
         let target = &target;
-        work.push(Box::new(move || {
+        let mut draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
             let begun = Instant::now();
-            renderer.render(&mut frame.world, target, &frame.options)?;
+            renderer.render(world, target, options)?;
             renderer.wait()?;
             Ok(milliseconds_since(begun))
-        }));
+        };
+        match named {
+            Some((_, renderer)) => work.push(Box::new(move || {
+                let mut renderer = renderer.borrow_mut();
+                draw(&mut renderer)?;
+                draw(&mut renderer)
+            })),
+            None => {
+                let mut renderer = Renderer::new(gpu);
+                work.push(Box::new(move || draw(&mut renderer)));
+            }
+        }
     }
     let go_on = |share: f64| conditions.tell(before + (0.3 + 0.7 * share) * (after - before));
     let times = in_rounds(&mut work, conditions.rounds(seconds), &go_on)?;

@@ -57,7 +57,9 @@ pub use folder::{PAGE, REPORT, TABLE, read_picture, read_report};
 pub use fronts::{Stretch, pareto_front, stretches};
 pub use page::{Images, page};
 pub use picture::{Compared, Picture, compared};
-pub use report::{CostReport, ErrorOf, ErrorOver, Machine, Plot, Point, PointPicture, Quantity, Settings, Study};
+pub use report::{
+    CostReport, ErrorOf, ErrorOver, Machine, Plot, Point, PointPicture, Quantity, Settings, Study,
+};
 pub use run::{CostOptions, CostProgress, measure};
 pub use spread::Spread;
 pub use studies::{STUDIES, StudyKind, studies_named};

@@ -53,7 +53,12 @@ impl Measured {
     ///
     /// # Errors
     /// [`CostError::Sizes`], [`CostError::NotFinite`].
-    pub fn add_error(&mut self, point: Point, picture: &Picture, reference: &Picture) -> Result<(), CostError> {
+    pub fn add_error(
+        &mut self,
+        point: Point,
+        picture: &Picture,
+        reference: &Picture,
+    ) -> Result<(), CostError> {
         let error = checked(&self.study, &point, compared(reference, picture, ErrorOver::Picture))?.error;
         self.study.points.push(Point { error: Some(error), ..point });
         Ok(())

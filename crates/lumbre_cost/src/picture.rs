@@ -51,8 +51,7 @@ pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Opti
         return None;
     }
     let pairs = reference.radiance.iter().zip(&picture.radiance);
-    let counts =
-        |(a, b): &(&DVec3, &DVec3)| {
+    let counts = |(a, b): &(&DVec3, &DVec3)| {
         over != ErrorOver::WhereBothAreLit || (**a != DVec3::ZERO && **b != DVec3::ZERO)
     };
     let (wanted, found): (Vec<DVec3>, Vec<DVec3>) = pairs.filter(counts).map(|(a, b)| (*a, *b)).unzip();
@@ -85,7 +84,10 @@ mod tests {
         assert!((lit.largest - 0.1).abs() < 1e-12);
         let all = compared(&reference, &picture, ErrorOver::Picture).expect("the sizes agree").error;
         assert!((all.relative_rmse - (0.26f64 / 0.75).sqrt()).abs() < 1e-12, "{all:?}");
-        assert_eq!(compared(&reference, &reference, ErrorOver::Picture).map(|same| same.error.relative_rmse), Some(0.0));
+        assert_eq!(
+            compared(&reference, &reference, ErrorOver::Picture).map(|same| same.error.relative_rmse),
+            Some(0.0)
+        );
         assert_eq!(compared(&reference, &grey(&[1.0, 1.0]), ErrorOver::Picture), None);
     }
 }

@@ -19,7 +19,7 @@ pub enum PlotSize {
 impl PlotSize {
     fn pixels(self) -> (u32, u32) {
         match self {
-            Self::Wide => (680, 400),
+            Self::Wide => (510, 380),
             Self::Narrow => (350, 320),
         }
     }
@@ -48,9 +48,12 @@ pub fn draw_plot(study: &Study, plot: &Plot, size: PlotSize) -> Result<String, C
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, size.pixels()).into_drawing_area();
-        draw(&root, study, plot, size).and_then(|()| root.present().map_err(|error| error.to_string())).map_err(
-            |reason| CostError::Plot { title: format!("{}: {}", study.title, plot.title), reason },
-        )?;
+        draw(&root, study, plot, size)
+            .and_then(|()| root.present().map_err(|error| error.to_string()))
+            .map_err(|reason| CostError::Plot {
+                title: format!("{}: {}", study.title, plot.title),
+                reason,
+            })?;
     }
     Ok(with_colors_of_the_page(&svg))
 }
@@ -83,8 +86,9 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
     if points.is_empty() {
         return Err("no point has both numbers".to_owned());
     }
-    let (most_across, most_up) = if size == PlotSize::Wide { (9, 7) } else { (5, 6) };
-    let across = Axis::of(points.iter().flat_map(|(_, point, at)| reach(&plot.across, point, at.0)), most_across);
+    let (most_across, most_up) = if size == PlotSize::Wide { (7, 7) } else { (5, 6) };
+    let across =
+        Axis::of(points.iter().flat_map(|(_, point, at)| reach(&plot.across, point, at.0)), most_across);
     let up = Axis::of(points.iter().map(|(.., at)| at.1), most_up);
     let text = |color: &RGBColor| ("sans-serif", FONT).into_font().color(color);
     let mut chart = ChartBuilder::on(root)
@@ -167,7 +171,11 @@ fn reach(across: &Quantity, point: &Point, at: f64) -> Vec<f64> {
 }
 
 /// A mark: shapes differ as well as colours, for whoever sees no colours and for print.
-fn mark(root: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+fn mark(
+    root: &Area<'_>,
+    series: usize,
+    (x, y): (i32, i32),
+) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     let style = series_color(series).filled();
     let ring = series_color(series).stroke_width(2);
     match series % 4 {
@@ -185,7 +193,12 @@ struct Label {
 }
 
 impl Label {
-    fn beside(text: &str, (x, y): (i32, i32), (width, height): (u32, u32), taken: &[[i32; 4]]) -> Option<Self> {
+    fn beside(
+        text: &str,
+        (x, y): (i32, i32),
+        (width, height): (u32, u32),
+        taken: &[[i32; 4]],
+    ) -> Option<Self> {
         // Of a proportional font nothing is known here: a wide guess.
         let long = (text.chars().count() as f64 * 0.56 * f64::from(FONT)).ceil() as i32;
         let high = FONT as i32;
@@ -198,14 +211,23 @@ impl Label {
             (x - long / 2, y + high),
         ];
         let fits = |extent: &[i32; 4]| {
-            let inside = extent[0] > 66 && extent[1] > 4 && extent[2] < width as i32 - 4 && extent[3] < height as i32 - 48;
+            let inside = extent[0] > 66
+                && extent[1] > 4
+                && extent[2] < width as i32 - 4
+                && extent[3] < height as i32 - 48;
             let free = |other: &[i32; 4]| {
-                extent[0] >= other[2] || extent[2] <= other[0] || extent[1] >= other[3] || extent[3] <= other[1]
+                extent[0] >= other[2]
+                    || extent[2] <= other[0]
+                    || extent[1] >= other[3]
+                    || extent[3] <= other[1]
             };
             inside && taken.iter().all(free)
         };
         let extent = |start: (i32, i32)| [start.0, start.1 - high / 2, start.0 + long, start.1 + high / 2];
-        starts.into_iter().map(|start| Self { start, extent: extent(start) }).find(|label| fits(&label.extent))
+        starts
+            .into_iter()
+            .map(|start| Self { start, extent: extent(start) })
+            .find(|label| fits(&label.extent))
     }
 }
 
@@ -302,10 +324,21 @@ mod tests {
     #[test]
     fn names_do_not_lie_over_each_other() {
         let first = Label::beside("depth 3", (200, 100), (680, 400), &[]).expect("there is room");
-        let second = Label::beside("depth 4", (203, 102), (680, 400), &[first.extent]).expect("there is room");
-        let apart = second.extent[1] >= first.extent[3] || second.extent[3] <= first.extent[1]
-            || second.extent[0] >= first.extent[2] || second.extent[2] <= first.extent[0];
+        let second =
+            Label::beside("depth 4", (203, 102), (680, 400), &[first.extent]).expect("there is room");
+        let apart = second.extent[1] >= first.extent[3]
+            || second.extent[3] <= first.extent[1]
+            || second.extent[0] >= first.extent[2]
+            || second.extent[2] <= first.extent[0];
         assert!(apart, "{:?} {:?}", first.extent, second.extent);
-        assert!(Label::beside("a name that is far too long to stand anywhere in so small a drawing", (175, 100), (350, 320), &[]).is_none());
+        assert!(
+            Label::beside(
+                "a name that is far too long to stand anywhere in so small a drawing",
+                (175, 100),
+                (350, 320),
+                &[]
+            )
+            .is_none()
+        );
     }
 }

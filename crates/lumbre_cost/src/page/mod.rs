@@ -80,7 +80,7 @@ fn section(study: &Study, images: &Images<'_>) -> Result<Markup, CostError> {
             @if !study.findings.is_empty() {
                 ul class="findings" { @for finding in &study.findings { li { (finding) } } }
             }
-            @for plot in &plots { (plot) }
+            div class="plots" { @for plot in &plots { (plot) } }
             (gallery::viewer(study, images))
             (tables::points(study))
             @if !study.notes.is_empty() {

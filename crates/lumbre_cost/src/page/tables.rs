@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use maud::{Markup, html};
 
-use crate::findings::{milliseconds, rounded};
+use crate::findings::{counted, milliseconds, rounded};
 use crate::{CostReport, Point, Study};
 
 /// The machine and the settings.
@@ -69,9 +69,9 @@ pub fn points(study: &Study) -> Markup {
                             td { (error(point)) }
                             @if has_flip { td { (number(point.error.and_then(|error| error.flip))) } }
                             td { (number(point.error.map(|error| error.largest))) }
-                            @for name in &parameters { td { (number(point.parameters.get(*name).copied())) } }
+                            @for name in &parameters { td { (point.parameters.get(*name).copied().map_or(String::new(), counted)) } }
                             @for name in &figures { td { (number(point.figures.get(*name).copied())) } }
-                            @for name in &counts { td { (number(point.counts.get(*name).copied())) } }
+                            @for name in &counts { td { (point.counts.get(*name).copied().map_or(String::new(), counted)) } }
                         }
                     }
                 }

@@ -3,7 +3,9 @@
 mod ball;
 mod balls_and_lamps;
 mod room;
+mod sheet;
 
 pub use ball::{Ball, ball, exact_ball};
 pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
 pub use room::{Air, room};
+pub use sheet::{Sheet, sheet};

@@ -11,7 +11,7 @@ use crate::frames::draw_picture;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
 use crate::scenes::{Air, room};
-use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Errors that are asked for, as shares.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01, 0.005];
@@ -43,7 +43,7 @@ fn study() -> Study {
         name: "bake".into(),
         title: "The error that a bake is asked for".into(),
         question: "Radiosity baked once: what does it take to have less error, what does smoothing save, and is the error that a bake states the true one?".into(),
-        reference: "a converged bake of the same texels with other random numbers and without smoothing; relative to its mean".into(),
+        reference: "a converged bake of the same texels with other random numbers and without smoothing, whose own noise is taken off; relative to its mean".into(),
         plots: vec![
             Plot {
                 title: "Error against time".into(),
@@ -77,7 +77,12 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
     let label = |error: f64| format!("error {}", percent(error));
     let mut all: Vec<Asked> = Vec::new();
     for &error in errors {
-        all.push(Asked { series: "final", label: label(error), options: BakeOptions { error, ..options }, more: "" });
+        all.push(Asked {
+            series: "final",
+            label: label(error),
+            options: BakeOptions { error, ..options },
+            more: "",
+        });
     }
     let draft = BakeOptions { quality: Quality::Draft, error: errors[0], ..options };
     all.push(Asked { series: "draft", label: label(errors[0]), options: draft, more: " --quality draft" });
@@ -95,12 +100,12 @@ fn of_scene(
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
-    let options = bake_options(conditions, scene, conditions.unless_quick(16_000.0, 4_000.0))?;
+    let options = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 2_000.0))?;
     let part = |share: f64| before + share * (after - before);
     let converged = BakeOptions {
         quality: Quality::Reference,
         error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 5.0))),
+        time: Some(Duration::from_secs_f64(conditions.unless_quick(30.0, 6.0))),
         seed: conditions.seed.wrapping_add(99),
         denoise: false,
         ..options
@@ -117,7 +122,8 @@ fn of_scene(
     for round in 0..rounds {
         last.clear();
         for (place, asked) in all.iter().enumerate() {
-            let share = |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
+            let share =
+                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
             let told = [part(share(place)), part(share(place + 1))];
             let baked = bake_scene(conditions, scene, &asked.options, told)?;
             times[place].push(1e3 * baked.report.seconds);
@@ -154,7 +160,10 @@ fn of_scene(
     let findings = findings(scene, &points);
     measured.study.findings.extend(findings);
     if rounds == 1 {
-        measured.study.notes.push("Each bake was timed once: a quick report does not tell times of bakes apart.".into());
+        measured
+            .study
+            .notes
+            .push("Each bake was timed once: a quick report does not tell times of bakes apart.".into());
         measured.study.notes.dedup();
     }
     Ok(())
@@ -183,19 +192,20 @@ fn command(scene: &SceneFile, asked: &Asked) -> String {
 
 fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
     let mut findings = Vec::new();
+    let told = |error: &ErrorOf| format!("{} ± {}", percent(error.relative_rmse), percent(error.uncertainty));
     let ratios: Vec<f64> = points
         .iter()
-        .filter_map(|point| Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?))
+        .filter_map(|point| {
+            Some(point.figures.get(FOUND)? / point.figures.get(STATED).filter(|stated| **stated > 0.0)?)
+        })
         .collect();
     if let Some(ratio) = Spread::of(&ratios) {
         let most = ratios.iter().copied().fold(0.0, f64::max);
-        let uncertain = points.iter().filter_map(|point| point.error).map(|error| error.uncertainty).fold(0.0, f64::max);
         findings.push(format!(
-            "Bakes of {} are off by {} of what they state in the median, by {} at most; the converged bake leaves {} open.",
+            "The errors found in bakes of {} are {} times those that they state in the median, and {} times at most.",
             scene.name,
             rounded(ratio.median),
-            rounded(most),
-            percent(uncertain)
+            rounded(most)
         ));
     }
     findings.extend(cheapest_by_error(points, "of error"));
@@ -209,8 +219,8 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
             "From {} to {} the error falls from {} to {} for {} times the time.",
             coarse.label,
             fine.label,
-            percent(much.relative_rmse),
-            percent(little.relative_rmse),
+            told(&much),
+            told(&little),
             rounded(long.median / short.median)
         ));
     }

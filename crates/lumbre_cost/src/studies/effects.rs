@@ -12,6 +12,8 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 
 /// Seconds for the frames of each scene of a full report.
 const SECONDS: f64 = 16.0;
+/// Effects that are told of, the costliest.
+const TOLD: usize = 3;
 const SAVED: &str = "saved, ms";
 
 /// Measures it.
@@ -57,11 +59,11 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole));
-    let mut frames = vec![Frame { world: whole, options: FrameOptions::default() }];
+    let mut frames = vec![Frame::new(whole, FrameOptions::default())];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
         effect.remove(&mut world, &mut options);
-        frames.push(Frame { world, options });
+        frames.push(Frame::new(world, options));
     }
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let [whole, without @ ..] = &drawn[..] else { return Ok(()) };
@@ -133,6 +135,7 @@ fn findings(
     let share = |ratio: f64| 100.0 * (1.0 - 1.0 / ratio);
     let told: Vec<String> = costly
         .iter()
+        .take(TOLD)
         .map(|(effect, ratio, error)| {
             format!(
                 "without {effect} it takes {} % less ({} to {}) and loses {} of the picture",
@@ -150,10 +153,16 @@ fn findings(
             told.join("; ")
         ));
     }
-    let open: Vec<&str> =
-        known.iter().filter(|(_, ratio, _)| is_above_one(ratio).is_none()).map(|(effect, ..)| *effect).collect();
+    let open: Vec<&str> = known
+        .iter()
+        .filter(|(_, ratio, _)| is_above_one(ratio).is_none())
+        .map(|(effect, ..)| *effect)
+        .collect();
     if !open.is_empty() {
-        findings.push(format!("In {scene} the times do not tell whether {} anything.", listed_with(&open, "costs", "cost", "or")));
+        findings.push(format!(
+            "In {scene} the times do not tell whether {} anything.",
+            listed_with(&open, "costs", "cost", "or")
+        ));
     }
     // What costs the most per loss: the first to go.
     let worth = |(_, ratio, error): &&&(&str, Spread, f64)| (ratio.median - 1.0) / error.max(1e-9);
@@ -165,7 +174,10 @@ fn findings(
     let unseen: Vec<&str> =
         known.iter().filter(|(.., error)| *error == 0.0).map(|(effect, ..)| *effect).collect();
     if !unseen.is_empty() {
-        findings.push(format!("The picture of {scene} is the same to the bit without {}.", listed(&unseen, "or without")));
+        findings.push(format!(
+            "The picture of {scene} is the same to the bit without {}.",
+            listed(&unseen, "or without")
+        ));
     }
     findings
 }

@@ -22,6 +22,8 @@ const FEW: &[u32] = &[1, 16, 128];
 const USUAL: f32 = 0.05;
 const THRESHOLDS: &[f32] = &[0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
 const FEW_THRESHOLDS: &[f32] = &[0.1, 0.02, 0.005];
+/// With more lamps to draw a frame takes longer than to compile its shaders.
+const SHARING: u32 = 64;
 const LAMPS: &str = "lamps";
 const THRESHOLD: &str = "threshold, % of white";
 const ENDING: &str = "lamps that end, by clusters";
@@ -82,9 +84,10 @@ fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<Tim
     for &lamps in numbers {
         let asked = BallsAndLamps { lamps, threshold: USUAL, seed: conditions.seed };
         let scene = SceneFile::made(conditions, &format!("lamps-{lamps}"), balls_and_lamps(asked))?;
-        for (light_lists, _) in LISTS {
+        for (light_lists, name) in LISTS {
             let options = FrameOptions { light_lists, ..FrameOptions::default() };
-            frames.push(Frame { world: scene.open(conditions.aspect())?, options });
+            let frame = Frame::new(scene.open(conditions.aspect())?, options);
+            frames.push(if lamps <= SHARING { frame.sharing(name) } else { frame });
         }
     }
     let mut drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.6])?.into_iter();
@@ -122,9 +125,15 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
     let mut findings = Vec::new();
     let mut said = Vec::new();
     for (lamps, _) in times {
-        let here = study.points.iter().filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(*lamps)));
+        let here =
+            study.points.iter().filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(*lamps)));
         let mut here: Vec<&Point> = here.filter(|point| point.milliseconds.is_some()).collect();
-        here.sort_by(|a, b| a.milliseconds.map(|t| t.median).unwrap_or(0.0).total_cmp(&b.milliseconds.map(|t| t.median).unwrap_or(0.0)));
+        here.sort_by(|a, b| {
+            a.milliseconds
+                .map(|t| t.median)
+                .unwrap_or(0.0)
+                .total_cmp(&b.milliseconds.map(|t| t.median).unwrap_or(0.0))
+        });
         let Some(first) = here.first().and_then(|point| point.milliseconds) else { continue };
         let open = here.iter().filter(|point| point.milliseconds.is_some_and(|time| !first.is_below(&time)));
         let open: Vec<&str> = open.map(|point| point.series.as_str()).collect();
@@ -142,7 +151,12 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
             (ratio_of(&everything.times, &clusters.times), ratio_of(&objects.times, &clusters.times))
     {
         let told = |ratio: &crate::Spread, name: &str| match is_above_one(ratio) {
-            Some(_) => format!("{name} takes {} times as long as clusters ({} to {})", rounded(ratio.median), rounded(ratio.lower), rounded(ratio.upper)),
+            Some(_) => format!(
+                "{name} takes {} times as long as clusters ({} to {})",
+                rounded(ratio.median),
+                rounded(ratio.lower),
+                rounded(ratio.upper)
+            ),
             None => format!("{name} and clusters are not told apart"),
         };
         findings.push(format!(
@@ -151,8 +165,16 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
             told(&by_object, "finding them by lists of objects")
         ));
     }
-    let largest = study.points.iter().filter_map(|point| point.error).map(|error| error.relative_rmse).fold(0.0, f64::max);
-    findings.push(format!("The lists leave out nothing that is seen: the pictures differ by {} at most.", percent(largest)));
+    let largest = study
+        .points
+        .iter()
+        .filter_map(|point| point.error)
+        .map(|error| error.relative_rmse)
+        .fold(0.0, f64::max);
+    findings.push(format!(
+        "The lists leave out nothing that is seen: the pictures differ by {} at most.",
+        percent(largest)
+    ));
     findings
 }
 
@@ -169,12 +191,20 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
         let scene = SceneFile::made(conditions, &name, balls_and_lamps(asked))?;
         let light_lists = if *threshold == 0.0 { LightLists::Everything } else { LightLists::Clusters };
         let options = FrameOptions { light_lists, ..FrameOptions::default() };
-        frames.push(Frame { world: scene.open(conditions.aspect())?, options });
+        let frame = Frame::new(scene.open(conditions.aspect())?, options);
+        frames.push(if lamps <= SHARING {
+            frame.sharing(if *threshold == 0.0 { "endless" } else { ENDING })
+        } else {
+            frame
+        });
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.6, 1.0])?;
     let [endless, ending @ ..] = &drawn[..] else { return Ok(()) };
     let reference = measured.keep_reference(&format!("{lamps} endless lamps"), endless.picture.clone());
-    let whole = Point { label: format!("{lamps} lamps without an end"), ..point(endless, "lamps without an end", lamps) };
+    let whole = Point {
+        label: format!("{lamps} lamps without an end"),
+        ..point(endless, "lamps without an end", lamps)
+    };
     measured.add_picture(whole, endless.picture.clone(), &reference, ErrorOver::Picture)?;
     let before = measured.study.points.len();
     for (threshold, frame) in thresholds.iter().zip(ending) {
@@ -188,16 +218,25 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
         .iter()
         .filter_map(|point| {
             let (ratio, error) = (point.milliseconds?.median / endless.spread()?.median, point.error?);
-            Some(format!("{}: {} of the time, {} of error", point.label, rounded(ratio), percent(error.relative_rmse)))
+            Some(format!(
+                "{}: {} of the time, {} of error",
+                point.label,
+                rounded(ratio),
+                percent(error.relative_rmse)
+            ))
         })
         .collect();
-    measured.study.findings.push(format!("{lamps} lamps that end where they bring little of white, against lamps without an end: {}.", told.join("; ")));
+    measured.study.findings.push(format!(
+        "{lamps} lamps that end where they bring little of white, against lamps without an end: {}.",
+        told.join("; ")
+    ));
     Ok(())
 }
 
 /// The lamps of given files by every list.
 fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
-    measured.study.question = "The lamps of each scene: asked everywhere, found by lists of objects, found by clusters.".into();
+    measured.study.question =
+        "The lamps of each scene: asked everywhere, found by lists of objects, found by clusters.".into();
     measured.study.plots.truncate(1);
     measured.study.plots[0] = Plot {
         title: "Time against the number of lamps".into(),
@@ -210,7 +249,7 @@ fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), 
     for scene in &scenes {
         for (light_lists, _) in LISTS {
             let options = FrameOptions { light_lists, ..FrameOptions::default() };
-            frames.push(Frame { world: scene.open(conditions.aspect())?, options });
+            frames.push(Frame::new(scene.open(conditions.aspect())?, options));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 1.0])?;
@@ -222,11 +261,18 @@ fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), 
             measured.add_error(own, &frame.picture, &three[0].picture)?;
         }
         let points: Vec<&Point> = measured.study.points[before..].iter().collect();
-        let largest = points.iter().filter_map(|point| point.error).map(|error| error.relative_rmse).fold(0.0, f64::max);
+        let largest = points
+            .iter()
+            .filter_map(|point| point.error)
+            .map(|error| error.relative_rmse)
+            .fold(0.0, f64::max);
         // Their errors are roundings: only the times are weighed.
         let even: Vec<Point> = points
             .iter()
-            .map(|point| Point { error: point.error.map(|error| crate::ErrorOf { relative_rmse: largest, ..error }), ..(*point).clone() })
+            .map(|point| Point {
+                error: point.error.map(|error| crate::ErrorOf { relative_rmse: largest, ..error }),
+                ..(*point).clone()
+            })
             .collect();
         let even: Vec<&Point> = even.iter().collect();
         measured.study.findings.extend(cheapest_by_error(&even, &format!("of error in {}", scene.name)));

@@ -10,6 +10,7 @@ use crate::baked::{bake_options, bake_scene};
 use crate::findings::{cheapest_by_error, milliseconds, percent, rounded};
 use crate::frames::{Frame, draw_frames};
 use crate::measured::Measured;
+use crate::picture::Picture;
 use crate::rounds::milliseconds_since;
 use crate::scene_file::SceneFile;
 use crate::scenes::{Air, room};
@@ -85,13 +86,19 @@ fn of_scene(
     };
     let most = conditions.unless_quick(512, 96);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
-    let open = report.standard_error.unwrap_or(0.0);
+    // The report states it of the mean; errors are of the root mean square.
+    let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
     let reference = measured.keep_reference(&format!("{} by {most} paths", scene.name), picture);
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
     conditions.tell(part(0.5))?;
 
-    let bake = bake_options(conditions, scene, conditions.unless_quick(16_000.0, 4_000.0))?;
-    let baked = bake_scene(conditions, scene, &lumbre_bake::BakeOptions { error: 0.02, ..bake }, [part(0.5), part(0.6)])?;
+    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 2_000.0))?;
+    let baked = bake_scene(
+        conditions,
+        scene,
+        &lumbre_bake::BakeOptions { error: 0.02, ..bake },
+        [part(0.5), part(0.6)],
+    )?;
     let light = |shadows, multisample| FrameOptions { shadows, multisample, ..FrameOptions::default() };
     let steps = [
         ("lamps", light(false, false), " --no-shadows"),
@@ -100,10 +107,10 @@ fn of_scene(
     ];
     let mut frames = Vec::new();
     for (_, options, _) in &steps {
-        frames.push(Frame { world: scene.open(conditions.aspect())?, options: options.clone() });
+        frames.push(Frame::new(scene.open(conditions.aspect())?, options.clone()));
     }
     let bake_time = 1e3 * baked.report.seconds;
-    frames.push(Frame { world: baked.world, options: light(true, true) });
+    frames.push(Frame::new(baked.world, light(true, true)));
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(0.7)])?;
     let labels = steps.iter().map(|(label, ..)| *label).chain(["and lightmaps"]);
     let more = steps.iter().map(|(.., more)| *more).chain([" --msaa"]);
@@ -111,7 +118,8 @@ fn of_scene(
     for ((label, more), frame) in labels.zip(more).zip(&drawn) {
         let with_lightmaps = label == "and lightmaps";
         let file = if with_lightmaps { "baked.glb" } else { scene.in_commands() };
-        let draw = format!("lumbre render {file} -o frame.exr --size {size}{more} --frames 20 --timings times.json");
+        let draw =
+            format!("lumbre render {file} -o frame.exr --size {size}{more} --frames 20 --timings times.json");
         let point = Point {
             series: series("frame"),
             label: label.to_owned(),
@@ -120,7 +128,10 @@ fn of_scene(
             counts: frame.counts(),
             figures: if with_lightmaps { [(BAKE.to_owned(), bake_time)].into() } else { Default::default() },
             command: match with_lightmaps {
-                true => format!("lumbre bake {} -o baked.glb --error 0.02 --probes never && {draw}", scene.in_commands()),
+                true => format!(
+                    "lumbre bake {} -o baked.glb --error 0.02 --probes never && {draw}",
+                    scene.in_commands()
+                ),
                 false => draw,
             },
             ..Point::default()
@@ -161,6 +172,14 @@ fn of_scene(
     Ok(())
 }
 
+/// The mean of all channels over their root mean square; 0 for a black picture.
+fn mean_over_root_mean_square(picture: &Picture) -> f64 {
+    let numbers = 3.0 * picture.radiance.len().max(1) as f64;
+    let mean = picture.radiance.iter().map(|pixel| pixel.element_sum()).sum::<f64>() / numbers;
+    let squares = picture.radiance.iter().map(|pixel| pixel.length_squared()).sum::<f64>() / numbers;
+    if squares > 0.0 { mean / squares.sqrt() } else { 0.0 }
+}
+
 fn findings(points: &[&Point], open: f64) -> Vec<String> {
     let mut findings = Vec::new();
     let frames: Vec<&&Point> = points.iter().filter(|point| point.series.starts_with("frame")).collect();
@@ -173,7 +192,11 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             _ => format!("for {} instead of {}", milliseconds(&long), milliseconds(&short)),
         };
         let change = match (was.relative_rmse - is.relative_rmse).abs() > open {
-            true => format!("takes the error from {} to {}", percent(was.relative_rmse), percent(is.relative_rmse)),
+            true => format!(
+                "takes the error from {} to {}",
+                percent(was.relative_rmse),
+                percent(is.relative_rmse)
+            ),
             false => "changes the error by less than the reference leaves open".to_owned(),
         };
         said.push(format!("\"{}\" {change} {cost}", pair[1].label));
@@ -181,7 +204,8 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
     if !said.is_empty() {
         findings.push(format!("In the frame, {}.", said.join("; ")));
     }
-    let best = frames.iter().filter_map(|point| Some((point, point.error?.relative_rmse, point.milliseconds?)));
+    let best =
+        frames.iter().filter_map(|point| Some((point, point.error?.relative_rmse, point.milliseconds?)));
     if let Some((frame, error, time)) = best.min_by(|a, b| a.1.total_cmp(&b.1)) {
         let paths = points.iter().filter(|point| point.series.starts_with("paths"));
         let reached = paths
@@ -197,8 +221,17 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             ),
             None => "no number of paths that was tried gets there".to_owned(),
         };
-        let bake = frame.figures.get(BAKE).map_or(String::new(), |ms| format!(", after a bake of {} s", rounded(ms / 1e3)));
-        findings.push(format!("The best frame (\"{}\") is off by {} in {}{bake}; {paths}. The reference leaves {} open.", frame.label, percent(error), milliseconds(&time), percent(open)));
+        let bake = frame
+            .figures
+            .get(BAKE)
+            .map_or(String::new(), |ms| format!(", after a bake of {} s", rounded(ms / 1e3)));
+        findings.push(format!(
+            "The best frame (\"{}\") is off by {} in {}{bake}; {paths}. The reference leaves {} open.",
+            frame.label,
+            percent(error),
+            milliseconds(&time),
+            percent(open)
+        ));
     }
     findings.extend(cheapest_by_error(points, "of error"));
     findings

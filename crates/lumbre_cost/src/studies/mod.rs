@@ -4,6 +4,9 @@ mod bake;
 mod effects;
 mod lamps;
 mod light_transport;
+mod lightmaps;
+mod precision;
+mod reflection;
 mod shading;
 
 use crate::measured::Measured;
@@ -27,6 +30,9 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "effects", about: "every effect of a scene, switched off in turn", run: effects::run },
     StudyKind { name: "bake", about: "the error that a bake is asked for", run: bake::run },
     StudyKind { name: "transport", about: "from the frame to the truth", run: light_transport::run },
+    StudyKind { name: "reflection", about: "reflection models against Phong's", run: reflection::run },
+    StudyKind { name: "lightmaps", about: "density and format of lightmaps", run: lightmaps::run },
+    StudyKind { name: "precision", about: "f32 on the device against f64", run: precision::run },
 ];
 
 /// The studies of these names, in the order of the page; all without a name.

@@ -4,9 +4,8 @@
 use lumbre_optics::{ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
 
-use crate::findings::{cheapest_by_error, cost_of, is_above_one, percent, ratio_of, rounded};
+use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded};
 use crate::frames::{DrawnFrame, Frame, draw_frames};
-use crate::fronts::pareto_front;
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::scene_file::SceneFile;
@@ -33,7 +32,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         for &shading in Shading::ALL {
             let world = subject.scene.open(conditions.aspect())?;
             let options = FrameOptions { shading: Some(shading), shadows: false, ..FrameOptions::default() };
-            frames.push(Frame { world, options });
+            frames.push(Frame::new(world, options).sharing(shading.name()));
         }
     }
     let drawn = draw_frames(conditions, frames, SECONDS, [0.1, 1.0])?;
@@ -176,13 +175,6 @@ fn findings(study: &Study, drawn: &[DrawnFrame], whole: bool) -> Vec<String> {
         return findings;
     }
     findings.extend(cheapest_by_error(&points, "of error"));
-    let front: Vec<String> =
-        pareto_front(points).iter().map(|p| format!("{} {}", p.series, p.label)).collect();
-    let front: Vec<&str> = front.iter().map(String::as_str).collect();
-    findings.push(format!(
-        "No other choice is both faster and nearer than {}.",
-        crate::findings::listed(&front, "and")
-    ));
     // Where the two are most alike in error: the finest mesh.
     if let Some((three, times)) = study.points.chunks(3).zip(drawn.chunks(3)).next_back() {
         findings.extend(of_one_mesh(three, times));
@@ -196,20 +188,14 @@ fn of_one_mesh(three: &[Point], times: &[DrawnFrame]) -> Option<String> {
     let ratio = ratio_of(&per_vertex.times, &per_fragment.times)?;
     let range = format!("{} to {}", rounded(ratio.lower), rounded(ratio.upper));
     let cost = match is_above_one(&ratio) {
-        Some(above) => format!(
-            "Gouraud costs {} of Phong ({range}): {}",
-            rounded(ratio.median),
-            if above { "more" } else { "less" }
-        ),
-        None => format!("whether Gouraud costs more or less than Phong is not decided ({range} of it)"),
+        Some(above) => {
+            let which = if above { "more" } else { "less" };
+            format!("Gouraud takes {} of Phong's time ({range}), which is {which}", rounded(ratio.median))
+        }
+        None => {
+            format!("the times do not decide whether Gouraud takes more or less than Phong ({range} of it)")
+        }
     };
     let [a, b] = [gouraud, phong].map(|point| point.error.map_or(f64::NAN, |error| error.relative_rmse));
-    Some(format!(
-        "On {} {cost}; its error is {} and Phong's {} ({}; {}).",
-        phong.label,
-        percent(a),
-        percent(b),
-        cost_of(gouraud),
-        cost_of(phong)
-    ))
+    Some(format!("At {} {cost}; its error is {}, Phong's {}.", phong.label, percent(a), percent(b)))
 }

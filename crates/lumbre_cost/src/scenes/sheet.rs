@@ -1,0 +1,68 @@
+//! A sheet that fills the frame, under one lamp: no rims, so that every pixel compares the arithmetic of lighting and nothing else.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use lumbre_mesh::shapes;
+use lumbre_optics::{Light, Material, Surface};
+use lumbre_scene::{Camera, Mesh, Name, Projection, SceneSettings, Transform};
+
+/// What makes the arithmetic hard.
+#[derive(Clone, Copy, Debug)]
+pub struct Sheet {
+    /// Where all of it is, metres from the origin along each axis.
+    pub far: f64,
+    /// How much larger all of it is than a sheet of two metres.
+    pub scale: f64,
+    /// The exponent of the highlight.
+    pub shininess: f32,
+    /// Height of the lamp over the sheet, at the usual scale, metres.
+    pub height: f64,
+    /// Angle of a distant light over the horizon, radians; without one there is a lamp.
+    pub grazing: Option<f64>,
+}
+
+impl Sheet {
+    /// Nothing is hard.
+    pub const PLAIN: Self = Self { far: 0.0, scale: 1.0, shininess: 20.0, height: 0.8, grazing: None };
+}
+
+/// The sheet, seen aslant from above.
+pub fn sheet(asked: Sheet) -> World {
+    let mut world = World::new();
+    world.insert_resource(SceneSettings { ambient: Vec3::splat(0.02), ..SceneSettings::default() });
+    let at = |point: DVec3| DVec3::splat(asked.far) + point * asked.scale;
+    let color = Vec3::new(0.6, 0.45, 0.3);
+    let front = Surface {
+        ambient: color,
+        diffuse: color,
+        specular: Vec3::splat(0.4),
+        shininess: asked.shininess,
+        ..Surface::default()
+    };
+    let material = Material { front, ..Material::default() };
+    let mesh = Mesh(Arc::new(shapes::plane(12.0, 12.0, 4, 4)));
+    let place = Transform::from_translation(at(DVec3::ZERO)).with_scale(DVec3::splat(asked.scale));
+    world.spawn((Name::new("sheet"), mesh, material, place));
+    match asked.grazing {
+        Some(angle) => {
+            let from = DVec3::new(angle.cos(), angle.sin(), 0.0);
+            let aimed = Transform::from_translation(at(from)).looking_at(at(DVec3::ZERO), DVec3::Z);
+            let strength = 0.5 / angle.sin();
+            world.spawn((Name::new("light"), Light::directional(Vec3::splat(strength as f32)), aimed));
+        }
+        None => {
+            // As bright at any scale and height.
+            let reach = asked.height * asked.scale;
+            let lamp = Light::point(Vec3::splat((0.6 * reach * reach) as f32));
+            world.spawn((Name::new("lamp"), lamp, Transform::from_translation(at(DVec3::Y * asked.height))));
+        }
+    }
+    let eye =
+        Transform::from_translation(at(DVec3::new(0.0, 1.5, 1.2))).looking_at(at(DVec3::ZERO), DVec3::Y);
+    let projection =
+        Projection::Perspective { vertical_fov: 0.7, aspect: None, near: 0.01 * asked.scale, far: None };
+    world.spawn((Name::new("camera"), Camera { projection, exposure: 1.0 }, eye));
+    world
+}

@@ -1,0 +1,300 @@
+//! Lightmaps by their density and their format: bytes and time against what a frame loses.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use lumbre_bake::{BakeOptions, Density};
+use lumbre_render::FrameOptions;
+use lumbre_scene::{
+    Lightmap, LightmapEncoding, LightmapImage, Mesh, PackedFormat, Supercompression, lightmap_to_ktx2,
+    lightmap_to_open_exr,
+};
+
+use crate::baked::{Baked, bake_options, bake_scene};
+use crate::findings::{listed, percent, rounded};
+use crate::frames::{Frame, draw_frames};
+use crate::fronts::pareto_front;
+use crate::measured::Measured;
+use crate::scene_file::SceneFile;
+use crate::scenes::{Air, room};
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+
+/// Texels of the reference; each density below has a quarter of the texels of the one before.
+const TEXELS: f64 = 64_000.0;
+const FEW_TEXELS: f64 = 16_000.0;
+const DENSITY: &str = "texels along a metre";
+const BYTES: &str = "bytes of the textures";
+const BAKE: &str = "baked before, ms";
+const SECONDS: f64 = 8.0;
+
+/// How texels are kept on the GPU, and in which file.
+#[derive(Clone, Copy)]
+enum Format {
+    Floats,
+    Halves,
+    Packed(PackedFormat),
+}
+
+impl Format {
+    const ALL: [Self; 4] = [
+        Self::Floats,
+        Self::Halves,
+        Self::Packed(PackedFormat::Rgb9E5),
+        Self::Packed(PackedFormat::B10G11R11),
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Floats => "32-bit floats",
+            Self::Halves => "half floats",
+            Self::Packed(PackedFormat::Rgb9E5) => "RGB9E5",
+            Self::Packed(PackedFormat::B10G11R11) => "B10G11R11",
+        }
+    }
+
+    /// Bytes of a texel on the GPU.
+    fn bytes(self) -> f64 {
+        match self {
+            Self::Floats => 16.0,
+            Self::Halves => 8.0,
+            Self::Packed(_) => 4.0,
+        }
+    }
+
+    /// The map as it is after it was kept so, and the bytes of its file. The two formats that frames do not read as they are come as floats of the same value.
+    fn kept(self, map: &LightmapImage) -> Result<(LightmapImage, usize), CostError> {
+        Ok(match self {
+            Self::Floats => {
+                let encoding = LightmapEncoding::Rgb32Float;
+                (LightmapImage { encoding, ..map.clone() }, lightmap_to_open_exr(map, encoding)?.0.len())
+            }
+            Self::Halves => {
+                let encoding = LightmapEncoding::Rgb16Float;
+                (LightmapImage { encoding, ..map.clone() }, lightmap_to_open_exr(map, encoding)?.0.len())
+            }
+            Self::Packed(format) => {
+                let file = lightmap_to_ktx2(map, format, Supercompression::Zstandard)?.0;
+                let through =
+                    |texel: &glam::Vec3| format.encode(*texel).map_or(*texel, |bits| format.decode(bits));
+                let texels = map.texels.iter().map(through).collect();
+                let encoding = match format {
+                    PackedFormat::Rgb9E5 => LightmapEncoding::Rgb9E5,
+                    PackedFormat::B10G11R11 => LightmapEncoding::Rgb32Float,
+                };
+                (LightmapImage { texels, encoding, ..map.clone() }, file.len())
+            }
+        })
+    }
+}
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    let scenes = match conditions.files.is_empty() {
+        true => vec![SceneFile::made(conditions, "room", room(Air::Clear))?],
+        false => SceneFile::given(conditions)?,
+    };
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        let told = [place, place + 1].map(|place| place as f64 / count);
+        of_scene(conditions, scene, told, &mut measured)?;
+    }
+    Ok(measured)
+}
+
+fn study() -> Study {
+    Study {
+        name: "lightmaps".into(),
+        title: "Density and format of lightmaps".into(),
+        question: "How many texels along a metre, and how many bytes for each: what does a frame lose, and what does it cost?".into(),
+        reference: "the frame with the densest maps, in 32-bit floats".into(),
+        plots: vec![Plot {
+            title: "Error against bytes".into(),
+            across: Quantity::Count(BYTES.into()),
+            up: Quantity::Error,
+            joined: true,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+/// Maps of one density.
+struct Maps {
+    baked: Baked,
+    density: f64,
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let part = |share: f64| before + share * (after - before);
+    let options = bake_options(conditions, scene, conditions.unless_quick(TEXELS, FEW_TEXELS))?;
+    let Density::TexelsPerMeter(densest) = options.density else { return Ok(()) };
+    let mut all = Vec::new();
+    for (place, halved) in [1.0, 2.0, 4.0, 8.0].into_iter().enumerate() {
+        let density = densest / halved;
+        let options = BakeOptions { density: Density::TexelsPerMeter(density), error: 0.02, ..options };
+        let told = [place, place + 1].map(|place| part(0.6 * place as f64 / 4.0));
+        all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, density });
+    }
+    let mut frames = Vec::new();
+    let mut points = Vec::new();
+    for (place, maps) in all.iter_mut().enumerate() {
+        for format in Format::ALL {
+            // Formats matter alike at every density: the densest two tell.
+            if place > 1 && !matches!(format, Format::Halves) {
+                continue;
+            }
+            let (world, sizes) = in_format(conditions, scene, &mut maps.baked.world, format)?;
+            frames.push(Frame::new(world, FrameOptions::default()));
+            points.push(point(conditions, scene, maps, format, sizes));
+        }
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(1.0)])?;
+    let reference = measured.keep_reference(&format!("{} densest", scene.name), drawn[0].picture.clone());
+    let first = measured.study.points.len();
+    for (mut point, frame) in points.into_iter().zip(&drawn) {
+        point.milliseconds = frame.spread();
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    let finding = finding(&scene.name, &measured.study.points[first..]);
+    measured.study.findings.extend(finding);
+    Ok(())
+}
+
+/// Bytes of the textures on the GPU, of their files, and texels.
+struct Sizes {
+    textures: f64,
+    files: f64,
+    texels: f64,
+}
+
+/// The scene with maps of a bake as they are after they were kept in a format.
+fn in_format(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    baked: &mut World,
+    format: Format,
+) -> Result<(World, Sizes), CostError> {
+    let mut kept: Vec<(Arc<LightmapImage>, Arc<LightmapImage>)> = Vec::new();
+    let mut sizes = Sizes { textures: 0.0, files: 0.0, texels: 0.0 };
+    let mut maps = baked.query::<&Lightmap>();
+    for map in maps.iter(baked) {
+        if kept.iter().any(|(known, _)| Arc::ptr_eq(known, &map.image)) {
+            continue;
+        }
+        let (image, file) = format.kept(&map.image)?;
+        sizes.files += file as f64;
+        sizes.texels += image.texels.len() as f64;
+        sizes.textures += format.bytes() * image.texels.len() as f64;
+        kept.push((Arc::clone(&map.image), Arc::new(image)));
+    }
+    // Read once more the scene has the same entities; they get what the bake gave them, with other maps.
+    let mut world = scene.open(conditions.aspect())?;
+    let mut lit = baked.query::<(Entity, &Mesh, &Lightmap)>();
+    for (entity, mesh, map) in lit.iter(baked) {
+        let Some((_, image)) = kept.iter().find(|(known, _)| Arc::ptr_eq(known, &map.image)) else {
+            continue;
+        };
+        if let Ok(mut entity) = world.get_entity_mut(entity) {
+            entity.insert((mesh.clone(), Lightmap { image: Arc::clone(image) }));
+        }
+    }
+    Ok((world, sizes))
+}
+
+fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Format, sizes: Sizes) -> Point {
+    let counts = [(BYTES, sizes.textures), ("bytes of the files", sizes.files), ("texels", sizes.texels)];
+    let series = match conditions.files.len() {
+        0 | 1 => format.name().to_owned(),
+        _ => format!("{}, {}", format.name(), scene.name),
+    };
+    let ktx2 = match format {
+        Format::Packed(format) => format!(" --ktx2 {}", format.name()),
+        Format::Halves => " --exr half".to_owned(),
+        Format::Floats => String::new(),
+    };
+    Point {
+        series,
+        label: format!("{} a metre", rounded(maps.density)),
+        parameters: [(DENSITY.to_owned(), maps.density)].into(),
+        counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
+        figures: [(BAKE.to_owned(), 1e3 * maps.baked.report.seconds)].into(),
+        command: format!(
+            "lumbre bake {} -o baked.glb --error 0.02 --texels-per-meter {} --probes never --no-resolution-error --no-reuse{ktx2} && lumbre render baked.glb -o frame.exr --size {} --frames 20 --timings times.json",
+            scene.in_commands(),
+            rounded(maps.density),
+            conditions.size_text()
+        ),
+        ..Point::default()
+    }
+}
+
+/// What formats and densities lose, and whether their times differ.
+fn finding(scene: &str, points: &[Point]) -> Vec<String> {
+    let [reference, others @ ..] = points else { return Vec::new() };
+    let errors = |points: &[&Point]| {
+        points.iter().filter_map(|p| p.error).map(|e| e.relative_rmse).fold(0.0, f64::max)
+    };
+    let same_density: Vec<&Point> = others.iter().filter(|point| point.label == reference.label).collect();
+    let coarser: Vec<&Point> = others.iter().filter(|point| point.label != reference.label).collect();
+    let mut findings = Vec::new();
+    if let Some(next) =
+        coarser.iter().filter_map(|point| point.error).map(|e| e.relative_rmse).min_by(f64::total_cmp)
+    {
+        let formats: Vec<String> = same_density
+            .iter()
+            .filter_map(|point| {
+                Some(format!("{} loses {}", point.series, percent(point.error?.relative_rmse)))
+            })
+            .collect();
+        let formats: Vec<&str> = formats.iter().map(String::as_str).collect();
+        let less = if errors(&same_density) < next { "less than" } else { "not less than" };
+        findings.push(format!(
+            "In {scene} {}: {less} half the density, which loses {}.",
+            listed(&formats, "and"),
+            percent(next)
+        ));
+    }
+    // In bytes in place of time.
+    let by_bytes: Vec<Point> = points
+        .iter()
+        .filter_map(|point| {
+            let bytes = *point.counts.get(BYTES)?;
+            let milliseconds = Spread::of(&[bytes]);
+            Some(Point { milliseconds, ..point.clone() })
+        })
+        .collect();
+    let front: Vec<String> = pareto_front(&by_bytes)
+        .iter()
+        .filter_map(|point| {
+            let bytes = point.milliseconds?.median;
+            Some(format!(
+                "{} at {} ({} MB, {})",
+                point.series,
+                point.label,
+                rounded(bytes / 1e6),
+                percent(point.error?.relative_rmse)
+            ))
+        })
+        .collect();
+    let front: Vec<&str> = front.iter().map(String::as_str).collect();
+    findings.push(format!("The least bytes for their error in {scene}: {}.", listed(&front, "and")));
+    let told_apart = others.iter().any(|point| match (point.milliseconds, reference.milliseconds) {
+        (Some(time), Some(whole)) => time.is_below(&whole) || whole.is_below(&time),
+        _ => false,
+    });
+    if !told_apart {
+        findings.push(format!(
+            "The frames of {scene} take the same time with all of them, as far as the times tell."
+        ));
+    }
+    findings
+}

@@ -1,0 +1,177 @@
+//! Frames of f32 against rays of f64 over cases that are hard for arithmetic, and what is lost when the frame is kept in fewer bits.
+
+use std::time::Instant;
+
+use glam::DVec3;
+use half::f16;
+use lumbre_render::FrameOptions;
+
+use crate::findings::{listed, milliseconds, percent, rounded};
+use crate::frames::{Frame, draw_frames};
+use crate::measured::Measured;
+use crate::picture::Picture;
+use crate::rounds::milliseconds_since;
+use crate::scene_file::SceneFile;
+use crate::scenes::{Sheet, sheet};
+use crate::traced::lighting_of;
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+
+/// What is hard, and about what.
+const CASES: [(&str, Sheet); 7] = [
+    ("plain", Sheet::PLAIN),
+    ("exponent 50000", Sheet { shininess: 50_000.0, ..Sheet::PLAIN }),
+    ("lamp at 2 cm", Sheet { height: 0.02, ..Sheet::PLAIN }),
+    ("light at 0.1°", Sheet { grazing: Some(0.001_745_329), ..Sheet::PLAIN }),
+    ("10000 km away", Sheet { far: 1e7, ..Sheet::PLAIN }),
+    ("a millimetre large", Sheet { scale: 5e-4, ..Sheet::PLAIN }),
+    ("100 km large", Sheet { scale: 5e4, ..Sheet::PLAIN }),
+];
+const SECONDS: f64 = 6.0;
+const F32: &str = "f32 frame";
+const F16: &str = "the frame kept in f16";
+const EIGHT: &str = "the frame kept in eight bits";
+const F64: &str = "f64 rays";
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    let mut measured = Measured { study: study(), ..Measured::default() };
+    if !conditions.files.is_empty() {
+        measured.study.notes.push("The given files were not looked at: this study is of one sheet.".into());
+    }
+    let mut frames = Vec::new();
+    let mut scenes = Vec::new();
+    for (name, asked) in CASES {
+        let scene =
+            SceneFile::made(conditions, &format!("sheet-{}", name.replace([' ', '°'], "-")), sheet(asked))?;
+        frames.push(Frame::new(scene.open(conditions.aspect())?, FrameOptions::default()).sharing("sheet"));
+        scenes.push(scene);
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, [0.0, 0.5])?;
+    for (place, ((name, _), (scene, frame))) in CASES.iter().zip(scenes.iter().zip(&drawn)).enumerate() {
+        conditions.tell(0.5 + 0.5 * place as f64 / CASES.len() as f64)?;
+        let mut times = Vec::new();
+        let mut exact = None;
+        for _ in 0..3 {
+            let begun = Instant::now();
+            exact = Some(lighting_of(conditions, scene)?);
+            times.push(milliseconds_since(begun));
+        }
+        let Some(exact) = exact else { continue };
+        let reference = measured.keep_reference(&format!("f64 {name}"), exact.clone());
+        let size = conditions.size_text();
+        let point = |series: &str, time, command: String| Point {
+            series: series.into(),
+            label: (*name).into(),
+            milliseconds: time,
+            command,
+            ..Point::default()
+        };
+        let draw = format!(
+            "lumbre render {} -o frame.exr --size {size} --frames 20 --timings times.json",
+            scene.in_commands()
+        );
+        let trace = format!(
+            "lumbre trace {} -o picture.exr --size {size} --depth 0 --no-shadows",
+            scene.in_commands()
+        );
+        let kept = [
+            (F32, frame.picture.clone()),
+            (F16, in_halves(&frame.picture)),
+            (EIGHT, in_bytes(&frame.picture)),
+        ];
+        for (series, picture) in kept {
+            let mut point = point(series, frame.spread(), draw.clone());
+            point.counts = frame.counts();
+            measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
+        }
+        measured.add_picture(point(F64, Spread::of(&times), trace), exact, &reference, ErrorOver::Picture)?;
+    }
+    measured.study.findings = findings(&measured.study);
+    Ok(measured)
+}
+
+fn study() -> Study {
+    Study {
+        name: "precision".into(),
+        title: "f32 on the device against f64".into(),
+        question: "A sheet that fills the frame, under light that is hard for arithmetic: what do 32 bits lose, and what 16 and eight after them? And what would 64 bits cost, by rays?".into(),
+        reference: "the same lighting equation at the same pixels, traced in f64".into(),
+        plots: vec![Plot {
+            title: "Error against time".into(),
+            across: Quantity::Milliseconds,
+            up: Quantity::Error,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+fn each_channel(picture: &Picture, kept: impl Fn(f64) -> f64) -> Picture {
+    let radiance = picture.radiance.iter().map(|pixel| DVec3::from(pixel.to_array().map(&kept))).collect();
+    Picture { width: picture.width, radiance }
+}
+
+fn in_halves(picture: &Picture) -> Picture {
+    each_channel(picture, |value| f64::from(f16::from_f64(value)))
+}
+
+/// Through sRGB's encoding, as a screen has it, without a tone curve.
+fn in_bytes(picture: &Picture) -> Picture {
+    let decoded = |value: f64| match value {
+        low if low <= 0.04045 => low / 12.92,
+        high => ((high + 0.055) / 1.055).powf(2.4),
+    };
+    let kept = |pixel: &DVec3| {
+        let bytes = lumbre_trace::encode_srgb(*pixel).to_array().map(|value| (255.0 * value).round() / 255.0);
+        DVec3::from(bytes.map(decoded))
+    };
+    Picture { width: picture.width, radiance: picture.radiance.iter().map(kept).collect() }
+}
+
+fn findings(study: &Study) -> Vec<String> {
+    let error = |point: &&Point| point.error.map_or(0.0, |error| error.relative_rmse);
+    let mut findings = Vec::new();
+    let hardest = study.of_series(F32).max_by(|a, b| error(a).total_cmp(&error(b)));
+    let plain = study.of_series(F32).find(|point| point.label == CASES[0].0);
+    if let (Some(hardest), Some(plain)) = (hardest, plain) {
+        findings.push(format!(
+            "Of the f32 frames the farthest off is \"{}\", by {}; \"{}\" is off by {}.",
+            hardest.label,
+            percent(error(&hardest)),
+            plain.label,
+            percent(error(&plain))
+        ));
+    }
+    let bytes: Vec<(&Point, f64)> = study.of_series(EIGHT).map(|point| (point, error(&point))).collect();
+    let worse: Vec<&str> = study
+        .of_series(F32)
+        .zip(&bytes)
+        .filter(|(frame, (_, kept))| error(frame) > 0.5 * kept)
+        .map(|(frame, _)| frame.label.as_str())
+        .collect();
+    findings.push(match worse.is_empty() {
+        true => "In every case eight bits lose more than twice as much as f32.".to_owned(),
+        false => {
+            format!("Arithmetic loses as much as eight bits, or half of it, in {}.", listed(&worse, "and"))
+        }
+    });
+    let times = study.of_series(F32).zip(study.of_series(F64));
+    let factors: Vec<f64> = times
+        .filter_map(|(frame, rays)| Some(rays.milliseconds?.median / frame.milliseconds?.median))
+        .collect();
+    if let (Some(factor), Some(frame)) =
+        (Spread::of(&factors), study.of_series(F32).find_map(|p| p.milliseconds))
+    {
+        findings.push(format!(
+            "Rays in f64 take {} times as long as the frame in the median ({} to {}; a frame: {}).",
+            rounded(factor.median),
+            rounded(factor.lower),
+            rounded(factor.upper),
+            milliseconds(&frame)
+        ));
+    }
+    findings
+}
