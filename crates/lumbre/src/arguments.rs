@@ -419,10 +419,10 @@ pub struct Cost {
     #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "studies", "resume", "size", "seed", "quiet"])]
     pub compare: Option<Vec<PathBuf>>,
     /// Counts, errors and times that differ by less than this factor count as equal.
-    #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, requires = "compare", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, conflicts_with = "output", allow_negative_numbers = true)]
     pub factor: f64,
     /// Exit status 1 also for times that grew, by more than the factor and with quartiles that lie apart.
-    #[arg(long, requires = "compare")]
+    #[arg(long, conflicts_with = "output")]
     pub times: bool,
 }
 

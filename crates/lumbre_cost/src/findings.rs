@@ -2,12 +2,12 @@
 //! where the times do not decide.
 
 use crate::fronts::stretches;
-use crate::{Point, Spread};
+use crate::{ErrorOf, Point, Spread};
 
 /// Who is the cheapest for which error that may be left, as sentences: from where on one series alone gets to small errors in the least time, where another
-/// one is at least level for large errors, and what lies between. `what` names the error, as in "error of the picture"; nothing for less than two series
-/// that have times and errors.
-pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
+/// one is at least level for large errors, and what lies between. `place` says of what, as in " in the room"; nothing for less than two series that have
+/// times and errors.
+pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
     let mut series: Vec<&str> = Vec::new();
     for point in points.iter().filter(|point| point.error.is_some() && point.milliseconds.is_some()) {
         if !series.contains(&point.series.as_str()) {
@@ -24,15 +24,14 @@ pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
     let fine = found.iter().take_while(|stretch| same(&stretch.cheapest, &finest.cheapest)).count();
     let end = found[fine - 1].to;
     let range = match end.is_infinite() {
-        true => format!("At every {what} down to {}", percent(finest.from)),
-        false => format!("Below {} {what}, down to {},", percent(end), percent(finest.from)),
+        true => format!("At every error{place} down to {}", percent(finest.from)),
+        false => format!("Below {} of error{place}, down to {},", percent(end), percent(finest.from)),
     };
     sentences.push(match &finest.cheapest[..] {
-        [only] => format!(
-            "{range} {} is the cheapest ({}).",
-            only.series,
-            cost_of(smallest(points, &only.series).unwrap_or(only))
-        ),
+        [only] => {
+            let finest = smallest(points, &only.series).unwrap_or(only);
+            format!("{range} the cheapest is {} ({}: {}).", only.series, finest.label, cost_of(finest))
+        }
         several => format!("{range} the times do not decide between {}.", names_of(several)),
     });
     // From the largest error downwards: as long as one series is among the cheapest.
@@ -58,7 +57,7 @@ pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
                 true => String::new(),
                 false => format!(", in parts of that range level with {}", listed(&level, "and")),
             };
-            sentences.push(format!("Above {} {} is the cheapest{level}.", percent(from), winner.series));
+            sentences.push(format!("Above {} the cheapest is {}{level}.", percent(from), winner.series));
             let between = &rest[..rest.len() - coarse];
             if !between.is_empty() {
                 let all: Vec<&Point> =
@@ -75,8 +74,7 @@ pub fn cheapest_by_error(points: &[&Point], what: &str) -> Option<String> {
     let contends = |name: &str| found.iter().any(|s| s.cheapest.iter().any(|point| point.series == name));
     let never: Vec<&str> = series.iter().copied().filter(|name| !contends(name)).collect();
     if !never.is_empty() {
-        sentences
-            .push(format!("{} never the cheapest.", capitalized(&listed_with(&never, "is", "are", "and"))));
+        sentences.push(format!("Never so: {}.", listed(&never, "and")));
     }
     Some(sentences.join(" "))
 }
@@ -104,17 +102,21 @@ fn smallest<'a>(points: &[&'a Point], series: &str) -> Option<&'a Point> {
     known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(point, _)| point)
 }
 
-/// With its first letter in upper case.
-fn capitalized(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+/// A point's time and error.
+pub fn cost_of(point: &Point) -> String {
+    let time = point.milliseconds.as_ref().map(milliseconds);
+    let error = point.error.map(|error| format!("{} of error", error_of(&error)));
+    time.into_iter().chain(error).collect::<Vec<_>>().join(", ")
 }
 
-/// A point's time and error, with its label.
-pub fn cost_of(point: &Point) -> String {
-    let time = point.milliseconds.map_or(String::new(), |time| format!("{}, ", milliseconds(&time)));
-    let error = point.error.map_or(String::new(), |error| format!("{}, ", percent(error.relative_rmse)));
-    format!("{time}{error}{}", point.label)
+/// An error as per cent, with what is not known of it; where that is more than itself, as what it is at most.
+pub fn error_of(error: &ErrorOf) -> String {
+    let ErrorOf { relative_rmse, uncertainty, .. } = *error;
+    match uncertainty {
+        0.0 => percent(relative_rmse),
+        open if open >= relative_rmse => format!("at most {}", percent(relative_rmse + open)),
+        open => format!("{} ± {}", percent(relative_rmse), percent(open)),
+    }
 }
 
 /// How much longer the first takes than the second, as a factor with its range, from times of the same rounds; nothing without any.
@@ -142,6 +144,15 @@ pub fn rounded(value: f64) -> String {
         _ if size >= 10.0 => format!("{value:.1}"),
         _ if size >= 1.0 => format!("{value:.2}"),
         _ => format!("{value:.3}"),
+    }
+}
+
+/// A number with about three digits, without zeros at its end.
+pub fn short(value: f64) -> String {
+    let text = rounded(value);
+    match text.contains('.') && !text.contains('e') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
     }
 }
 

@@ -52,17 +52,18 @@ impl Folder {
         if path.exists() { read_report(&path).map(Some) } else { Ok(None) }
     }
 
-    /// Writes a study's pictures.
+    /// Writes a study's pictures, in place of those that are there from another time.
     ///
     /// # Errors
     /// [`CostError::File`], [`CostError::Picture`].
     pub fn write_pictures(&self, measured: &Measured) -> Result<(), CostError> {
+        let own = self.path.join("pictures").join(&measured.study.name);
+        let failed = |source| CostError::File { path: own.clone(), source };
+        if own.exists() {
+            fs::remove_dir_all(&own).map_err(failed)?;
+        }
+        fs::create_dir_all(&own).map_err(failed)?;
         for (name, picture) in &measured.pictures {
-            let path = self.path.join(name);
-            if let Some(folder) = path.parent() {
-                fs::create_dir_all(folder)
-                    .map_err(|source| CostError::File { path: folder.to_owned(), source })?;
-            }
             self.write_light(name, picture)?;
         }
         // What belongs together is shown with one exposure: that of the reference.

@@ -120,8 +120,17 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
 
     let front = if plot.front { pareto_front(points.iter().map(|(_, point, _)| *point)) } else { Vec::new() };
     let corners: Vec<(f64, f64)> = front.iter().filter_map(|point| place(plot, point)).map(onto).collect();
-    let steps = corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]);
+    let steps: Vec<(f64, f64)> =
+        corners.iter().zip(corners.iter().skip(1)).flat_map(|(a, b)| [*a, (b.0, a.1), *b]).collect();
+    // Names are not to lie over lines.
+    let mut lines = vec![steps.clone()];
     chart.draw_series(DashedLineSeries::new(steps, 4, 4, FRONT.stroke_width(1))).map_err(told)?;
+    if plot.equal {
+        let ends = [across.from.max(up.from), across.to.min(up.to)].map(|value| (value, value));
+        if ends[0] < ends[1] {
+            chart.draw_series(DashedLineSeries::new(ends, 2, 4, FRONT.stroke_width(1))).map_err(told)?;
+        }
+    }
 
     for (color, name) in &series {
         let own = || points.iter().filter(|(_, point, _)| point.series == *name);
@@ -131,6 +140,7 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
             if plot.across != Quantity::Milliseconds {
                 line.sort_by(|a, b| a.0.total_cmp(&b.0));
             }
+            lines.push(line.clone());
             chart.draw_series(LineSeries::new(line, style.stroke_width(2))).map_err(told)?;
         }
         // Quartiles of times, where they are wider than the mark.
@@ -146,6 +156,8 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
     }
     let area = chart.plotting_area();
     let mut taken: Vec<[i32; 4]> = Vec::new();
+    let pixels = |line: &[(f64, f64)]| line.iter().map(|at| area.map_coordinate(at)).collect::<Vec<_>>();
+    lines.iter().for_each(|line| taken.extend(along(&pixels(line))));
     for (color, _, at) in &points {
         let (x, y) = area.map_coordinate(&onto(*at));
         taken.push([x - MARK, y - MARK, x + MARK, y + MARK]);
@@ -160,6 +172,19 @@ fn draw(root: &Area<'_>, study: &Study, plot: &Plot, size: PlotSize) -> Result<(
         root.draw(&Text::new(point.label.clone(), label.start, style)).map_err(told)?;
     }
     Ok(())
+}
+
+/// Small boxes along a line of pixels.
+fn along(line: &[(i32, i32)]) -> Vec<[i32; 4]> {
+    let mut boxes = Vec::new();
+    for ((x, y), (to_x, to_y)) in line.iter().zip(line.iter().skip(1)) {
+        let steps = (to_x - x).abs().max((to_y - y).abs()) / 4 + 1;
+        boxes.extend((0..=steps).map(|step| {
+            let [x, y] = [x + (to_x - x) * step / steps, y + (to_y - y) * step / steps];
+            [x - 1, y - 1, x + 1, y + 1]
+        }));
+    }
+    boxes
 }
 
 /// A number across with the quartiles of its time.
@@ -203,12 +228,14 @@ impl Label {
         let long = (text.chars().count() as f64 * 0.56 * f64::from(FONT)).ceil() as i32;
         let high = FONT as i32;
         let starts = [
+            (x + MARK + 2, y - high + 1),
             (x + MARK + 4, y),
-            (x + MARK + 2, y - high + 2),
-            (x + MARK + 2, y + high - 2),
+            (x - long - 2, y + high - 1),
             (x - MARK - 4 - long, y),
-            (x - long / 2, y - high),
-            (x - long / 2, y + high),
+            (x - long - 2, y - high + 1),
+            (x + MARK + 2, y + high - 1),
+            (x - long / 2, y - high - 2),
+            (x - long / 2, y + high + 2),
         ];
         let fits = |extent: &[i32; 4]| {
             let inside = extent[0] > 66

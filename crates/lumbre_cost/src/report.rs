@@ -144,6 +144,8 @@ pub struct Plot {
     pub joined: bool,
     /// Those points are marked that no other one beats in both quantities.
     pub front: bool,
+    /// A line marks where both quantities are equal.
+    pub equal: bool,
 }
 
 /// What an axis measures.

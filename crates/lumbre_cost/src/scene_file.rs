@@ -47,7 +47,7 @@ impl SceneFile {
             .map_err(|source| CostError::File { path: folder.clone(), source })?;
         let path = folder.join(name).with_extension("glb");
         save(&mut world, &path)?;
-        Ok(Self { name: name.to_owned(), path, in_commands: format!("scenes/{name}.glb") })
+        Ok(Self { name: name.replace('-', " "), path, in_commands: format!("scenes/{name}.glb") })
     }
 
     /// Reads it. A scene without a camera gets one that sees everything, and one that would be black a light at the camera, as

@@ -100,17 +100,20 @@ fn color_differences(reference: &Picture, test: &Picture, pixels_per_degree: f64
 fn filtered(picture: &Picture, pixels_per_degree: f64) -> Vec<DVec3> {
     let widest = SENSITIVITY.iter().flat_map(|s| [s[1], s[3]]).fold(0.0, f64::max);
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i64;
-    let gaussians = |s: [f64; 4], squared: f64| {
-        let one = |weight: f64, width: f64| weight * (PI / width).sqrt() * (-PI * PI * squared / width).exp();
-        one(s[0], s[1]) + one(s[2], s[3])
-    };
-    let kernel = kernel(radius, |x, y| {
-        let squared = (x * x + y * y) / (pixels_per_degree * pixels_per_degree);
-        DVec3::from(SENSITIVITY.map(|s| gaussians(s, squared)))
-    });
-    let sum: DVec3 = kernel.iter().sum();
     let opponents: Vec<_> = picture.pixels.iter().map(|color| opponent(linear(*color))).collect();
-    let seen = convolved(&opponents, picture.width, radius, &kernel);
+    let (mut seen, mut sum) = (vec![DVec3::ZERO; opponents.len()], DVec3::ZERO);
+    // Each of the two Gaussians by itself is a product of one along rows and one along columns.
+    for gaussian in [0, 2] {
+        let along = kernel(radius, |x| {
+            DVec3::from(SENSITIVITY.map(|s| (-(PI * x / pixels_per_degree).powi(2) / s[gaussian + 1]).exp()))
+        });
+        let height = DVec3::from(SENSITIVITY.map(|s| s[gaussian] * (PI / s[gaussian + 1]).sqrt()));
+        let down: Vec<DVec3> = along.iter().map(|weight| height * *weight).collect();
+        let total: DVec3 = along.iter().sum();
+        sum += height * total * total;
+        let part = convolved(&opponents, picture.width, &along, &down);
+        seen.iter_mut().zip(part).for_each(|(seen, part)| *seen += part);
+    }
     let clamped = |color: DVec3| from_opponent(color / sum).clamp(DVec3::ZERO, DVec3::ONE);
     seen.into_iter().map(|color| hunt_lab(clamped(color))).collect()
 }
@@ -133,46 +136,48 @@ fn features(picture: &Picture, pixels_per_degree: f64) -> Vec<[f64; 2]> {
         .iter()
         .map(|color| DVec3::splat((opponent(linear(*color)).x + 16.0) / 116.0))
         .collect();
-    let along = |turned: bool, point: bool| {
-        let mut weights = kernel(radius, |x, y| {
-            let bell = (-(x * x + y * y) / (2.0 * deviation * deviation)).exp();
-            let along = if turned { y } else { x };
-            let weight = if point { (along / deviation).powi(2) - 1.0 } else { -along };
-            DVec3::splat(weight * bell)
-        });
-        // What is positive sums to 1, what is negative to -1.
-        let sums = [1.0, -1.0].map(|sign| weights.iter().map(|w| (sign * w.x).max(0.0)).sum::<f64>());
-        weights.iter_mut().for_each(|w| *w /= if w.x > 0.0 { sums[0] } else { sums[1] });
-        convolved(&lightness, picture.width, radius, &weights)
-    };
-    let [edge_x, edge_y] = [false, true].map(|turned| along(turned, false));
-    let [point_x, point_y] = [false, true].map(|turned| along(turned, true));
-    let strength = |i: usize| [edge_x[i].x.hypot(edge_y[i].x), point_x[i].x.hypot(point_y[i].x)];
-    (0..lightness.len()).map(strength).collect()
+    let bell = |x: f64| (-x * x / (2.0 * deviation * deviation)).exp();
+    let beside = kernel(radius, |x| DVec3::splat(bell(x)));
+    let total: DVec3 = beside.iter().sum();
+    // Edges in the first channel, points in the second.
+    let mut along =
+        kernel(radius, |x| DVec3::new(-x, (x / deviation).powi(2) - 1.0, 0.0) * DVec3::splat(bell(x)));
+    // What is positive sums to 1, what is negative to -1.
+    let [above, below] = [1.0, -1.0]
+        .map(|sign| along.iter().map(|weight| (sign * *weight).max(DVec3::ZERO)).sum::<DVec3>() * total);
+    for weight in &mut along {
+        let scaled = |channel: usize| {
+            let size = if weight[channel] > 0.0 { above[channel] } else { below[channel] };
+            if size > 0.0 { weight[channel] / size } else { 0.0 }
+        };
+        *weight = DVec3::new(scaled(0), scaled(1), 0.0);
+    }
+    let across = convolved(&lightness, picture.width, &along, &beside);
+    let down = convolved(&lightness, picture.width, &beside, &along);
+    across.iter().zip(&down).map(|(a, b)| [a.x.hypot(b.x), a.y.hypot(b.y)]).collect()
 }
 
-fn kernel(radius: i64, weight: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
-    let side = -radius..=radius;
-    side.clone()
-        .flat_map(|y| side.clone().map(move |x| (x, y)))
-        .map(|(x, y)| weight(x as f64, y as f64))
-        .collect()
+/// The weights from -radius to radius.
+fn kernel(radius: i64, weight: impl Fn(f64) -> DVec3) -> Vec<DVec3> {
+    (-radius..=radius).map(|x| weight(x as f64)).collect()
 }
 
-/// Channel by channel; what is beyond the border is as the border.
-fn convolved(pixels: &[DVec3], width: usize, radius: i64, kernel: &[DVec3]) -> Vec<DVec3> {
+/// Channel by channel, with weights that are those along a row times those along a column; what is beyond the border is as the border.
+fn convolved(pixels: &[DVec3], width: usize, across: &[DVec3], down: &[DVec3]) -> Vec<DVec3> {
     let height = pixels.len() / width.max(1);
-    let at = |x: i64, y: i64| {
-        let (x, y) = (x.clamp(0, width as i64 - 1), y.clamp(0, height as i64 - 1));
-        pixels[y as usize * width + x as usize]
+    let near = |at: usize, step: usize, weights: &[DVec3], end: usize| {
+        (at + step).saturating_sub(weights.len() / 2).min(end - 1)
     };
-    let pixel = |index: usize| {
-        let (x, y) = ((index % width) as i64, (index / width) as i64);
-        let rows = kernel.chunks_exact(2 * radius as usize + 1).zip(-radius..);
-        rows.flat_map(|(row, dy)| {
-            row.iter().zip(-radius..).map(move |(weight, dx)| *weight * at(x + dx, y + dy))
-        })
-        .sum()
+    let in_rows = |index: usize| {
+        let (x, row) = (index % width, &pixels[index / width * width..][..width]);
+        let at = |step: usize| row[near(x, step, across, width)];
+        across.iter().enumerate().map(|(step, weight)| *weight * at(step)).sum()
     };
-    (0..pixels.len()).into_par_iter().map(pixel).collect()
+    let rows: Vec<DVec3> = (0..pixels.len()).into_par_iter().map(in_rows).collect();
+    let in_columns = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let at = |step: usize| rows[near(y, step, down, height) * width + x];
+        down.iter().enumerate().map(|(step, weight)| *weight * at(step)).sum()
+    };
+    (0..pixels.len()).into_par_iter().map(in_columns).collect()
 }

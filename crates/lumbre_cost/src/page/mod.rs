@@ -110,6 +110,9 @@ fn plot_figure(study: &Study, plot: &Plot) -> Result<Markup, CostError> {
                 @if plot.front {
                     li { span class="front" {} "not beaten in both" }
                 }
+                @if plot.equal {
+                    li { span class="front" {} "equal" }
+                }
             }
         }
     })

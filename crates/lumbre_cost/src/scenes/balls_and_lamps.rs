@@ -23,7 +23,7 @@ pub struct BallsAndLamps {
 /// Half the side of the floor, in metres.
 const HALF_SIDE: f64 = 18.0;
 /// Radiance that a lamp's strongest channel gives a white surface that faces it from a metre.
-const STRENGTH: f32 = 0.5;
+const STRENGTH: f32 = 1.0;
 
 /// A floor, 64 balls, lamps at random places just above the floor, and a camera that sees most of them.
 pub fn balls_and_lamps(asked: BallsAndLamps) -> World {

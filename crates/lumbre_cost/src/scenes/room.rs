@@ -28,8 +28,8 @@ pub enum Air {
 /// shine all the same.
 pub fn room(air: Air) -> World {
     let mut world = World::new();
-    let fog = Fog { mode: FogMode::Exponential { density: 0.015 }, color: Vec3::new(0.25, 0.28, 0.32) };
-    let hazy = SceneSettings { ambient: Vec3::splat(0.02), fog: Some(fog), ..SceneSettings::default() };
+    let fog = Fog { mode: FogMode::Exponential { density: 0.02 }, color: Vec3::new(0.4, 0.45, 0.5) };
+    let hazy = SceneSettings { ambient: Vec3::splat(0.06), fog: Some(fog), ..SceneSettings::default() };
     world.insert_resource(if air == Air::Hazy { hazy } else { SceneSettings::default() });
     walls(&mut world);
     furniture(&mut world);
@@ -125,28 +125,28 @@ fn furniture(world: &mut World) {
 
 fn lights(world: &mut World) {
     let panel = Material {
-        front: Surface { emission: Vec3::new(2.4, 2.3, 2.1), ..Surface::default() },
+        front: Surface { emission: Vec3::new(7.5, 7.2, 6.6), ..Surface::default() },
         ..Material::matt(Vec3::ZERO)
     };
     let down = Transform::from_xyz(-0.8, SIZE.y - 0.02, 0.2)
         .with_rotation(DQuat::from_rotation_x(std::f64::consts::PI));
     let panel = fixed(world, "panel", shapes::plane(1.2, 0.8, 1, 1), panel, down);
     world.entity_mut(panel).insert(EmissiveLight);
-    let lamp = Light { bake: BakeMode::Static, radius: 0.05, ..Light::point(Vec3::new(0.5, 0.42, 0.3)) };
+    let lamp = Light { bake: BakeMode::Static, radius: 0.05, ..Light::point(Vec3::new(1.3, 1.1, 0.8)) };
     world.spawn((Name::new("lamp"), lamp, Transform::from_xyz(1.4, 2.2, 0.6)));
     let moving = |color: Vec3| Light::point(color).with_range(3.0);
     world.spawn((
         Name::new("red lamp"),
-        moving(Vec3::new(0.35, 0.05, 0.05)),
+        moving(Vec3::new(0.8, 0.1, 0.1)),
         Transform::from_xyz(-1.9, 0.8, 0.6),
     ));
     world.spawn((
         Name::new("blue lamp"),
-        moving(Vec3::new(0.05, 0.1, 0.35)),
+        moving(Vec3::new(0.1, 0.2, 0.8)),
         Transform::from_xyz(1.2, 0.6, 0.4),
     ));
     let torch =
-        Light { shadow: true, ..Light::spot(Vec3::splat(1.6), SpotCone::Smooth { inner: 0.3, outer: 0.5 }) };
+        Light { shadow: true, ..Light::spot(Vec3::splat(3.0), SpotCone::Smooth { inner: 0.3, outer: 0.5 }) };
     let aimed = Transform::from_xyz(0.3, 2.5, 1.7).looking_at(DVec3::new(0.4, 0.2, -0.8), DVec3::Y);
     world.spawn((Name::new("torch"), torch, aimed));
 }

@@ -148,7 +148,7 @@ fn findings(
         .collect();
     if !told.is_empty() {
         findings.push(format!(
-            "The frame of {scene} takes {}; {}.",
+            "The frame of the {scene} takes {}; {}.",
             crate::findings::milliseconds(&time),
             told.join("; ")
         ));
@@ -160,7 +160,7 @@ fn findings(
         .collect();
     if !open.is_empty() {
         findings.push(format!(
-            "In {scene} the times do not tell whether {} anything.",
+            "In the {scene} the times do not tell whether {} anything.",
             listed_with(&open, "costs", "cost", "or")
         ));
     }
@@ -169,13 +169,13 @@ fn findings(
     if let Some((effect, ..)) = costly.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))
         && costly.len() > 1
     {
-        findings.push(format!("What saves the most for what is lost in {scene}: to leave out {effect}."));
+        findings.push(format!("What saves the most for what is lost in the {scene}: to leave out {effect}."));
     }
     let unseen: Vec<&str> =
         known.iter().filter(|(.., error)| *error == 0.0).map(|(effect, ..)| *effect).collect();
     if !unseen.is_empty() {
         findings.push(format!(
-            "The picture of {scene} is the same to the bit without {}.",
+            "The picture of the {scene} is the same to the bit without {}.",
             listed(&unseen, "or without")
         ));
     }

@@ -2,7 +2,7 @@
 
 use lumbre_render::{FrameOptions, LightLists};
 
-use crate::findings::{cheapest_by_error, is_above_one, listed, percent, ratio_of, rounded};
+use crate::findings::{cheapest_by_error, is_above_one, listed, percent, ratio_of, rounded, short};
 use crate::frames::{DrawnFrame, Frame, draw_frames};
 use crate::fronts::pareto_front;
 use crate::measured::Measured;
@@ -19,7 +19,7 @@ const LISTS: [(LightLists, &str); 3] = [
 const MANY: &[u32] = &[1, 4, 16, 64, 256, 1024];
 const FEW: &[u32] = &[1, 16, 128];
 /// Where the lamps of the first part end: the part of white that they bring there.
-const USUAL: f32 = 0.05;
+const USUAL: f32 = 0.1;
 const THRESHOLDS: &[f32] = &[0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
 const FEW_THRESHOLDS: &[f32] = &[0.1, 0.02, 0.005];
 /// With more lamps to draw a frame takes longer than to compile its shaders.
@@ -69,6 +69,7 @@ fn study() -> Study {
                 series: vec![ENDING.into()],
                 joined: true,
                 front: true,
+                ..Plot::default()
             },
         ],
         ..Study::default()
@@ -209,7 +210,7 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
     let before = measured.study.points.len();
     for (threshold, frame) in thresholds.iter().zip(ending) {
         let share = 100.0 * f64::from(*threshold);
-        let mut ended = Point { label: format!("at {} %", rounded(share)), ..point(frame, ENDING, lamps) };
+        let mut ended = Point { label: format!("at {} %", short(share)), ..point(frame, ENDING, lamps) };
         ended.parameters.insert(THRESHOLD.into(), share);
         measured.add_picture(ended, frame.picture.clone(), &reference, ErrorOver::Picture)?;
     }
@@ -275,7 +276,7 @@ fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), 
             })
             .collect();
         let even: Vec<&Point> = even.iter().collect();
-        measured.study.findings.extend(cheapest_by_error(&even, &format!("of error in {}", scene.name)));
+        measured.study.findings.extend(cheapest_by_error(&even, &format!(" in {}", scene.name)));
     }
     Ok(())
 }

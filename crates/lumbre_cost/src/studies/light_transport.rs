@@ -84,7 +84,7 @@ fn of_scene(
         samples: Some(samples),
         ..TraceOptions::default()
     };
-    let most = conditions.unless_quick(512, 96);
+    let most = conditions.unless_quick(320, 96);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
     // The report states it of the mean; errors are of the root mean square.
     let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
@@ -101,8 +101,8 @@ fn of_scene(
     )?;
     let light = |shadows, multisample| FrameOptions { shadows, multisample, ..FrameOptions::default() };
     let steps = [
-        ("lamps", light(false, false), " --no-shadows"),
-        ("and shadows", light(true, false), ""),
+        ("lamps alone", light(false, false), " --no-shadows"),
+        ("with shadows", light(true, false), ""),
         ("and four samples", light(true, true), " --msaa"),
     ];
     let mut frames = Vec::new();
@@ -233,6 +233,6 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             percent(open)
         ));
     }
-    findings.extend(cheapest_by_error(points, "of error"));
+    findings.extend(cheapest_by_error(points, ""));
     findings
 }

@@ -11,7 +11,7 @@ use lumbre_scene::{
 };
 
 use crate::baked::{Baked, bake_options, bake_scene};
-use crate::findings::{listed, percent, rounded};
+use crate::findings::{listed, percent, rounded, short};
 use crate::frames::{Frame, draw_frames};
 use crate::fronts::pareto_front;
 use crate::measured::Measured;
@@ -20,32 +20,26 @@ use crate::scenes::{Air, room};
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Texels of the reference; each density below has a quarter of the texels of the one before.
-const TEXELS: f64 = 64_000.0;
-const FEW_TEXELS: f64 = 16_000.0;
+const TEXELS: f64 = 40_000.0;
+const FEW_TEXELS: f64 = 6_000.0;
 const DENSITY: &str = "texels along a metre";
-const BYTES: &str = "bytes of the textures";
+const BYTES: &str = "bytes of textures in that format";
 const BAKE: &str = "baked before, ms";
 const SECONDS: f64 = 8.0;
 
 /// How texels are kept on the GPU, and in which file.
 #[derive(Clone, Copy)]
 enum Format {
-    Floats,
     Halves,
     Packed(PackedFormat),
 }
 
 impl Format {
-    const ALL: [Self; 4] = [
-        Self::Floats,
-        Self::Halves,
-        Self::Packed(PackedFormat::Rgb9E5),
-        Self::Packed(PackedFormat::B10G11R11),
-    ];
+    const ALL: [Self; 3] =
+        [Self::Halves, Self::Packed(PackedFormat::Rgb9E5), Self::Packed(PackedFormat::B10G11R11)];
 
     fn name(self) -> &'static str {
         match self {
-            Self::Floats => "32-bit floats",
             Self::Halves => "half floats",
             Self::Packed(PackedFormat::Rgb9E5) => "RGB9E5",
             Self::Packed(PackedFormat::B10G11R11) => "B10G11R11",
@@ -55,19 +49,14 @@ impl Format {
     /// Bytes of a texel on the GPU.
     fn bytes(self) -> f64 {
         match self {
-            Self::Floats => 16.0,
             Self::Halves => 8.0,
             Self::Packed(_) => 4.0,
         }
     }
 
-    /// The map as it is after it was kept so, and the bytes of its file. The two formats that frames do not read as they are come as floats of the same value.
+    /// The map as it is after it was kept so, and the bytes of its file. Frames hold all maps as half floats, which have every value of the packed formats.
     fn kept(self, map: &LightmapImage) -> Result<(LightmapImage, usize), CostError> {
         Ok(match self {
-            Self::Floats => {
-                let encoding = LightmapEncoding::Rgb32Float;
-                (LightmapImage { encoding, ..map.clone() }, lightmap_to_open_exr(map, encoding)?.0.len())
-            }
             Self::Halves => {
                 let encoding = LightmapEncoding::Rgb16Float;
                 (LightmapImage { encoding, ..map.clone() }, lightmap_to_open_exr(map, encoding)?.0.len())
@@ -77,11 +66,7 @@ impl Format {
                 let through =
                     |texel: &glam::Vec3| format.encode(*texel).map_or(*texel, |bits| format.decode(bits));
                 let texels = map.texels.iter().map(through).collect();
-                let encoding = match format {
-                    PackedFormat::Rgb9E5 => LightmapEncoding::Rgb9E5,
-                    PackedFormat::B10G11R11 => LightmapEncoding::Rgb32Float,
-                };
-                (LightmapImage { texels, encoding, ..map.clone() }, file.len())
+                (LightmapImage { texels, ..map.clone() }, file.len())
             }
         })
     }
@@ -110,7 +95,7 @@ fn study() -> Study {
         name: "lightmaps".into(),
         title: "Density and format of lightmaps".into(),
         question: "How many texels along a metre, and how many bytes for each: what does a frame lose, and what does it cost?".into(),
-        reference: "the frame with the densest maps, in 32-bit floats".into(),
+        reference: "the frame with the densest maps, in half floats".into(),
         plots: vec![Plot {
             title: "Error against bytes".into(),
             across: Quantity::Count(BYTES.into()),
@@ -219,11 +204,10 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
     let ktx2 = match format {
         Format::Packed(format) => format!(" --ktx2 {}", format.name()),
         Format::Halves => " --exr half".to_owned(),
-        Format::Floats => String::new(),
     };
     Point {
         series,
-        label: format!("{} a metre", rounded(maps.density)),
+        label: format!("{} a metre", short(maps.density)),
         parameters: [(DENSITY.to_owned(), maps.density)].into(),
         counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
         figures: [(BAKE.to_owned(), 1e3 * maps.baked.report.seconds)].into(),
@@ -252,13 +236,13 @@ fn finding(scene: &str, points: &[Point]) -> Vec<String> {
         let formats: Vec<String> = same_density
             .iter()
             .filter_map(|point| {
-                Some(format!("{} loses {}", point.series, percent(point.error?.relative_rmse)))
+                Some(format!("{} lose {}", point.series, percent(point.error?.relative_rmse)))
             })
             .collect();
         let formats: Vec<&str> = formats.iter().map(String::as_str).collect();
         let less = if errors(&same_density) < next { "less than" } else { "not less than" };
         findings.push(format!(
-            "In {scene} {}: {less} half the density, which loses {}.",
+            "In the {scene} {}: {less} half the density, which loses {}.",
             listed(&formats, "and"),
             percent(next)
         ));
@@ -286,14 +270,14 @@ fn finding(scene: &str, points: &[Point]) -> Vec<String> {
         })
         .collect();
     let front: Vec<&str> = front.iter().map(String::as_str).collect();
-    findings.push(format!("The least bytes for their error in {scene}: {}.", listed(&front, "and")));
+    findings.push(format!("The least bytes for their error in the {scene}: {}.", listed(&front, "and")));
     let told_apart = others.iter().any(|point| match (point.milliseconds, reference.milliseconds) {
         (Some(time), Some(whole)) => time.is_below(&whole) || whole.is_below(&time),
         _ => false,
     });
     if !told_apart {
         findings.push(format!(
-            "The frames of {scene} take the same time with all of them, as far as the times tell."
+            "The frames of the {scene} take the same time with all of them, as far as the times tell."
         ));
     }
     findings

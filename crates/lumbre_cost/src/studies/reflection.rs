@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use lumbre_optics::{ReflectionModel, Surface, SurfaceSample, specular_reflection};
 use lumbre_render::FrameOptions;
 
-use crate::findings::{is_above_one, percent, ratio_of, rounded};
+use crate::findings::{is_above_one, percent, rounded};
 use crate::frames::{DrawnFrame, Frame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
@@ -148,11 +148,8 @@ fn findings(study: &Study, drawn: &[DrawnFrame]) -> Vec<String> {
     let mut nearest: Option<(&str, f64)> = None;
     for (place, &model) in models.iter().enumerate().skip(1) {
         // Over all exponents: pairs of the same rounds.
-        let ratios: Vec<f64> = drawn
-            .chunks(models.len())
-            .filter_map(|of_exponent| ratio_of(&of_exponent[place].times, &of_exponent[0].times))
-            .flat_map(|ratio| [ratio.lower, ratio.median, ratio.upper])
-            .collect();
+        let pairs = drawn.chunks(models.len()).flat_map(|all| all[place].times.iter().zip(&all[0].times));
+        let ratios: Vec<f64> = pairs.map(|(time, of_phong)| time / of_phong.max(1e-9)).collect();
         if let Some(ratio) = Spread::of(&ratios) {
             let range = format!("{} to {}", rounded(ratio.lower), rounded(ratio.upper));
             costs.push(match is_above_one(&ratio) {

@@ -174,7 +174,7 @@ fn findings(study: &Study, drawn: &[DrawnFrame], whole: bool) -> Vec<String> {
         }
         return findings;
     }
-    findings.extend(cheapest_by_error(&points, "of error"));
+    findings.extend(cheapest_by_error(&points, ""));
     // Where the two are most alike in error: the finest mesh.
     if let Some((three, times)) = study.points.chunks(3).zip(drawn.chunks(3)).next_back() {
         findings.extend(of_one_mesh(three, times));

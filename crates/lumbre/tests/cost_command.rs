@@ -1,0 +1,120 @@
+//! `lumbre cost` as its users meet it.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use lumbre::cost::{CostReport, read_report};
+
+fn lumbre(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lumbre")).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn a_small_report_and_what_changed_since() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report");
+    let asked = ["cost", "-o", text(&report), "--quick", "--study", "reflection", "--size", "24x16"];
+    let output = lumbre(&asked);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stdout(&output).contains("Reflection models beside Phong's (10 points"), "{}", stdout(&output));
+    assert!(stdout(&output).trim_end().ends_with("index.html"), "{}", stdout(&output));
+    assert!(stderr(&output).contains("lumbre: reflection: "), "{}", stderr(&output));
+    let found = read_report(&report).unwrap();
+    assert_eq!((found.settings.size, found.settings.quick), ((24, 16), true));
+    assert!(found.machine.threads > 0 && !found.machine.adapter.is_empty());
+    for name in ["index.html", "cost.csv", "cost.json", "scenes/ball-exponent-8.glb"] {
+        assert!(report.join(name).exists(), "{name} is missing");
+    }
+    // A point's command makes its picture again.
+    let point = &found.studies[0].points[1];
+    let mut words: Vec<&str> = point.command.split(' ').skip(1).collect();
+    words.iter_mut().filter(|word| **word == "20").for_each(|word| *word = "2");
+    let again =
+        Command::new(env!("CARGO_BIN_EXE_lumbre")).args(&words).current_dir(&report).output().unwrap();
+    assert!(again.status.success(), "{}: {}", point.command, stderr(&again));
+    let kept = format!("{}.exr", point.picture.as_ref().unwrap().picture);
+    let compared = lumbre(&["compare", text(&report.join(kept)), text(&report.join("frame.exr")), "--json"]);
+    let compared: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    assert_eq!(compared["largest"].as_f64(), Some(0.0), "{compared}");
+
+    // Resumed, nothing is measured again.
+    let resumed = lumbre(&[&asked[..], &["--resume"]].concat());
+    assert!(resumed.status.success(), "{}", stderr(&resumed));
+    assert_eq!(read_report(&report).unwrap(), found);
+
+    let json = report.join("cost.json");
+    let same = lumbre(&["cost", "--compare", text(&json), text(&report)]);
+    assert!(same.status.success(), "{}", stderr(&same));
+    assert!(stdout(&same).contains("0 counts, errors or points are worse"), "{}", stdout(&same));
+    let planted = |name: &str, plant: &dyn Fn(&mut CostReport)| {
+        let mut report = found.clone();
+        plant(&mut report);
+        let path = folder.path().join(name);
+        std::fs::write(&path, serde_json::to_string(&report).unwrap()).unwrap();
+        path
+    };
+    let counted = planted("counted.json", &|report| {
+        *report.studies[0].points[2].counts.get_mut("fragment invocations").unwrap() *= 1.5;
+    });
+    let worse = lumbre(&["cost", "--compare", text(&json), text(&counted)]);
+    assert_eq!(worse.status.code(), Some(1), "{}", stdout(&worse));
+    assert!(stdout(&worse).contains("fragment invocations"), "{}", stdout(&worse));
+    let better = lumbre(&["cost", "--compare", text(&counted), text(&json)]);
+    assert!(better.status.success(), "{}", stdout(&better));
+    let within = lumbre(&["cost", "--compare", text(&json), text(&counted), "--factor", "2"]);
+    assert!(within.status.success(), "{}", stdout(&within));
+    // Times alone are told, and fail only where that is asked for.
+    let slower = planted("slower.json", &|report| {
+        let time = report.studies[0].points[0].milliseconds.as_mut().unwrap();
+        (time.lower, time.median, time.upper) = (9.0 * time.upper, 10.0 * time.upper, 11.0 * time.upper);
+    });
+    let told = lumbre(&["cost", "--compare", text(&json), text(&slower)]);
+    assert!(told.status.success() && stdout(&told).contains("and 1 times"), "{}", stdout(&told));
+    let failed = lumbre(&["cost", "--compare", text(&json), text(&slower), "--times"]);
+    assert_eq!(failed.status.code(), Some(1), "{}", stdout(&failed));
+}
+
+#[test]
+fn bad_arguments_are_refused_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(folder.path()).to_owned();
+    let garbage = folder.path().join("garbage.json");
+    std::fs::write(&garbage, "{\"studies\": 3}").unwrap();
+    let cases: &[(&[&str], i32, &str)] = &[
+        (&["cost"], 2, "--output"),
+        (
+            &["cost", "-o", &out, "--study", "shadnig"],
+            1,
+            "there is no study `shadnig`; there are: shading, lamps",
+        ),
+        (&["cost", "-o", &out, "--size", "4x4"], 2, "each from 8 to 4096"),
+        (&["cost", "-o", &out, "--size", "9000x10"], 2, "each from 8 to 4096"),
+        (&["cost", "-o", &out, "--factor", "2"], 2, "cannot be used with"),
+        (&["cost", "-o", &out, "--times"], 2, "cannot be used with"),
+        (&["cost", "--compare", "a.json"], 2, "2 values"),
+        (&["cost", "--compare", "a.json", "b.json", "--quick"], 2, "--quick"),
+        (&["cost", "--compare", "a.json", "b.json", "--factor", "0.5"], 2, "at least 1"),
+        (&["cost", "--compare", "a.json", "b.json"], 1, "a.json"),
+        (&["cost", "--compare", text(&garbage), text(&garbage)], 1, "is no report of lumbre cost"),
+        (&["cost", "missing.glb", "-o", &out, "--study", "shading"], 1, "missing.glb"),
+    ];
+    for (arguments, status, words) in cases {
+        let output = lumbre(arguments);
+        assert_eq!(output.status.code(), Some(*status), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{arguments:?}: {}", stderr(&output));
+    }
+}

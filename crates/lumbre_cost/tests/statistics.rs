@@ -1,0 +1,178 @@
+//! Fronts, stretches and sentences on points whose answer is known, and two reports with a planted difference.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
+use lumbre_cost::{
+    CostReport, ErrorOf, Point, Spread, Study, What, cheapest_by_error, compare_reports, pareto_front,
+    stretches,
+};
+
+/// A point of a series: an error as a share, and milliseconds with quartiles so far to either side.
+fn point(series: &str, label: &str, error: f64, ms: f64, beside: f64) -> Point {
+    Point {
+        series: series.into(),
+        label: label.into(),
+        milliseconds: Some(Spread { lower: ms - beside, median: ms, upper: ms + beside, rounds: 9 }),
+        error: Some(ErrorOf { relative_rmse: error, ..ErrorOf::default() }),
+        counts: [("rays".to_owned(), 1000.0)].into(),
+        ..Point::default()
+    }
+}
+
+/// Two curves that cross between an error of 4 % and one of 2 %: "quick" costs 1 + 1/e, "fine" 20 + 0.1/e, in per cent.
+fn crossing(beside: f64) -> Vec<Point> {
+    let errors = [16.0, 8.0, 4.0, 2.0, 1.0];
+    let mut points = Vec::new();
+    for error in errors {
+        let label = format!("{error} %");
+        points.push(point("quick", &label, error / 100.0, 1.0 + 80.0 / error, beside));
+        points.push(point("fine", &label, error / 100.0, 28.0 + 8.0 / error, beside));
+    }
+    points
+}
+
+#[test]
+fn a_crossing_at_a_known_place_is_found() {
+    let points = crossing(0.1);
+    let found: Vec<&Point> = points.iter().collect();
+    let found = stretches(&found);
+    // 4 %: 21 against 30. 2 %: 41 against 32. One percent: 81 against 36.
+    let names: Vec<(f64, f64, Vec<&str>)> = found
+        .iter()
+        .map(|s| (s.from, s.to, s.cheapest.iter().map(|point| point.series.as_str()).collect()))
+        .collect();
+    assert_eq!(names, [(0.01, 0.04, vec!["fine"]), (0.04, f64::INFINITY, vec!["quick"])]);
+    let all: Vec<&Point> = points.iter().collect();
+    let said = cheapest_by_error(&all, "").unwrap();
+    assert!(
+        said.starts_with("Below 4.00 % of error, down to 1.00 %, the cheapest is fine (1 %: 36.0 ± 0.100 ms"),
+        "{said}"
+    );
+    assert!(said.contains("Above 4.00 % the cheapest is quick."), "{said}");
+}
+
+#[test]
+fn curves_that_do_not_cross_have_one_winner() {
+    let mut points = Vec::new();
+    for error in [0.08, 0.04, 0.02] {
+        points.push(point("quick", "a", error, 1.0 / error, 0.1));
+        points.push(point("slow", "a", error, 3.0 / error, 0.1));
+    }
+    let all: Vec<&Point> = points.iter().collect();
+    let found = stretches(&all);
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].from, found[0].to, found[0].cheapest.len()), (0.02, f64::INFINITY, 1));
+    let said = cheapest_by_error(&all, "").unwrap();
+    assert!(said.starts_with("At every error down to 2.00 % the cheapest is quick ("), "{said}");
+    assert!(said.ends_with("Never so: slow."), "{said}");
+}
+
+#[test]
+fn times_within_each_others_quartiles_decide_nothing() {
+    let points = crossing(60.0);
+    let all: Vec<&Point> = points.iter().collect();
+    assert!(stretches(&all).iter().all(|stretch| stretch.cheapest.len() == 2));
+    let said = cheapest_by_error(&all, "").unwrap();
+    assert!(said.contains("the times do not decide between"), "{said}");
+    assert!(!said.contains("cheapest is"), "{said}");
+}
+
+#[test]
+fn one_series_is_compared_with_nothing() {
+    let points = [point("only", "a", 0.1, 1.0, 0.1), point("only", "b", 0.01, 9.0, 0.1)];
+    assert_eq!(cheapest_by_error(&points.iter().collect::<Vec<_>>(), ""), None);
+}
+
+#[test]
+fn the_front_holds_what_is_not_beaten_in_both() {
+    let points = [
+        point("a", "beaten", 0.10, 5.0, 0.1),
+        point("a", "quickest", 0.20, 1.0, 0.1),
+        point("b", "nearest", 0.01, 9.0, 0.1),
+        point("b", "between", 0.05, 4.0, 0.1),
+        point("b", "as near and slower", 0.05, 6.0, 0.1),
+        Point { label: "without a time".into(), milliseconds: None, ..point("b", "", 0.001, 1.0, 0.1) },
+    ];
+    let front: Vec<&str> = pareto_front(&points).iter().map(|point| point.label.as_str()).collect();
+    assert_eq!(front, ["quickest", "between", "nearest"]);
+    // By trying all pairs.
+    for tried in &points {
+        let (Some(time), Some(error)) = (tried.milliseconds, tried.error) else { continue };
+        let beaten = points.iter().any(|other| match (other.milliseconds, other.error) {
+            (Some(t), Some(e)) => {
+                t.median <= time.median
+                    && e.relative_rmse <= error.relative_rmse
+                    && (t.median < time.median || e.relative_rmse < error.relative_rmse)
+            }
+            _ => false,
+        });
+        assert_eq!(front.contains(&tried.label.as_str()), !beaten, "{}", tried.label);
+    }
+}
+
+fn report(points: Vec<Point>) -> CostReport {
+    CostReport {
+        studies: vec![Study { name: "bake".into(), points, ..Study::default() }],
+        ..CostReport::default()
+    }
+}
+
+#[test]
+fn a_planted_slow_down_is_found_and_noise_is_not() {
+    let before = report(vec![point("final", "a", 0.01, 10.0, 1.0), point("final", "b", 0.02, 5.0, 1.0)]);
+    let slower = report(vec![point("final", "a", 0.01, 15.0, 1.0), point("final", "b", 0.02, 5.9, 1.0)]);
+    let changes = compare_reports(&before, &slower, 1.1);
+    assert_eq!(changes.len(), 1, "{changes:?}");
+    assert!(changes[0].is_slower() && !changes[0].is_worse());
+    assert_eq!(
+        changes[0].to_string(),
+        "bake, final, a: 15.0 ± 1.00 ms instead of 10.0 ± 1.00 ms (1.50 times)"
+    );
+    // The other way round it is a change, and no worse one.
+    let back = compare_reports(&slower, &before, 1.1);
+    assert!(back.len() == 1 && !back[0].is_slower() && !back[0].is_worse(), "{back:?}");
+    assert!(compare_reports(&before, &slower, 2.0).is_empty());
+}
+
+#[test]
+fn a_planted_error_and_a_planted_count_are_found() {
+    let before = report(vec![point("final", "a", 0.01, 10.0, 1.0)]);
+    let mut worse = before.clone();
+    worse.studies[0].points[0].error = Some(ErrorOf { relative_rmse: 0.012, ..ErrorOf::default() });
+    worse.studies[0].points[0].counts.insert("rays".into(), 1200.0);
+    let changes = compare_reports(&before, &worse, 1.1);
+    assert_eq!(changes.len(), 2, "{changes:?}");
+    assert!(changes.iter().all(|change| change.is_worse()));
+    assert!(changes.iter().any(|change| matches!(change.what, What::Error { .. })));
+    assert!(compare_reports(&before, &worse, 1.3).is_empty());
+    assert!(compare_reports(&worse, &before, 1.1).iter().all(|change| !change.is_worse()));
+    // What the references leave open is no change.
+    for report in [&mut worse] {
+        let point = &mut report.studies[0].points[0];
+        point.error = Some(ErrorOf { relative_rmse: 0.012, uncertainty: 0.01, ..ErrorOf::default() });
+    }
+    let open = compare_reports(&before, &worse, 1.1);
+    assert!(open.iter().all(|change| !matches!(change.what, What::Error { .. })), "{open:?}");
+}
+
+#[test]
+fn what_is_gone_is_worse_and_what_is_new_is_not() {
+    let both = report(vec![point("final", "a", 0.01, 10.0, 1.0), point("final", "b", 0.02, 5.0, 1.0)]);
+    let one = report(vec![point("final", "a", 0.01, 10.0, 1.0)]);
+    let gone = compare_reports(&both, &one, 1.1);
+    assert!(gone.len() == 1 && gone[0].is_worse(), "{gone:?}");
+    let new = compare_reports(&one, &both, 1.1);
+    assert!(new.len() == 1 && !new[0].is_worse(), "{new:?}");
+    assert!(compare_reports(&one, &CostReport::default(), 1.1)[0].is_worse());
+}
+
+#[test]
+fn a_count_that_comes_from_nothing_or_goes_is_seen() {
+    let mut before = report(vec![point("final", "a", 0.01, 10.0, 1.0)]);
+    let after = before.clone();
+    before.studies[0].points[0].counts.insert("rays".into(), 0.0);
+    assert!(compare_reports(&before, &after, 1.1)[0].is_worse());
+    let mut without = after.clone();
+    without.studies[0].points[0].counts.clear();
+    assert!(!compare_reports(&after, &without, 1.1).is_empty());
+}

@@ -1,0 +1,202 @@
+//! Studies from end to end on scenes whose answer is known, the pictures that a report keeps, and what becomes of a report that is interrupted.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_cost::{
+    CostError, CostOptions, CostReport, ErrorOver, PAGE, Picture, Point, TABLE, measure, read_picture,
+    read_report, studies_named,
+};
+use lumbre_mesh::{TriangleMesh, shapes};
+use lumbre_optics::{Light, Material, Surface};
+use lumbre_render::Gpu;
+use lumbre_scene::{Camera, Mesh, Name, StaticObject, Transform, save};
+
+fn options(studies: &[&str], files: Vec<PathBuf>) -> CostOptions {
+    let names: Vec<String> = studies.iter().map(|name| (*name).to_owned()).collect();
+    CostOptions {
+        files,
+        studies: studies_named(&names).unwrap(),
+        quick: true,
+        size: (48, 32),
+        seed: 1,
+        resume: false,
+    }
+}
+
+fn measured(options: &CostOptions, folder: &Path) -> CostReport {
+    let gpu = Gpu::headless().expect("a Vulkan driver; the software one will do");
+    measure(&gpu, options, folder, &|_| ControlFlow::Continue(())).unwrap()
+}
+
+fn saved(folder: &Path, name: &str, mut world: World) -> PathBuf {
+    let path = folder.join(name);
+    save(&mut world, &path).unwrap();
+    path
+}
+
+fn point<'a>(report: &'a CostReport, study: &str, series: &'a str) -> &'a Point {
+    report.study(study).unwrap().of_series(series).next().unwrap()
+}
+
+#[test]
+fn gouraud_is_phong_on_a_matt_plane_under_a_distant_light() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new();
+    let plane = Mesh(Arc::new(shapes::plane(40.0, 40.0, 2, 2)));
+    world.spawn((Name::new("plane"), plane, Material::matt(Vec3::new(0.7, 0.5, 0.3))));
+    let above = Transform::from_xyz(1.0, 2.0, 0.5).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("sun"), Light::directional(Vec3::ONE), above));
+    let eye = Transform::from_xyz(0.0, 6.0, 2.0).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("eye"), Camera::default(), eye));
+    let path = saved(folder.path(), "plane.glb", world);
+    let report = measured(&options(&["shading"], vec![path]), &folder.path().join("report"));
+    for series in ["flat", "Gouraud", "Phong"] {
+        let error = point(&report, "shading", series).error.unwrap();
+        // f32's unit in the last place is 6e-8, and a cosine takes a handful of roundings.
+        assert!(error.relative_rmse < 1e-6, "{series}: {error:?}");
+        assert!(error.flip.unwrap() < 1e-3, "{series}: {error:?}");
+    }
+    let phong = point(&report, "shading", "Phong");
+    let time = phong.milliseconds.unwrap();
+    assert!(time.rounds >= 3 && time.lower <= time.median && time.median <= time.upper, "{time:?}");
+    assert!(phong.counts["fragment invocations"] >= 48.0 * 32.0, "{:?}", phong.counts);
+}
+
+/// A closed box whose every side glows with the same radiance and reflects half of what it gets: inside, every direction is as bright.
+fn furnace() -> World {
+    let outward = shapes::cuboid(Vec3::splat(2.0), 1);
+    let turned = |triangle: &[u32; 3]| [triangle[0], triangle[2], triangle[1]];
+    let inward = TriangleMesh {
+        normals: outward.normals.iter().map(|normal| -*normal).collect(),
+        indices: outward.indices.as_chunks::<3>().0.iter().flat_map(turned).collect(),
+        tangents: Vec::new(),
+        ..outward
+    };
+    let front = Surface { diffuse: Vec3::splat(0.5), emission: Vec3::ONE, ..Surface::default() };
+    let mut world = World::new();
+    let material = Material { front, ..Material::default() };
+    world.spawn((Name::new("furnace"), Mesh(Arc::new(inward)), material, StaticObject));
+    world.spawn((Name::new("eye"), Camera::default(), Transform::from_xyz(0.0, 0.0, 0.5)));
+    world
+}
+
+#[test]
+fn a_furnace_is_baked_without_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = saved(folder.path(), "furnace.glb", furnace());
+    let report = measured(&options(&["bake"], vec![path]), &folder.path().join("report"));
+    let study = report.study("bake").unwrap();
+    assert!(study.points.len() >= 5);
+    for point in &study.points {
+        let (error, stated) = (point.error.unwrap(), point.figures["error stated, % of the mean"]);
+        // E = π (1 + 1/2 + 1/4 + …): all that is left is what the solver's residual and f32 leave, and what the bake states of itself.
+        let bound = 1e-3 + stated / 100.0 + error.uncertainty;
+        assert!(
+            error.relative_rmse <= bound,
+            "{}, {}: {error:?}, stated {stated} %",
+            point.series,
+            point.label
+        );
+        assert!(point.counts["texels"] > 100.0);
+    }
+}
+
+/// Root mean square difference over that of the reference, by the plain formula.
+fn relative_rmse(reference: &Picture, picture: &Picture, over: ErrorOver) -> f64 {
+    let (mut squares, mut size) = (0.0, 0.0);
+    for (wanted, found) in reference.radiance.iter().zip(&picture.radiance) {
+        if over == ErrorOver::WhereBothAreLit && (*wanted == DVec3::ZERO || *found == DVec3::ZERO) {
+            continue;
+        }
+        for channel in 0..3 {
+            squares += (wanted[channel] - found[channel]).powi(2);
+            size += wanted[channel].powi(2);
+        }
+    }
+    if squares == 0.0 { 0.0 } else { (squares / size).sqrt() }
+}
+
+#[test]
+fn errors_are_those_of_the_pictures_that_are_kept_and_a_report_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = options(&["shading", "reflection"], Vec::new());
+    let report = measured(&asked, folder.path());
+    let mut compared = 0;
+    for point in report.studies.iter().flat_map(|study| &study.points) {
+        let (files, error) = (point.picture.as_ref().unwrap(), point.error.unwrap());
+        let [picture, reference] =
+            [&files.picture, &files.reference].map(|name| read_picture(folder.path(), name).unwrap());
+        let again = relative_rmse(&reference, &picture, files.error_of);
+        // The reference is rounded to f32 in its file.
+        let bound = 1e-6 * error.relative_rmse + 1e-7;
+        assert!(
+            (again - error.relative_rmse).abs() < bound,
+            "{}, {}: {again} {error:?}",
+            point.series,
+            point.label
+        );
+        for kind in ["png", "heat.png"] {
+            assert!(folder.path().join(format!("{}.{kind}", files.picture)).exists());
+        }
+        compared += usize::from(error.relative_rmse > 0.0);
+    }
+    assert!(compared > 20, "only {compared} pictures differ from their reference");
+
+    // Finer meshes are nearer, in every shading.
+    let shading = report.study("shading").unwrap();
+    for series in ["flat", "Gouraud", "Phong"] {
+        let errors: Vec<f64> =
+            shading.of_series(series).map(|point| point.error.unwrap().relative_rmse).collect();
+        assert!(errors.len() == 8 && errors[7] < 0.1 * errors[0], "{series}: {errors:?}");
+    }
+    assert!(!shading.findings.is_empty());
+    let table = std::fs::read_to_string(folder.path().join(TABLE)).unwrap();
+    let points: usize = report.studies.iter().map(|study| study.points.len()).sum();
+    assert_eq!(table.lines().count(), points + 1);
+    let page = std::fs::read_to_string(folder.path().join(PAGE)).unwrap();
+    assert!(page.contains("<section id=\"shading\">") && page.contains("<section id=\"reflection\">"));
+
+    // What is there is kept to the bit, and what is asked for besides is added.
+    let again = CostOptions { resume: true, ..options(&["shading", "reflection", "precision"], Vec::new()) };
+    let more = measured(&again, folder.path());
+    assert_eq!(more.studies[..2], report.studies[..]);
+    assert_eq!(more.studies.len(), 3);
+    assert_eq!(read_report(folder.path()).unwrap(), more);
+    // With other settings nothing is kept.
+    let other = CostOptions { seed: 2, studies: studies_named(&["reflection".into()]).unwrap(), ..again };
+    let measured_again = measured(&other, folder.path());
+    assert_ne!(measured_again.studies[0].seconds, report.studies[1].seconds);
+}
+
+#[test]
+fn an_interruption_keeps_the_studies_that_are_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let gpu = Gpu::headless().expect("a Vulkan driver; the software one will do");
+    let asked = options(&["reflection", "precision"], Vec::new());
+    let told = AtomicUsize::new(0);
+    let ended = measure(&gpu, &asked, folder.path(), &|progress| {
+        told.fetch_add(1, Ordering::Relaxed);
+        match progress.study {
+            "precision" => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    });
+    assert!(matches!(ended, Err(CostError::Interrupted)), "{ended:?}");
+    assert!(told.load(Ordering::Relaxed) > 10);
+    let kept = read_report(folder.path()).unwrap();
+    assert_eq!(kept.studies.iter().map(|study| study.name.as_str()).collect::<Vec<_>>(), ["reflection"]);
+    assert!(folder.path().join(PAGE).exists());
+}
+
+#[test]
+fn a_study_that_there_is_none_of_is_refused_by_name() {
+    let error = studies_named(&["shading".into(), "shadnig".into()]).unwrap_err().to_string();
+    assert!(error.contains("`shadnig`") && error.contains("shading, lamps"), "{error}");
+}
