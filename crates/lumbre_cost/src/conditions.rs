@@ -52,7 +52,7 @@ impl Conditions<'_> {
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
             true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 6.0) },
-            false => Rounds { warm_up: 2, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
+            false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
         }
     }
 

@@ -76,3 +76,24 @@ fn an_edge_that_comes_and_goes_is_seen() {
     let row = &map[48 * 96..49 * 96];
     assert!(row[48] > 0.15 && row[10] < 1e-6, "{} {}", row[48], row[10]);
 }
+
+#[test]
+fn the_published_implementation_finds_the_same() {
+    // What flip-evaluator 1.7 (PyPI) finds as LDR-FLIP of the same pictures, in f32.
+    let bytes = |color: [usize; 3]| DVec3::from(color.map(|byte| byte as f64 / 255.0));
+    let ramp = |x: usize, y: usize| bytes([4 * x % 256, 5 * y % 256, 2 * (x + y) % 256]);
+    let grain = |x: usize, y: usize| {
+        bytes([1, 2, 3].map(|salt| (x * 374_761_393 + y * 668_265_263 + salt * 982_451_653) % 251))
+    };
+    let grey = |_: usize, _: usize| bytes([128; 3]);
+    let marked = |x: usize, y: usize| if x == 20 || y > 40 { bytes([200, 180, 60]) } else { bytes([128; 3]) };
+    let of = |color: &dyn Fn(usize, usize) -> DVec3| picture(64, 48, color);
+    let found = [
+        (mean(&of(&ramp), &of(&|x, y| ramp(x + 3, y))), 0.209_837_14),
+        (mean(&of(&grain), &of(&|x, y| grain(y, x))), 0.180_859_92),
+        (mean(&of(&grey), &of(&marked)), 0.216_059_37),
+    ];
+    for (found, published) in found {
+        assert!((found - published).abs() < 2e-5 * published, "{found} is not {published}");
+    }
+}

@@ -15,7 +15,9 @@ use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Stu
 
 /// Errors that are asked for, as shares.
 const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
-const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.01];
+const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.015];
+/// Bakes take seconds: each is done twice.
+const ROUNDS: usize = 2;
 const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
 const FOUND: &str = "error found, % of the mean";
@@ -106,7 +108,7 @@ fn of_scene(
     let converged = BakeOptions {
         quality: Quality::Reference,
         error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 6.0))),
+        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 5.0))),
         seed: conditions.seed.wrapping_add(99),
         denoise: false,
         ..options
@@ -123,14 +125,13 @@ fn of_scene(
     let reference = measured.keep_reference(&format!("{} converged", scene.name), picture);
 
     let all = asked(conditions, options);
-    let rounds = conditions.unless_quick(3, 2);
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); all.len()];
     let mut last = Vec::new();
-    for round in 0..rounds {
+    for round in 0..ROUNDS {
         last.clear();
         for (place, asked) in all.iter().enumerate() {
             let share =
-                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
+                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (ROUNDS * all.len()) as f64;
             let told = [part(share(place)), part(share(place + 1))];
             let baked = bake_scene(conditions, scene, &asked.options, told)?;
             times[place].push(1e3 * baked.report.seconds);

@@ -8,7 +8,7 @@ use crate::fronts::pareto_front;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
 use crate::scenes::{BallsAndLamps, balls_and_lamps};
-use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// How lamps are found, each with what it is called.
 const LISTS: [(LightLists, &str); 3] = [
@@ -123,35 +123,30 @@ fn point(frame: &DrawnFrame, series: &str, lamps: u32) -> Point {
 }
 
 fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
-    let mut findings = Vec::new();
-    let mut said = Vec::new();
+    // Neighbouring numbers of lamps with the same winners are told together.
+    let mut stretches: Vec<(u32, u32, Vec<&str>)> = Vec::new();
     for (lamps, _) in times {
-        let here =
-            study.points.iter().filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(*lamps)));
-        let mut here: Vec<&Point> = here.filter(|point| point.milliseconds.is_some()).collect();
-        here.sort_by(|a, b| {
-            a.milliseconds
-                .map(|t| t.median)
-                .unwrap_or(0.0)
-                .total_cmp(&b.milliseconds.map(|t| t.median).unwrap_or(0.0))
-        });
-        let Some(first) = here.first().and_then(|point| point.milliseconds) else { continue };
-        let open = here.iter().filter(|point| point.milliseconds.is_some_and(|time| !first.is_below(&time)));
-        let open: Vec<&str> = open.map(|point| point.series.as_str()).collect();
-        said.push(match &open[..] {
-            [only] => format!("with {lamps} {only}"),
-            several => format!("with {lamps} the times do not decide between {}", listed(several, "and")),
-        });
+        let winners = cheapest_with(study, *lamps);
+        match stretches.last_mut().filter(|(.., last)| *last == winners) {
+            Some((_, to, _)) => *to = *lamps,
+            None => stretches.push((*lamps, *lamps, winners)),
+        }
     }
-    if !said.is_empty() {
-        findings.push(format!("The cheapest: {}.", said.join("; ")));
-    }
+    let told = stretches.iter().map(|(from, to, winners)| {
+        let range = if from == to { format!("with {from}") } else { format!("with {from} to {to}") };
+        match &winners[..] {
+            [only] => format!("{range} {only}"),
+            several => format!("{range} the times do not decide between {}", listed(several, "and")),
+        }
+    });
+    let mut findings =
+        vec![format!("The cheapest way to find lamps: {}.", told.collect::<Vec<_>>().join("; "))];
     if let Some((lamps, three)) = times.last()
         && let [everything, objects, clusters] = &three[..]
         && let (Some(all), Some(by_object)) =
             (ratio_of(&everything.times, &clusters.times), ratio_of(&objects.times, &clusters.times))
     {
-        let told = |ratio: &crate::Spread, name: &str| match is_above_one(ratio) {
+        let told = |ratio: &Spread, name: &str| match is_above_one(ratio) {
             Some(_) => format!(
                 "{name} takes {} times as long as clusters ({} to {})",
                 rounded(ratio.median),
@@ -177,6 +172,16 @@ fn findings_by_number(study: &Study, times: &TimesByNumber) -> Vec<String> {
         percent(largest)
     ));
     findings
+}
+
+/// The lists that are the cheapest with so many lamps: one where the times decide, several where they do not, in the order of [`LISTS`].
+fn cheapest_with(study: &Study, lamps: u32) -> Vec<&str> {
+    let here = study.points.iter().filter(|point| point.parameters.get(LAMPS) == Some(&f64::from(lamps)));
+    let timed: Vec<(&str, Spread)> =
+        here.filter_map(|point| Some((point.series.as_str(), point.milliseconds?))).collect();
+    let first = timed.iter().min_by(|a, b| a.1.median.total_cmp(&b.1.median));
+    let is_level = |time: &Spread| first.is_some_and(|(_, least)| !least.is_below(time));
+    timed.iter().filter(|(_, time)| is_level(time)).map(|(series, _)| *series).collect()
 }
 
 fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), CostError> {
