@@ -236,7 +236,7 @@ fn finding(scene: &str, points: &[Point]) -> Vec<String> {
         let formats: Vec<String> = same_density
             .iter()
             .filter_map(|point| {
-                Some(format!("{} lose {}", point.series, percent(point.error?.relative_rmse)))
+                Some(format!("{} loses {}", point.series, percent(point.error?.relative_rmse)))
             })
             .collect();
         let formats: Vec<&str> = formats.iter().map(String::as_str).collect();
