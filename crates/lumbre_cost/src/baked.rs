@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, LightmapError, Probes, bake};
-use lumbre_scene::{GlobalTransform, Hidden, Lightmap, LightmapImage, Mesh, StaticObject};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, TexelErrors, bake};
+use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
 
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError, ErrorOf};
@@ -40,9 +40,9 @@ pub fn bake_options(
 
 /// Square metres of what is baked.
 fn static_area(world: &mut World) -> f64 {
-    let mut objects =
-        world.query_filtered::<(&Mesh, &GlobalTransform), (With<StaticObject>, Without<Hidden>)>();
-    let area = |(mesh, place): (&Mesh, &GlobalTransform)| {
+    let hidden = hidden_entities(world);
+    let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform), With<StaticObject>>();
+    let area = |(_, mesh, place): (Entity, &Mesh, &GlobalTransform)| {
         let corner = |index: u32| {
             let point = mesh.0.positions.get(index as usize).copied().unwrap_or(Vec3::ZERO);
             place.0.transform_point3(point.as_dvec3())
@@ -56,7 +56,7 @@ fn static_area(world: &mut World) -> f64 {
             .filter(|area| area.is_finite())
             .sum::<f64>()
     };
-    objects.iter(world).map(area).sum()
+    objects.iter(world).filter(|(entity, ..)| !hidden.contains(entity)).map(area).sum()
 }
 
 /// Bakes a scene. `told` are the shares of the study that are done before and after.
@@ -84,7 +84,7 @@ pub type Maps = BTreeMap<String, (Arc<LightmapImage>, Arc<[f32]>)>;
 
 /// The lightmaps of a World that has just been baked.
 pub fn maps_of(world: &mut World) -> Maps {
-    let mut maps = world.query::<(&Lightmap, &LightmapError)>();
+    let mut maps = world.query::<(&Lightmap, &TexelErrors)>();
     let named = maps
         .iter(world)
         .map(|(map, errors)| (map.image.name.clone(), (Arc::clone(&map.image), Arc::clone(&errors.0))));
