@@ -25,7 +25,14 @@ for ( const width of [ 390, 1400 ] ) {
 		faults.push( ...( await page.evaluate( tooWide ) ).map( ( fault ) => `${ name }: ${ fault }` ) );
 		faults.push( ...( await page.evaluate( overlappingText ) ).map( ( fault ) => `${ name }: ${ fault }` ) );
 		await page.screenshot( { path: `${ pictures }/${ name }.png`, fullPage: true } );
-		for ( const section of await page.locator( 'section' ).all() ) await section.screenshot( { path: `${ pictures }/${ name }-${ await section.getAttribute( 'id' ) }.png` } );
+		for ( const section of await page.locator( 'section' ).all() ) {
+
+			const file = `${ pictures }/${ name }-${ await section.getAttribute( 'id' ) }`;
+			await section.screenshot( { path: `${ file }.png` } );
+			await section.locator( '.plots' ).screenshot( { path: `${ file }-plots.png` } );
+
+		}
+
 
 		for ( const viewer of await page.locator( '.viewer' ).all() ) faults.push( ...( await clickThrough( viewer ) ).map( ( fault ) => `${ name }: ${ fault }` ) );
 

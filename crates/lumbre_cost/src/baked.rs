@@ -38,6 +38,16 @@ pub fn bake_options(
     Ok(BakeOptions { density, probes: Probes::Never, resolution_error: false, ..BakeOptions::default() })
 }
 
+/// How `lumbre bake` is asked for that density, with what else the bakes of a study have in common.
+pub fn bake_arguments(options: &BakeOptions) -> String {
+    let density = match options.density {
+        Density::TexelsPerMeter(density) => format!(" --texels-per-meter {}", (density * 1e6).round() / 1e6),
+        Density::MapSize(side) => format!(" --map-size {side}"),
+        Density::Automatic => String::new(),
+    };
+    format!("--error {}{density} --probes never --no-resolution-error --no-reuse", options.error)
+}
+
 /// Square metres of what is baked.
 fn static_area(world: &mut World) -> f64 {
     let hidden = hidden_entities(world);

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use lumbre_bake::{BakeOptions, Density, Quality};
+use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
 
-use crate::baked::{bake_options, bake_scene, maps_of, texel_error};
+use crate::baked::{bake_arguments, bake_options, bake_scene, maps_of, texel_error};
 use crate::findings::{cheapest_by_error, error_of, percent, rounded, short};
 use crate::frames::draw_picture;
 use crate::measured::Measured;
@@ -108,7 +108,7 @@ fn of_scene(
     let converged = BakeOptions {
         quality: Quality::Reference,
         error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 5.0))),
+        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 3.0))),
         seed: conditions.seed.wrapping_add(99),
         denoise: false,
         ..options
@@ -179,16 +179,8 @@ fn command(scene: &SceneFile, asked: &Asked) -> String {
     if !asked.options.denoise {
         return "lumbre cost -o again --study bake".into();
     }
-    let density = match asked.options.density {
-        Density::TexelsPerMeter(density) => format!(" --texels-per-meter {}", rounded(density)),
-        _ => String::new(),
-    };
-    format!(
-        "lumbre bake {} -o baked.glb --error {}{}{density} --probes never --no-resolution-error --no-reuse",
-        scene.in_commands(),
-        asked.options.error,
-        asked.more
-    )
+    let arguments = bake_arguments(&asked.options);
+    format!("lumbre bake {} -o baked.glb {arguments}{}", scene.in_commands(), asked.more)
 }
 
 fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {

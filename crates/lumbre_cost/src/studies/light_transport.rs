@@ -3,10 +3,11 @@
 
 use std::time::Instant;
 
+use lumbre_bake::BakeOptions;
 use lumbre_render::FrameOptions;
 use lumbre_trace::{Integrator, TraceOptions};
 
-use crate::baked::{bake_options, bake_scene};
+use crate::baked::{bake_arguments, bake_options, bake_scene};
 use crate::findings::{cheapest_by_error, milliseconds, percent, rounded};
 use crate::frames::{Frame, draw_frames};
 use crate::measured::Measured;
@@ -19,7 +20,7 @@ use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Sp
 
 /// Paths a pixel.
 const PATHS: &[u32] = &[4, 16, 32];
-const FEW_PATHS: &[u32] = &[4, 16];
+const FEW_PATHS: &[u32] = &[2, 8];
 /// Pictures are this part as wide and high as elsewhere: paths take their time.
 const SMALLER: u32 = 3;
 const SECONDS: f64 = 4.0;
@@ -84,7 +85,7 @@ fn of_scene(
         samples: Some(samples),
         ..TraceOptions::default()
     };
-    let most = conditions.unless_quick(256, 96);
+    let most = conditions.unless_quick(256, 64);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
     // The report states it of the mean; errors are of the root mean square.
     let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
@@ -93,12 +94,8 @@ fn of_scene(
     conditions.tell(part(0.5))?;
 
     let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 2_000.0))?;
-    let baked = bake_scene(
-        conditions,
-        scene,
-        &lumbre_bake::BakeOptions { error: 0.02, ..bake },
-        [part(0.5), part(0.6)],
-    )?;
+    let bake = BakeOptions { error: 0.02, ..bake };
+    let baked = bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?;
     let light = |shadows, multisample| FrameOptions { shadows, multisample, ..FrameOptions::default() };
     let steps = [
         ("lamps alone", light(false, false), " --no-shadows"),
@@ -129,8 +126,9 @@ fn of_scene(
             figures: if with_lightmaps { [(BAKE.to_owned(), bake_time)].into() } else { Default::default() },
             command: match with_lightmaps {
                 true => format!(
-                    "lumbre bake {} -o baked.glb --error 0.02 --probes never && {draw}",
-                    scene.in_commands()
+                    "lumbre bake {} -o baked.glb {} && {draw}",
+                    scene.in_commands(),
+                    bake_arguments(&bake)
                 ),
                 false => draw,
             },

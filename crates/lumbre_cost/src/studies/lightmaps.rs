@@ -10,7 +10,7 @@ use lumbre_scene::{
     lightmap_to_open_exr,
 };
 
-use crate::baked::{Baked, bake_options, bake_scene};
+use crate::baked::{Baked, bake_arguments, bake_options, bake_scene};
 use crate::findings::{listed, percent, rounded, short};
 use crate::frames::{Frame, draw_frames};
 use crate::fronts::pareto_front;
@@ -110,6 +110,7 @@ fn study() -> Study {
 /// Maps of one density.
 struct Maps {
     baked: Baked,
+    options: BakeOptions,
     density: f64,
 }
 
@@ -127,7 +128,7 @@ fn of_scene(
         let density = densest / halved;
         let options = BakeOptions { density: Density::TexelsPerMeter(density), error: 0.02, ..options };
         let told = [place, place + 1].map(|place| part(0.6 * place as f64 / 4.0));
-        all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, density });
+        all.push(Maps { baked: bake_scene(conditions, scene, &options, told)?, options, density });
     }
     let mut frames = Vec::new();
     let mut points = Vec::new();
@@ -138,7 +139,7 @@ fn of_scene(
                 continue;
             }
             let (world, sizes) = in_format(conditions, scene, &mut maps.baked.world, format)?;
-            frames.push(Frame::new(world, FrameOptions::default()));
+            frames.push(Frame::new(world, FrameOptions::default()).sharing("lightmaps"));
             points.push(point(conditions, scene, maps, format, sizes));
         }
     }
@@ -201,9 +202,15 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
         0 | 1 => format.name().to_owned(),
         _ => format!("{}, {}", format.name(), scene.name),
     };
-    let ktx2 = match format {
-        Format::Packed(format) => format!(" --ktx2 {}", format.name()),
-        Format::Halves => " --exr half".to_owned(),
+    // Frames read the half floats that stand beside a packed file.
+    let command = match format {
+        Format::Halves => format!(
+            "lumbre bake {} -o baked.glb {} --exr half && lumbre render baked.glb -o frame.exr --size {} --frames 20 --timings times.json",
+            scene.in_commands(),
+            bake_arguments(&maps.options),
+            conditions.size_text()
+        ),
+        Format::Packed(_) => "lumbre cost -o again --study lightmaps".to_owned(),
     };
     Point {
         series,
@@ -211,12 +218,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Fo
         parameters: [(DENSITY.to_owned(), maps.density)].into(),
         counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
         figures: [(BAKE.to_owned(), 1e3 * maps.baked.report.seconds)].into(),
-        command: format!(
-            "lumbre bake {} -o baked.glb --error 0.02 --texels-per-meter {} --probes never --no-resolution-error --no-reuse{ktx2} && lumbre render baked.glb -o frame.exr --size {} --frames 20 --timings times.json",
-            scene.in_commands(),
-            rounded(maps.density),
-            conditions.size_text()
-        ),
+        command,
         ..Point::default()
     }
 }
