@@ -62,12 +62,12 @@ pub fn cheapest_by_error(points: &[&Point], place: &str) -> Option<String> {
             if !between.is_empty() {
                 let all: Vec<&Point> =
                     between.iter().flat_map(|stretch| stretch.cheapest.iter().copied()).collect();
-                sentences.push(format!(
-                    "Between {} and {} that changes from choice to choice ({}).",
-                    percent(end),
-                    percent(from),
-                    names_of(&all)
-                ));
+                let range = format!("Between {} and {}", percent(end), percent(from));
+                let names = names_of(&all);
+                sentences.push(match same(&all[..1], &between[0].cheapest) && between.len() == 1 {
+                    true => format!("{range} the cheapest is {names}."),
+                    false => format!("{range} that changes from choice to choice ({names})."),
+                });
             }
         }
     }

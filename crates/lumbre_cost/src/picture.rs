@@ -1,7 +1,7 @@
 //! Pictures of light, and how far one is from another. Not their drawing.
 
 use glam::DVec3;
-use lumbre_trace::{Metering, compare, encode_srgb, tone_curve};
+use lumbre_trace::{Metering, compare, shown};
 
 use crate::{ErrorOf, ErrorOver};
 
@@ -40,7 +40,7 @@ impl Picture {
 
     /// Colours as they are shown with that exposure: tone curve and sRGB's encoding, each channel in [0, 1].
     pub fn shown(&self, exposure: f64) -> Vec<DVec3> {
-        self.radiance.iter().map(|pixel| encode_srgb(tone_curve(*pixel * exposure))).collect()
+        self.radiance.iter().map(|pixel| shown(*pixel * exposure)).collect()
     }
 }
 
@@ -56,8 +56,8 @@ pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Opti
     };
     let (wanted, found): (Vec<DVec3>, Vec<DVec3>) = pairs.filter(counts).map(|(a, b)| (*a, *b)).unzip();
     let exposure = reference.exposure();
-    let shown = [reference.shown(exposure), picture.shown(exposure)];
-    let found = compare(reference.width, [&wanted, &found], shown);
+    let both_shown = [reference.shown(exposure), picture.shown(exposure)];
+    let found = compare(reference.width, [&wanted, &found], both_shown);
     let error = ErrorOf {
         relative_rmse: found.relative_error,
         largest: found.largest,

@@ -158,8 +158,9 @@ fn plastic(color: Vec3, roughness: f32) -> Material {
 /// A chequered floor.
 fn tiles() -> TextureReference {
     let side = 64;
-    let texel =
-        |x: u32, y: u32| if (x / 8 + y / 8).is_multiple_of(2) { [225, 220, 210, 255] } else { [150, 145, 140, 255] };
+    let texel = |x: u32, y: u32| {
+        if (x / 8 + y / 8).is_multiple_of(2) { [225, 220, 210, 255] } else { [150, 145, 140, 255] }
+    };
     let rgba = (0..side).flat_map(|y| (0..side).flat_map(move |x| texel(x, y))).collect();
     TextureReference {
         image: Arc::new(Image { name: "tiles".into(), width: side, height: side, rgba }),

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use half::f16;
+use lumbre_optics::{decode_srgb, encode_srgb};
 use lumbre_render::FrameOptions;
 
 use crate::findings::{listed, milliseconds, percent, rounded};
@@ -120,15 +121,7 @@ fn in_halves(picture: &Picture) -> Picture {
 
 /// Through sRGB's encoding, as a screen has it, without a tone curve.
 fn in_bytes(picture: &Picture) -> Picture {
-    let decoded = |value: f64| match value {
-        low if low <= 0.04045 => low / 12.92,
-        high => ((high + 0.055) / 1.055).powf(2.4),
-    };
-    let kept = |pixel: &DVec3| {
-        let bytes = lumbre_trace::encode_srgb(*pixel).to_array().map(|value| (255.0 * value).round() / 255.0);
-        DVec3::from(bytes.map(decoded))
-    };
-    Picture { width: picture.width, radiance: picture.radiance.iter().map(kept).collect() }
+    each_channel(picture, |value| decode_srgb((255.0 * encode_srgb(value.clamp(0.0, 1.0))).round() / 255.0))
 }
 
 fn findings(study: &Study) -> Vec<String> {
