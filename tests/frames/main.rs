@@ -11,6 +11,7 @@ mod constant_colors;
 mod degenerate;
 mod display;
 mod documents;
+mod effects_table;
 mod explained;
 mod faces;
 mod flat_rules;

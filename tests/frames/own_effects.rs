@@ -2,9 +2,9 @@
 //! where the scene does not call for them.
 
 #[path = "../../integrations/own_program/src/bloom.rs"]
-mod bloom;
+pub mod bloom;
 #[path = "../../integrations/own_program/src/outline.rs"]
-mod outline;
+pub mod outline;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -38,6 +38,44 @@ pub struct Statistics {
     pub cpu: CpuStages,
     /// Bytes of components uploaded for this frame because they changed.
     pub uploaded_bytes: u64,
+    /// What was uploaded for this frame, by what it is.
+    pub uploads: Uploads,
+}
+
+/// Bytes brought to the GPU for one frame. The uniform of the frame itself, some two hundred bytes, is not counted, nor what effects beyond the renderer's own upload.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Uploads {
+    /// Matrices of objects.
+    pub transforms: u64,
+    /// Records of materials.
+    pub materials: u64,
+    /// What each draw's instances are.
+    pub instances: u64,
+    /// Records of lights.
+    pub lights: u64,
+    /// Lists of the lights that reach objects.
+    pub light_lists: u64,
+    /// Clusters: their grid, their lists, and the records of inverse-square lights.
+    pub clusters: u64,
+    /// Views of shadow maps.
+    pub shadows: u64,
+    /// Attributes and indices of meshes, those of casters of shadows too.
+    pub meshes: u64,
+    /// Textures with their mip levels, and lightmaps.
+    pub textures: u64,
+}
+
+impl Uploads {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.components() + self.meshes + self.textures
+    }
+
+    /// What follows from components of the World, meshes and pictures apart.
+    pub fn components(&self) -> u64 {
+        let Self { transforms, materials, instances, lights, light_lists, clusters, shadows, .. } = self;
+        transforms + materials + instances + lights + light_lists + clusters + shadows
+    }
 }
 
 /// The passes that draw lit surfaces.

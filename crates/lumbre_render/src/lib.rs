@@ -84,7 +84,7 @@ pub use error::{EffectError, RenderError};
 pub use explain::{SceneExplanation, explain};
 pub use facts::SceneFacts;
 pub use frame_plan::FrameShape;
-pub use frame_report::{CpuStages, FrameReport, LightListing, LitPasses, PassLights, Statistics};
+pub use frame_report::{CpuStages, FrameReport, LightListing, LitPasses, PassLights, Statistics, Uploads};
 pub use frame_scene::{DrawnObject, FrameScene, FrameView};
 pub use gpu::Gpu;
 pub use metering::{LightMeter, Metering, meter};

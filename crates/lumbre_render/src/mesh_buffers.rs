@@ -102,11 +102,12 @@ impl GpuMesh {
         self.source.triangle_count()
     }
 
-    /// Makes what is missing of these attributes.
-    pub fn prepare(&mut self, gpu: &Gpu, attributes: &[Attribute], flat: Option<FlatRule>) {
-        if attributes.contains(&Attribute::Tangent) {
-            self.make_tangents(gpu);
-        }
+    /// Makes what is missing of these attributes; answers with the bytes uploaded for it.
+    pub fn prepare(&mut self, gpu: &Gpu, attributes: &[Attribute], flat: Option<FlatRule>) -> u64 {
+        let mut uploaded = match attributes.contains(&Attribute::Tangent) {
+            true => self.make_tangents(gpu),
+            false => 0,
+        };
         let buffers = match flat {
             Some(rule) => &mut self.expanded[rule as usize],
             None => &mut self.indexed,
@@ -118,28 +119,30 @@ impl GpuMesh {
                     Some(rule) => expanded_attribute(&self.source, attribute, rule),
                     None => indexed_attribute(&self.source, attribute),
                 };
+                uploaded += bytes.len() as u64;
                 *slot = Some(vertex_buffer(gpu, &bytes, wgpu::BufferUsages::VERTEX));
             }
         }
         if flat.is_none() && self.indices.is_none() {
-            let bytes = bytemuck::cast_slice(&self.source.indices);
+            let bytes: &[u8] = bytemuck::cast_slice(&self.source.indices);
+            uploaded += bytes.len() as u64;
             self.indices = Some(vertex_buffer(gpu, bytes, wgpu::BufferUsages::INDEX));
         }
+        uploaded
     }
 
-    /// Tangents for a mesh that has none. Vertices may be split, so that what was made of the indexed vertices is made again.
-    fn make_tangents(&mut self, gpu: &Gpu) {
-        let Some(set) = self.tangents.filter(|_| self.source.tangents.is_empty()) else { return };
+    /// Tangents for a mesh that has none. Vertices may be split, so that what was made of the indexed vertices is made again; answers with the bytes
+    /// uploaded for that.
+    fn make_tangents(&mut self, gpu: &Gpu) -> u64 {
+        let Some(set) = self.tangents.filter(|_| self.source.tangents.is_empty()) else { return 0 };
         // A mesh that is not sound shows its map as if it were flat.
-        let Ok(source) = self.source.with_tangents(set) else { return };
+        let Ok(source) = self.source.with_tangents(set) else { return 0 };
         self.source = Arc::new(source);
         self.indices = None;
         let made = std::mem::take(&mut self.indexed.attributes);
         let again: Vec<_> =
             Attribute::ALL.into_iter().filter(|attribute| made[*attribute as usize].is_some()).collect();
-        if !again.is_empty() {
-            self.prepare(gpu, &again, None);
-        }
+        if again.is_empty() { 0 } else { self.prepare(gpu, &again, None) }
     }
 
     /// Whether `prepare` made indexed positions.

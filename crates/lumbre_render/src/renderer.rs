@@ -34,7 +34,7 @@ use crate::textures::Textures;
 use crate::world_watch::WorldWatch;
 use crate::{
     CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, LitPasses, Measure,
-    RenderError, Statistics,
+    RenderError, Statistics, Uploads,
 };
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
@@ -217,8 +217,12 @@ impl Renderer {
                     return Ok(self.report_unchanged(last, plan, &clock));
                 }
                 self.shadows.stale.clear();
-                let statistics =
-                    Statistics { uploaded_bytes: 0, cpu: CpuStages::default(), ..last.statistics };
+                let statistics = Statistics {
+                    uploaded_bytes: 0,
+                    uploads: Uploads::default(),
+                    cpu: CpuStages::default(),
+                    ..last.statistics
+                };
                 LastFrame { statistics, ..last }
             }
             None => self.prepare(world, target, options, asked, &mut clock)?,
@@ -236,7 +240,8 @@ impl Renderer {
     /// What there is to say of a frame that is not drawn, since the target holds it.
     fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &Clock) -> FrameReport {
         let cpu = CpuStages { total_ms: milliseconds(clock.begun), ..CpuStages::default() };
-        let statistics = Statistics { uploaded_bytes: 0, cpu, ..last.statistics };
+        let statistics =
+            Statistics { uploaded_bytes: 0, uploads: Uploads::default(), cpu, ..last.statistics };
         let census = Arc::clone(&last.decided.census);
         self.last = Some(last);
         FrameReport {
@@ -455,7 +460,7 @@ impl Renderer {
         }
         cpu.shadows_ms = clock.lap();
         let settings = &decided.decision.settings;
-        let uploaded_bytes =
+        let mut uploads =
             self.upload_buffers(&seen.view, settings, &lights.set, seen.exposure, [clustered, shadowed])?;
         self.make_frame_groups(draws);
         let flat_rule = decided.decision.flat_rule();
@@ -470,13 +475,15 @@ impl Renderer {
             }
             let variant = &batch.pipeline.variant;
             if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
-                mesh.prepare(&self.gpu, &attributes(variant), is_flat(variant).then_some(flat_rule));
+                let flat = is_flat(variant).then_some(flat_rule);
+                uploads.meshes += mesh.prepare(&self.gpu, &attributes(variant), flat);
                 if decided.draws_objects {
-                    mesh.prepare(&self.gpu, &[Attribute::Position], None);
+                    uploads.meshes += mesh.prepare(&self.gpu, &[Attribute::Position], None);
                 }
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
+        uploads.textures = self.textures.take_uploaded();
         cpu.upload_ms = clock.lap();
         let clusters = &self.clusters.clusters;
         let light_lists = LightListing {
@@ -502,7 +509,8 @@ impl Renderer {
             variants: self.pipelines.variants(),
             pipelines_made: self.pipelines.made(),
             pipelines_awaited: 0,
-            uploaded_bytes,
+            uploaded_bytes: uploads.components(),
+            uploads,
         })
     }
 
@@ -577,7 +585,7 @@ impl Renderer {
         left_out.clone_into(&mut self.left_out);
     }
 
-    /// Uploads what changed; answers with its bytes.
+    /// Uploads the components that changed; answers with their bytes.
     fn upload_buffers(
         &mut self,
         view: &CameraView,
@@ -585,7 +593,7 @@ impl Renderer {
         lights: &LightSet,
         exposure: f32,
         [clustered, shadowed]: [bool; 2],
-    ) -> Result<u64, RenderError> {
+    ) -> Result<Uploads, RenderError> {
         let origin = self.objects.origin;
         let fog = settings.fog.as_ref();
         let data = FrameData {
@@ -601,11 +609,14 @@ impl Renderer {
             fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
         };
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&data));
-        let mut bytes = self.objects.transforms.pending_bytes()
-            + self.objects.materials.pending_bytes()
-            + self.lights.pending_bytes()
-            + self.instances.pending_bytes()
-            + self.light_list.pending_bytes();
+        let mut uploads = Uploads {
+            transforms: self.objects.transforms.pending_bytes(),
+            materials: self.objects.materials.pending_bytes(),
+            instances: self.instances.pending_bytes(),
+            lights: self.lights.pending_bytes(),
+            light_lists: self.light_list.pending_bytes(),
+            ..Uploads::default()
+        };
         let mut renewed = vec![
             self.objects.transforms.upload(&self.gpu),
             self.objects.materials.upload(&self.gpu),
@@ -614,7 +625,7 @@ impl Renderer {
             self.light_list.upload(&self.gpu),
         ];
         if clustered {
-            bytes += self.clusters.pending_bytes();
+            uploads.clusters = self.clusters.pending_bytes();
             renewed.push(self.clusters.upload(&self.gpu));
         }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
@@ -624,9 +635,10 @@ impl Renderer {
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
         if let Some(transforms) = self.objects.transforms.buffer().filter(|_| shadowed) {
             let layout = self.pipelines.shadow_layout();
-            bytes += self.shadows.upload(&self.gpu, transforms, &mut self.meshes, layout)?;
+            let of_shadows = self.shadows.upload(&self.gpu, transforms, &mut self.meshes, layout)?;
+            (uploads.shadows, uploads.meshes) = (of_shadows.shadows, of_shadows.meshes);
         }
-        Ok(bytes)
+        Ok(uploads)
     }
 
     /// A buffer of group 0, once it is there.

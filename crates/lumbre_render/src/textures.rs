@@ -28,6 +28,8 @@ pub(crate) struct Textures {
     images: HashMap<(usize, Texels), (Arc<Image>, wgpu::TextureView)>,
     lightmaps: HashMap<usize, (Arc<LightmapImage>, wgpu::TextureView)>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
+    /// Bytes uploaded since somebody last asked.
+    uploaded: u64,
 }
 
 impl Textures {
@@ -41,7 +43,12 @@ impl Textures {
         check(&image.name, image.width, image.height, image.rgba.len(), 4)?;
         let key = (Arc::as_ptr(image) as usize, texels);
         let entry = self.images.entry(key);
-        Ok(entry.or_insert_with(|| (Arc::clone(image), upload(gpu, image, texels))).1.clone())
+        let new = || {
+            let (view, bytes) = upload(gpu, image, texels);
+            self.uploaded += bytes;
+            (Arc::clone(image), view)
+        };
+        Ok(entry.or_insert_with(new).1.clone())
     }
 
     /// The view of a lightmap: E/π, f16 per channel.
@@ -57,12 +64,22 @@ impl Textures {
         }
         let key = Arc::as_ptr(image) as usize;
         let entry = self.lightmaps.entry(key);
-        Ok(entry.or_insert_with(|| (Arc::clone(image), upload_lightmap(gpu, image))).1.clone())
+        let new = || {
+            let (view, bytes) = upload_lightmap(gpu, image);
+            self.uploaded += bytes;
+            (Arc::clone(image), view)
+        };
+        Ok(entry.or_insert_with(new).1.clone())
     }
 
     /// A sampler.
     pub fn sampler(&mut self, gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
         self.samplers.entry(*sampler).or_insert_with(|| make_sampler(gpu, sampler)).clone()
+    }
+
+    /// Bytes uploaded since the last call.
+    pub fn take_uploaded(&mut self) -> u64 {
+        std::mem::take(&mut self.uploaded)
     }
 
     /// Forgets images that nothing else holds.
@@ -105,7 +122,8 @@ fn make_sampler(gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
     })
 }
 
-fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> wgpu::TextureView {
+/// The view of an image's copy, and the bytes of its levels.
+fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> (wgpu::TextureView, u64) {
     let mut levels = match texels {
         Texels::Colors => color_levels(image, true),
         Texels::Numbers => color_levels(image, false),
@@ -123,17 +141,19 @@ fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> wgpu::TextureView {
     for (mip, level) in (0..).zip(&levels) {
         write(gpu, &texture, mip, level.width, level.height, 4, &level.rgba);
     }
-    texture.create_view(&Default::default())
+    let bytes: usize = levels.iter().map(|level| level.rgba.len()).sum();
+    (texture.create_view(&Default::default()), bytes as u64)
 }
 
-fn upload_lightmap(gpu: &Gpu, image: &LightmapImage) -> wgpu::TextureView {
+/// The view of a lightmap's copy, and its bytes.
+fn upload_lightmap(gpu: &Gpu, image: &LightmapImage) -> (wgpu::TextureView, u64) {
     // f16 ends at 65504; a texel beyond it is a lamp, and as white as the largest number.
     let half = |value: f32| f16::from_f32(value.clamp(0.0, f16::MAX.to_f32())).to_bits();
     let texels: Vec<u16> =
         image.texels.iter().flat_map(|t| [half(t.x), half(t.y), half(t.z), half(1.0)]).collect();
     let texture = texture_2d(gpu, image.width, image.height, 1, wgpu::TextureFormat::Rgba16Float);
     write(gpu, &texture, 0, image.width, image.height, 8, bytemuck::cast_slice(&texels));
-    texture.create_view(&Default::default())
+    (texture.create_view(&Default::default()), size_of_val(texels.as_slice()) as u64)
 }
 
 fn texture_2d(

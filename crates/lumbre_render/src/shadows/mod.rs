@@ -12,7 +12,7 @@ use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
 use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight};
-use crate::{Gpu, RenderError};
+use crate::{Gpu, RenderError, Uploads};
 
 /// Largest side of the atlas, in texels.
 const MOST_TEXELS: u32 = 4096;
@@ -219,14 +219,15 @@ impl ShadowMaps {
         objects: &wgpu::Buffer,
         meshes: &mut MeshBuffers,
         layout: &wgpu::BindGroupLayout,
-    ) -> Result<u64, RenderError> {
+    ) -> Result<Uploads, RenderError> {
         if self.device.as_ref().is_none_or(|device| device.atlas.width() != self.side) {
             let side = self.side.min(gpu.device.limits().max_texture_dimension_2d);
             self.device = Some(OnDevice::new(gpu, side));
         }
-        let bytes = self.views.pending_bytes() + self.matrices.len() as u64;
+        let shadows = self.views.pending_bytes() + self.matrices.len() as u64;
+        let mut uploads = Uploads { shadows, ..Uploads::default() };
         let renewed = self.views.upload(gpu)?;
-        let Some(device) = &mut self.device else { return Ok(0) };
+        let Some(device) = &mut self.device else { return Ok(uploads) };
         if !self.matrices.is_empty() {
             gpu.queue.write_buffer(&device.matrices, 0, &self.matrices);
         }
@@ -238,10 +239,10 @@ impl ShadowMaps {
             pipelines.map(|pipelines| pipelines.group(&gpu.device, objects, &device.matrices));
         for caster in self.stale.iter().flat_map(|map| &map.casters) {
             if let Some(mesh) = meshes.get_mut(caster.mesh) {
-                mesh.prepare(gpu, &[Attribute::Position], None);
+                uploads.meshes += mesh.prepare(gpu, &[Attribute::Position], None);
             }
         }
-        Ok(bytes)
+        Ok(uploads)
     }
 
     /// The maps, once `upload` has made them.
