@@ -204,10 +204,20 @@ const ROWS: &[Row] = &[
         add: |scene| scene.options.light_lists = LightLists::Clusters,
     },
     Row {
-        effect: "clusters of other lights",
-        called_for_by: "the same, for lights with a range and a cone or an attenuation of their own",
-        features: &["CLUSTERS", "RANGED_CLUSTERS"],
+        effect: "clusters of inverse-square spot lights",
+        called_for_by: "the same, with cones as glTF's have them",
+        features: &["CLUSTERS", "INVERSE_SQUARE_CLUSTERS", "INVERSE_SQUARE_SPOTS", "UNIFORM_LIGHTS"],
         before: |scene| spawn(scene, ranged(cone())),
+        add: |scene| scene.options.light_lists = LightLists::Clusters,
+    },
+    Row {
+        effect: "clusters of other lights",
+        called_for_by: "the same, for other lights with a range: OpenGL's cones, attenuations of their own",
+        features: &["CLUSTERS", "RANGED_CLUSTERS"],
+        before: |scene| {
+            let cone = SpotCone::Exponent { cutoff: 0.5, exponent: 2.0 };
+            spawn(scene, ranged(Light::spot(Vec3::splat(9.0), cone)));
+        },
         add: |scene| scene.options.light_lists = LightLists::Clusters,
     },
     Row {
