@@ -110,6 +110,7 @@ fn no_frame_of_a_test_goes_past_the_probe() -> Outcome {
                 "frames/adapter.rs",
                 "frames/constant_colors.rs",
                 "frames/display.rs",
+                "frames/effects_table.rs",
                 "frames/explained.rs",
                 "frames/missing_pipelines.rs",
                 "frames/own_effects.rs",
