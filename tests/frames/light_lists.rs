@@ -6,8 +6,10 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Attenuation, BakeMode, Light, Material, ReflectionModel, Shading, SpotCone, Surface};
-use lumbre_render::{FrameOptions, FrameReport, LightLists};
+use lumbre_optics::{
+    AlphaMode, Attenuation, BakeMode, Light, Material, ReflectionModel, Shading, SpotCone, Surface,
+};
+use lumbre_render::{FrameOptions, FrameReport, LightLists, Measure, PassLights};
 use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 
 use crate::adapter::{draw, linear};
@@ -293,5 +295,55 @@ fn lamps_with_a_range_that_reach_nothing_in_view_lend_no_light_of_others() {
     assert!(clusters.1.statistics.light_lists.clustered && clusters.1.statistics.light_lists.entries == 0);
     for (clustered, all) in clusters.0.iter().zip(&everything.0) {
         assert!((*clustered - *all).abs().max_element() <= ROUNDING * all.max_element().max(0.01));
+    }
+}
+
+#[test]
+fn each_pass_counts_its_own_lights() {
+    let mut random = Random(23);
+    let mut world = World::new();
+    let ball = shapes::uv_sphere(0.4, 8, 4);
+    let glass = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..Material::matt(Vec3::ONE) };
+    let mut balls = [Vec::new(), Vec::new()];
+    for number in 0..24 {
+        let place = random.place(5.0);
+        let material = if number % 3 == 0 { glass.clone() } else { Material::matt(Vec3::ONE) };
+        balls[usize::from(number % 3 == 0)].push(place);
+        world.spawn((Mesh::from(ball.clone()), material, Transform::from_translation(place)));
+    }
+    let mut lamps = Vec::new();
+    for _ in 0..40 {
+        let (place, range) = (random.place(7.0), random.within(0.5, 4.0) as f32);
+        let lamp = Light::point(Vec3::ONE).with_range(range);
+        world.spawn((lamp, Transform::from_translation(place)));
+        lamps.push((place, f64::from(range)));
+    }
+    world.spawn((
+        Camera { projection: Projection::orthographic(20.0, 20.0, 80.0), exposure: 1.0 },
+        Transform::from_xyz(0.0, 0.0, 40.0),
+    ));
+    // By brute force: the lamps that reach the box around a ball.
+    let half_size = ball.positions.iter().fold(Vec3::ZERO, |half, at| half.max(at.abs())).as_dvec3();
+    let reaching = |place: &DVec3| -> Vec<usize> {
+        let reaches = |(lamp, range): &(DVec3, f64)| {
+            ((*lamp - *place).abs() - half_size).max(DVec3::ZERO).length() < *range
+        };
+        (0..lamps.len()).filter(|lamp| reaches(&lamps[*lamp])).collect()
+    };
+    for lists in [LightLists::Objects, LightLists::Everything] {
+        let options = FrameOptions { measure: Measure::Time, ..by(lists) };
+        let (_, report) = draw(&mut world, 32, 32, &options);
+        let passes = report.statistics.lit_passes;
+        assert_eq!(passes.lightmap, PassLights::default());
+        for (counted, balls) in [passes.forward, passes.transparent].iter().zip(&balls) {
+            let lists: Vec<Vec<usize>> = match lists {
+                LightLists::Everything => vec![(0..lamps.len()).collect(); balls.len()],
+                _ => balls.iter().map(reaching).collect(),
+            };
+            let different: std::collections::BTreeSet<usize> = lists.iter().flatten().copied().collect();
+            let mean = lists.iter().map(Vec::len).sum::<usize>() as f32 / balls.len() as f32;
+            assert_eq!((counted.objects, counted.lights as usize), (balls.len(), different.len()));
+            assert!((counted.lights_per_object - mean).abs() < 1e-4, "{counted:?}: {mean}");
+        }
     }
 }

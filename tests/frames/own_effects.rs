@@ -167,3 +167,25 @@ fn the_core_has_no_line_about_them() {
     assert!(files > 80, "only {files} files were read");
     assert!(lines.is_empty(), "{} lines of the core are about them:\n{}", lines.len(), lines.join("\n"));
 }
+
+#[test]
+fn effects_that_say_that_they_are_still_let_a_frame_be_kept() {
+    let (mut world, ball, camera) = ball(Material::matt(Vec3::ONE));
+    world.entity_mut(camera).insert(Bloom { strength: 0.4, levels: 2 });
+    world.entity_mut(ball).insert(Outlined { color: Vec3::X });
+    let mut renderer = with_both();
+    let target = Offscreen::new(gpu(), SIZE, SIZE, OffscreenFormat::Rgba8).unwrap();
+    let options = FrameOptions { keep_unchanged: true, ..FrameOptions::default() };
+    let mut drawn = |world: &mut World| {
+        let report = renderer.render(world, &target.target(), &options).unwrap();
+        report.plan.running().count() > 0
+    };
+    assert!(drawn(&mut world));
+    // Transforms were propagated, which is a change once.
+    drawn(&mut world);
+    assert!(!drawn(&mut world));
+    world.get_mut::<Bloom>(camera).unwrap().strength = 0.5;
+    assert!(drawn(&mut world) && !drawn(&mut world));
+    world.entity_mut(ball).remove::<Outlined>();
+    assert!(drawn(&mut world) && !drawn(&mut world));
+}

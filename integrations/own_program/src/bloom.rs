@@ -36,6 +36,11 @@ struct OnDevice {
     strength: wgpu::Buffer,
 }
 
+/// The bloom that the World asks for.
+fn found(world: &mut World) -> Option<Bloom> {
+    world.query::<&Bloom>().iter(world).copied().find(|bloom| bloom.strength > 0.0)
+}
+
 impl Effect for BloomEffect {
     fn name(&self) -> &'static str {
         "bloom"
@@ -46,9 +51,12 @@ impl Effect for BloomEffect {
     }
 
     fn extract(&mut self, world: &mut World, _: &SceneFacts, _: &FrameOptions) -> bool {
-        let found = world.query::<&Bloom>().iter(world).copied().find(|bloom| bloom.strength > 0.0);
-        self.bloom = found;
-        found.is_some()
+        self.bloom = found(world);
+        self.bloom.is_some()
+    }
+
+    fn is_still(&mut self, world: &mut World) -> bool {
+        found(world) == self.bloom
     }
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {

@@ -48,6 +48,12 @@ impl OutlineEffect {
     }
 }
 
+/// The colours of the objects that are to be outlined.
+fn found(world: &mut World) -> HashMap<Entity, Vec3> {
+    let mut query = world.query::<(Entity, &Outlined)>();
+    query.iter(world).map(|(entity, outlined)| (entity, outlined.color)).collect()
+}
+
 impl Effect for OutlineEffect {
     fn name(&self) -> &'static str {
         "outline"
@@ -58,9 +64,12 @@ impl Effect for OutlineEffect {
     }
 
     fn extract(&mut self, world: &mut World, _: &SceneFacts, _: &FrameOptions) -> bool {
-        let mut query = world.query::<(Entity, &Outlined)>();
-        self.outlined = query.iter(world).map(|(entity, outlined)| (entity, outlined.color)).collect();
+        self.outlined = found(world);
         !self.outlined.is_empty()
+    }
+
+    fn is_still(&mut self, world: &mut World) -> bool {
+        found(world) == self.outlined
     }
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
