@@ -57,7 +57,7 @@ fn scene() -> Scene {
     let (_, report) = scene.canvas.draw(&mut scene.world, &linear());
     assert_eq!(report.statistics.objects, OBJECTS, "all are in view");
     let all = OBJECTS as u64 * (OBJECT + MATERIAL + INSTANCE) + 5 * (LIGHT + INDEX);
-    assert_eq!(report.statistics.uploaded_bytes, all, "the first frame uploads everything once");
+    assert_eq!(report.statistics.uploads.components(), all, "the first frame uploads everything once");
     scene
 }
 
@@ -77,11 +77,11 @@ impl Scene {
         change(self);
         let (after, report) = self.redrawn();
         assert!(before != after, "negative control: the change is seen");
-        let uploaded = report.statistics.uploaded_bytes;
+        let uploaded = report.statistics.uploads.components();
         assert!(uploaded <= bytes, "{uploaded} bytes were uploaded, not {bytes}");
         // Whatever changed, it is uploaded once.
         let (_, report) = self.canvas.draw(&mut self.world, &linear());
-        assert_eq!(report.statistics.uploaded_bytes, 0);
+        assert_eq!(report.statistics.uploads.components(), 0);
         report
     }
 }
@@ -91,9 +91,9 @@ fn a_frame_in_which_nothing_changed_uploads_nothing() {
     // Of components, that is: the uniform of the frame (the camera, 144 bytes) is written every time and not counted.
     let mut scene = scene();
     let (first, report) = scene.redrawn();
-    assert_eq!(report.statistics.uploaded_bytes, 0);
+    assert_eq!(report.statistics.uploads.components(), 0);
     let (second, report) = scene.redrawn();
-    assert_eq!(report.statistics.uploaded_bytes, 0);
+    assert_eq!(report.statistics.uploads.components(), 0);
     assert!(first == second);
 }
 
@@ -215,7 +215,7 @@ fn growing_beyond_every_buffer_keeps_what_was_there() {
     let (_, report) = scene.redrawn();
     assert_eq!(report.statistics.lights, 45);
     let (_, report) = scene.redrawn();
-    assert_eq!(report.statistics.uploaded_bytes, 0);
+    assert_eq!(report.statistics.uploads.components(), 0);
 }
 
 #[test]

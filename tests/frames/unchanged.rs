@@ -80,10 +80,10 @@ fn is_still(report: &FrameReport) -> bool {
 fn a_still_world_is_not_looked_through_again() {
     let mut scene = scene();
     let (first, report) = scene.frame();
-    assert!(!is_still(&report) && report.statistics.uploaded_bytes > 0);
+    assert!(!is_still(&report) && report.statistics.uploads.components() > 0);
     let counts = report.statistics;
     let (still, report) = scene.rest();
-    assert!(still == first && report.statistics.uploaded_bytes == 0);
+    assert!(still == first && report.statistics.uploads.components() == 0);
     assert_eq!(
         (report.statistics.objects, report.statistics.draws, report.statistics.triangles),
         (counts.objects, counts.draws, counts.triangles)

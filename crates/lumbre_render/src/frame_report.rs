@@ -36,8 +36,6 @@ pub struct Statistics {
     pub lit_passes: LitPasses,
     /// What the CPU did, stage by stage.
     pub cpu: CpuStages,
-    /// Bytes of components uploaded for this frame because they changed.
-    pub uploaded_bytes: u64,
     /// What was uploaded for this frame, by what it is.
     pub uploads: Uploads,
 }

@@ -217,12 +217,8 @@ impl Renderer {
                     return Ok(self.report_unchanged(last, plan, &clock));
                 }
                 self.shadows.stale.clear();
-                let statistics = Statistics {
-                    uploaded_bytes: 0,
-                    uploads: Uploads::default(),
-                    cpu: CpuStages::default(),
-                    ..last.statistics
-                };
+                let statistics =
+                    Statistics { uploads: Uploads::default(), cpu: CpuStages::default(), ..last.statistics };
                 LastFrame { statistics, ..last }
             }
             None => self.prepare(world, target, options, asked, &mut clock)?,
@@ -240,8 +236,7 @@ impl Renderer {
     /// What there is to say of a frame that is not drawn, since the target holds it.
     fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &Clock) -> FrameReport {
         let cpu = CpuStages { total_ms: milliseconds(clock.begun), ..CpuStages::default() };
-        let statistics =
-            Statistics { uploaded_bytes: 0, uploads: Uploads::default(), cpu, ..last.statistics };
+        let statistics = Statistics { uploads: Uploads::default(), cpu, ..last.statistics };
         let census = Arc::clone(&last.decided.census);
         self.last = Some(last);
         FrameReport {
@@ -509,7 +504,6 @@ impl Renderer {
             variants: self.pipelines.variants(),
             pipelines_made: self.pipelines.made(),
             pipelines_awaited: 0,
-            uploaded_bytes: uploads.components(),
             uploads,
         })
     }

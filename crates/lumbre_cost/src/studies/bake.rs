@@ -5,12 +5,13 @@ use std::time::Duration;
 use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
 
+use super::over_scenes;
 use crate::baked::{bake_arguments, bake_options, bake_scene, maps_of, texel_error};
 use crate::findings::{cheapest_by_error, error_of, percent, rounded, short};
 use crate::frames::draw_picture;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
-use crate::scenes::{Air, room};
+use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Errors that are asked for, as shares.
@@ -27,17 +28,9 @@ const FOUND: &str = "error found, % of the mean";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let scenes = match conditions.files.is_empty() {
-        true => vec![SceneFile::made(conditions, "room", room(Air::Clear))?],
-        false => SceneFile::given(conditions)?,
-    };
-    let mut measured = Measured { study: study(), ..Measured::default() };
-    let count = scenes.len() as f64;
-    for (place, scene) in scenes.iter().enumerate() {
-        let told = [place, place + 1].map(|place| place as f64 / count);
-        of_scene(conditions, scene, told, &mut measured)?;
-    }
-    Ok(measured)
+    over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
 }
 
 fn study() -> Study {

@@ -3,11 +3,12 @@
 use lumbre_render::{FrameOptions, removable_effects};
 use lumbre_scene::Census;
 
+use super::over_scenes;
 use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded};
 use crate::frames::{DrawnFrame, Frame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
-use crate::scenes::{Air, room};
+use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Seconds for the frames of each scene of a full report.
@@ -21,17 +22,9 @@ const SAVED: &str = "saved, ms";
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let scenes = match conditions.files.is_empty() {
-        true => vec![SceneFile::made(conditions, "hazy-room", room(Air::Hazy))?],
-        false => SceneFile::given(conditions)?,
-    };
-    let mut measured = Measured { study: study(), ..Measured::default() };
-    let count = scenes.len() as f64;
-    for (place, scene) in scenes.iter().enumerate() {
-        let told = [place, place + 1].map(|place| place as f64 / count);
-        of_scene(conditions, scene, told, &mut measured)?;
-    }
-    Ok(measured)
+    over_scenes(conditions, study(), ("hazy-room", Air::Hazy), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
 }
 
 fn study() -> Study {

@@ -10,13 +10,14 @@ use lumbre_scene::{
     lightmap_to_open_exr,
 };
 
+use super::over_scenes;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_scene};
 use crate::findings::{listed, percent, rounded, short};
 use crate::frames::{Frame, draw_frames};
 use crate::fronts::pareto_front;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
-use crate::scenes::{Air, room};
+use crate::scenes::Air;
 use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
 
 /// Texels of the reference; each density below has a quarter of the texels of the one before.
@@ -77,17 +78,9 @@ impl Format {
 /// # Errors
 /// [`CostError`].
 pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
-    let scenes = match conditions.files.is_empty() {
-        true => vec![SceneFile::made(conditions, "room", room(Air::Clear))?],
-        false => SceneFile::given(conditions)?,
-    };
-    let mut measured = Measured { study: study(), ..Measured::default() };
-    let count = scenes.len() as f64;
-    for (place, scene) in scenes.iter().enumerate() {
-        let told = [place, place + 1].map(|place| place as f64 / count);
-        of_scene(conditions, scene, told, &mut measured)?;
-    }
-    Ok(measured)
+    over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
 }
 
 fn study() -> Study {

@@ -10,7 +10,9 @@ mod reflection;
 mod shading;
 
 use crate::measured::Measured;
-use crate::{Conditions, CostError};
+use crate::scene_file::SceneFile;
+use crate::scenes::{Air, room};
+use crate::{Conditions, CostError, Study};
 
 /// A study that can be asked for.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +36,26 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "lightmaps", about: "density and format of lightmaps", run: lightmaps::run },
     StudyKind { name: "precision", about: "f32 on the device against f64", run: precision::run },
 ];
+
+/// A study of each file that was given, or, without one, of the room in this air under this name. `of_scene` is told which share of the study, from 0 to 1, a
+/// scene begins and ends with.
+fn over_scenes(
+    conditions: &Conditions<'_>,
+    study: Study,
+    (name, air): (&str, Air),
+    of_scene: impl Fn(&SceneFile, [f64; 2], &mut Measured) -> Result<(), CostError>,
+) -> Result<Measured, CostError> {
+    let scenes = match conditions.files.is_empty() {
+        true => vec![SceneFile::made(conditions, name, room(air))?],
+        false => SceneFile::given(conditions)?,
+    };
+    let mut measured = Measured { study, ..Measured::default() };
+    let count = scenes.len() as f64;
+    for (place, scene) in scenes.iter().enumerate() {
+        of_scene(scene, [place, place + 1].map(|place| place as f64 / count), &mut measured)?;
+    }
+    Ok(measured)
+}
 
 /// The studies of these names, in the order of the page; all without a name.
 ///

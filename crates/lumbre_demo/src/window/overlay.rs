@@ -190,7 +190,7 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
         "{} triangles of {} objects in {} draw calls",
         counts.triangles, counts.objects, counts.draws
     ));
-    let (outside, pipelines, bytes) = (counts.objects_outside, counts.pipelines_made, counts.uploaded_bytes);
+    let (outside, pipelines, bytes) = (counts.objects_outside, counts.pipelines_made, counts.uploads.total());
     let awaited = match counts.pipelines_awaited {
         0 => String::new(),
         awaited => format!(" and {awaited} being made"),

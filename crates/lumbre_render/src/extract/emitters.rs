@@ -51,6 +51,11 @@ impl Emitters {
         if self.world != Some(world.id()) {
             *self = Self { world: Some(world.id()), ..Self::default() };
         }
+        // Most Worlds have none.
+        if world.query_filtered::<(), With<EmissiveLight>>().iter(world).next().is_none() {
+            self.known.clear();
+            return Ok(Vec::new());
+        }
         let hidden = hidden_entities(world);
         let mut query = world.query_filtered::<(
             (Entity, &Mesh, &Material, &GlobalTransform, Option<&MaterialTextures>),
