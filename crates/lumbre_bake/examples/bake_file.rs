@@ -1,4 +1,4 @@
-//! Bakes a glTF file, or a held-out scene by its name: `bake_file IN.glb|SCENE OUT.glb [--map-size N] [--draft] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
+//! Bakes a glTF file, or a held-out scene by its name: `bake_file IN.glb|SCENE OUT.glb [--map-size N] [--draft|--reference] [--error X] [--time SECONDS] [--csv REFERENCE] [--maps FOLDER]`.
 //! With a reference it prints the error, with a folder it writes each map as a PNG to look at.
 
 use std::error::Error;
@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--seed" => options.seed = value()?.parse()?,
             "--threads" => options.threads = Some(value()?.parse()?),
             "--draft" => options.quality = Quality::Draft,
+            "--reference" => options.quality = Quality::Reference,
             "--no-denoise" => options.denoise = false,
             "--no-seams" => options.seams = false,
             "--no-resolution-error" => options.resolution_error = false,

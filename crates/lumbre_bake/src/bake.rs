@@ -27,6 +27,7 @@ use crate::texels::resolution_error::{DensePoint, Light, compare};
 use crate::texels::rounds::{Bounced, Receivers};
 use crate::texels::seams::{Maps, Patience, close_seams};
 use crate::texels::straddling::{crossed, straddling};
+use crate::texels::texel_radiance::{GatheredLight, mean_reflectances};
 use crate::texels::worst_places::worst_places;
 use crate::texels::{lighting, rounds};
 use crate::transport::direct::Sources;
@@ -246,7 +247,13 @@ fn run(
                 total[texel.index as usize] = direct.total();
             }
             divided.places().for_each(|index| total[index] = Vec3::NAN);
+            let reflectance =
+                watch.during(0.0, || mean_reflectances(&scene, &layout, &exchange.patches, &texels))?;
+            let unknown = GatheredLight::default();
             let cache = RadianceCache {
+                gathered: &unknown,
+                correlated: CORRELATED_TEXELS * side,
+                reflectance: &reflectance,
                 scene: &scene,
                 layout: &layout,
                 patches: &exchange.patches,
@@ -256,7 +263,7 @@ fn run(
                 patch_direct: &exchange.direct,
                 patch_indirect: &exchange.indirect,
                 patch_error: &exchange.indirect_error,
-                near: exchange.near,
+                near: &exchange.near,
                 guide: &exchange.guide,
                 run: options.effort().gather[0] / REPLICATES as u32,
             };
@@ -273,6 +280,10 @@ fn run(
             };
             let gathered = rounds::gather(&cache, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
+            let variances = &gathered.variances.expected;
+            let light =
+                watch.during(1.0, || GatheredLight::new(&texels, &gathered.light, variances, &total))?;
+            let cache = RadianceCache { gathered: &light, ..cache };
             let volume =
                 probes::bake(&wanted, &scene, &sources, Some(&cache), options, &mut watch, &mut report)?;
             let light = Light { scene: &scene, sources: &sources, cache: Some(&cache) };
@@ -296,11 +307,11 @@ fn run(
         report.rebake = Some(rebake_report(changes, &texels, relit, kept.as_ref(), &report));
     }
     if exchange.is_none() {
-        note_direct_error(&texels, variances, &local, options, &mut report);
+        note_direct_error(&texels, &variances.expected, &local, options, &mut report);
         report.ended = Ended::after(report.error_reached, watch.is_late(), true);
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
     }
-    let (squares, whole) = (local.relative(variances), report.estimated_error);
+    let (squares, whole) = (local.relative(&variances.expected), report.estimated_error);
     report.worst = watch.during(0.0, || worst_places(&scene, &objects, &texels, &squares, whole))?;
     let samples = match former {
         Former::Forget => None,
@@ -323,7 +334,7 @@ fn run(
         }
     };
     watch.advance(0.2)?;
-    let known = (values.as_slice(), variances.as_slice());
+    let known = (values.as_slice(), variances.cautious.as_slice());
     let (mut filled, errors) =
         watch.during(0.2, || fill(&layout, &texels, &charts, known, options.gap, &scene.stop))?;
     watch.advance(1.0)?;
@@ -383,6 +394,9 @@ fn note_seams(
     }
     Ok(())
 }
+
+/// Texels over which the errors that smoothing leaves go together.
+const CORRELATED_TEXELS: f32 = 4.5;
 
 /// Length of a texel's side on the surface, canonical units, by the mean of all.
 fn texel_side(scene: &BakeScene, texels: &[Texel]) -> f32 {

@@ -20,27 +20,28 @@ use crate::{BakeError, BakeOptions, BakeReport};
 const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4) as u64;
 
 /// Of a texel that shows a surface: what it has gathered before and after a round, raw and smoothed estimates with their guides, and
-/// eight lists of one number each for the errors; the light around it, and its block. (What it has of shared samples is less, and gone by then.)
+/// sixteen lists of one number each for the errors; the light around it, and its block. (What it has of shared samples is less, and gone by then.)
 const COVERED: u64 = (size_of::<Texel>()
     + size_of::<Direct>()
     + 2 * size_of::<Gathered>()
     + 2 * size_of::<Estimates>()
     + 24
-    + 8 * 4
+    + 16 * 4
     + 3 * 4) as u64;
 
 /// Of a texel of a map: its light, direct and filled, the fill's two lists with their errors, and its error; or, before that and more, the numbers
 /// that smoothing keeps in rows: estimates with their bias, those of the weighted fit, guides with the noise, products and nearness. Its place
-/// among the covered ones and its surface.
-const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8;
+/// among the covered ones and its surface; its reflectance, and the light that the rounds before have gathered, with its error.
+const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1);
 
 /// What rows of texels have beside them, in texels.
 fn margins(layout: &LightmapLayout) -> u64 {
     layout.maps.iter().map(|map| u64::from(map.height) * BESIDE_A_ROW as u64).sum()
 }
 
-/// Of a patch: itself, its direct light in two halves and together, its rows' heads, and sixteen lists of the solver for each channel.
-const PATCH: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8) as u64;
+/// Of a patch: itself, its direct light in two halves and together, its rows' heads, and sixteen lists of the solver for each channel; how near it
+/// may be read.
+const PATCH: u64 = (size_of::<Patch>() + 4 * 12 + 6 * 24 + 3 * 16 * 8 + 4) as u64;
 
 /// Of a ray for form factors that meets a patch of its own: the count of it in the rays' half (a list may have grown to twice its
 /// length), in the row and in the column, and both entries of the pair in the matrix and in a half's.

@@ -170,6 +170,7 @@ mod tests {
             baked: Vec3::new(1.0, -0.0, f32::MIN_POSITIVE / 2.0),
             mixed: Vec3::new(f32::INFINITY, 3.5, -2.0),
             variance: 0.1,
+            caution: 0.05,
             rays: 7,
             sampled: true,
             seen: Seen { partly: true, signature: 0xdead_beef },

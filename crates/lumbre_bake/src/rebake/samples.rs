@@ -69,11 +69,19 @@ impl TexelSamples {
     /// Whether all of it are numbers that a bake can go on with.
     pub fn is_sound(&self) -> bool {
         let Self { cell: _, footprint: _, direct, gathered, bounced, neglected } = self;
-        let Gathered { sums, patch_errors, differences, squared_differences, inverse_distances, .. } =
-            gathered;
+        let Gathered {
+            sums,
+            patch_errors,
+            texel_variances,
+            differences,
+            squared_differences,
+            inverse_distances,
+            ..
+        } = gathered;
         let finite = (direct.baked + direct.mixed + *bounced + *differences).is_finite()
             && (direct.variance + *squared_differences + *inverse_distances).is_finite()
             && patch_errors.is_finite()
+            && texel_variances.is_finite()
             && sums.iter().all(|sum| sum.is_finite());
         finite && direct.variance >= 0.0 && *neglected >= 0.0 && neglected.is_finite()
     }

@@ -57,6 +57,7 @@ pub enum SamplesError {
 struct Settled {
     sums: [Vec3; REPLICATES],
     patch_errors: Vec2,
+    texel_variances: f32,
     checks: u32,
     differences: Vec3,
     squared_differences: f32,
@@ -67,6 +68,7 @@ struct Settled {
 fields!(Settled {
     sums: [Vec3; REPLICATES],
     patch_errors: Vec2,
+    texel_variances: f32,
     checks: u32,
     differences: Vec3,
     squared_differences: f32,
@@ -80,6 +82,7 @@ impl From<&Gathered> for Settled {
             sums,
             weights: _,
             patch_errors,
+            texel_variances,
             checks,
             differences,
             squared_differences,
@@ -87,7 +90,16 @@ impl From<&Gathered> for Settled {
             samples,
             rays: _,
         } = *own;
-        Self { sums, patch_errors, checks, differences, squared_differences, inverse_distances, samples }
+        Self {
+            sums,
+            patch_errors,
+            texel_variances,
+            checks,
+            differences,
+            squared_differences,
+            inverse_distances,
+            samples,
+        }
     }
 }
 
@@ -96,6 +108,7 @@ impl From<Settled> for Gathered {
         let Settled {
             sums,
             patch_errors,
+            texel_variances,
             checks,
             differences,
             squared_differences,
@@ -107,6 +120,7 @@ impl From<Settled> for Gathered {
             sums,
             weights,
             patch_errors,
+            texel_variances,
             checks,
             differences,
             squared_differences,

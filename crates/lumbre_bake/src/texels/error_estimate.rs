@@ -6,6 +6,7 @@
 //!            + smoothing:    half of the replicates smoothed against the other half raw, over the neighbourhood
 //!            + form factors: half the difference of two half solutions, gathered by the texel's own rays
 //!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
+//!            + texels read:  what is expected of the texels that later rounds read, as far as it goes together
 //!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
 //!            + solver:       residual / (1 - rho) of the light by bounces
 //!            + arithmetic:   what cracks as wide as coordinates are rounded let through of all the light
@@ -18,16 +19,39 @@ use rayon::prelude::*;
 
 use super::footprint::Texel;
 use super::gather::Gathered;
+use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, variance};
 use super::surroundings::Surroundings;
 use crate::transport::direct::Direct;
+
+/// Squared errors of texels, mean of the channels.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Variances {
+    /// As they are stated of single texels.
+    pub cautious: Vec<f32>,
+    /// As they are expected: for sums over many.
+    pub expected: Vec<f32>,
+}
+
+impl Variances {
+    /// Other squared errors added, of which nothing more is known.
+    pub fn with(&self, more: &[f32]) -> Self {
+        let sum = |own: &[f32]| own.iter().zip(more).map(|(own, more)| own + more).collect();
+        Self { cautious: sum(&self.cautious), expected: sum(&self.expected) }
+    }
+
+    /// In shares of the squared light around the texels.
+    pub fn relative(&self, local: &LocalLight) -> Self {
+        Self { cautious: local.relative(&self.cautious), expected: local.relative(&self.expected) }
+    }
+}
 
 /// What the gather leaves of each kind, squared, mean of the channels, per covered texel.
 pub(crate) struct GatherErrors<'a> {
     pub gathered: &'a [Gathered],
     pub estimates: &'a [Estimates],
     /// Variance of the mean of each.
-    pub spread: &'a [f32],
+    pub spread: &'a Variances,
     pub smoothing_bias: &'a [f32],
     pub patch_bias: &'a [PatchBias],
     /// Relative, of the solver.
@@ -46,10 +70,10 @@ const ALONE: f32 = 2.0 / 3.0;
 /// (mean of four seeds), with one and a half on 96.6 %, and with two on 97.9 % for twice the rays.
 const BEYOND: f32 = 1.5;
 
-/// Variance of every texel's mean, mean of the channels. Four replicates alone tell it badly: in one case of seven the mean is further than
-/// two of their standard errors from the truth (Student's t with three degrees of freedom); their neighbours' tell it too, and the larger counts,
-/// with so many standard errors of the neighbours' mean, since rays end where it is small by chance.
-pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> Vec<f32> {
+/// Variance of every texel's mean. Four replicates alone tell it badly: in one case of seven the mean is further than two of their standard errors
+/// from the truth (Student's t with three degrees of freedom); their neighbours' tell it too. Of a single texel the larger is stated, with so many
+/// standard errors of the neighbours' mean, since rays end where it is small by chance; over many texels the neighbours' mean is right.
+pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> Variances {
     let own: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum() / 3.0).collect();
     // The replicates of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
@@ -61,11 +85,12 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -
         .collect();
     let numbers = |index: usize| [1.0, own[index], own[index] * own[index], halves[index]];
     let sums = surroundings.sums(numbers, SPREAD_STEPS, SPREAD_STEP);
-    let around = |[count, sum, squares, of_halves]: [f32; 4]| {
+    let both = |([count, sum, squares, of_halves], own): ([f32; 4], &f32)| {
         let mean = (sum / count.max(1.0)).max(of_halves / count.max(1.0));
-        mean + BEYOND * standard_error([count, sum, squares])
+        (own.max(mean + BEYOND * standard_error([count, sum, squares])), mean)
     };
-    sums.into_par_iter().zip(&own).map(|(sums, own)| own.max(around(sums))).collect()
+    let (cautious, expected) = sums.into_par_iter().zip(&own).map(both).unzip();
+    Variances { cautious, expected }
 }
 
 /// Of the mean of so many variances, of which these are the sum and that of the squares: at least that of as many values with three degrees of
@@ -79,34 +104,34 @@ fn standard_error([count, sum, squares]: [f32; 3]) -> f32 {
 
 impl GatherErrors<'_> {
     /// The part of each texel's variance that more rays make smaller.
-    pub fn by_rays(&self) -> Vec<f32> {
-        self.spread.iter().zip(self.smoothing_bias).map(|(noise, bias)| noise + bias).collect()
+    pub fn by_rays(&self) -> Variances {
+        self.spread.with(self.smoothing_bias)
     }
 }
 
 /// Share of the mean light that is within the rounding of coordinates: sixteen of it, as where segments end.
 const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
 
-/// Variance of every covered texel, mean of the channels; `light` is the mean of all, W/m², of which cracks may let through.
-pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> Vec<f32> {
+/// Variance of every covered texel; `light` is the mean of all, W/m², of which cracks may let through.
+pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> Variances {
     let least = (ARITHMETIC * light).powi(2);
-    direct
-        .par_iter()
-        .enumerate()
-        .map(|(index, direct)| {
-            let by_bounces = gather.map_or(0.0, |gather| {
-                let estimates = &gather.estimates[index];
-                let unsolved = gather.residual_bound as f32 * mean(estimates).element_sum() / 3.0;
-                gather.spread[index]
-                    + gather.smoothing_bias[index]
-                    + gather.gathered[index].patch_error().powi(2)
-                    + unsolved * unsolved
-                    + gather.patch_bias[index].rest
-                    + gather.neglected.get(index).map_or(0.0, |neglected| neglected * neglected)
-            });
-            direct.variance + by_bounces + least
-        })
-        .collect()
+    let of_texel = |(index, direct): (usize, &Direct)| {
+        let systematic = gather.map_or(0.0, |gather| {
+            let estimates = &gather.estimates[index];
+            let unsolved = gather.residual_bound as f32 * mean(estimates).element_sum() / 3.0;
+            gather.smoothing_bias[index]
+                + gather.gathered[index].squared_read_error()
+                + unsolved * unsolved
+                + gather.patch_bias[index].rest
+                + gather.neglected.get(index).map_or(0.0, |neglected| neglected * neglected)
+        });
+        let [cautious, expected] =
+            gather.map_or([0.0; 2], |gather| [gather.spread.cautious[index], gather.spread.expected[index]]);
+        let rest = direct.variance + systematic + least;
+        (cautious + rest, expected + (rest - direct.caution))
+    };
+    let (cautious, expected) = direct.par_iter().enumerate().map(of_texel).unzip();
+    Variances { cautious, expected }
 }
 
 /// Texels around one over which checks are put together.

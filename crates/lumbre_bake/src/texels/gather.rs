@@ -1,6 +1,6 @@
 //! The final gather: rays from every texel read the light that leaves what they meet. Direct light there is that of
-//! the texel hit; the bounces before are the patches', or, where the hit is near and the patches coarse against it,
-//! those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
+//! the texel hit, and so are the bounces before once a round has gathered them; in the first they are the patches', or, where the hit is near and
+//! the patches coarse against it, those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
 
 use std::cell::RefCell;
 
@@ -77,6 +77,8 @@ struct Reading {
     weight: f32,
     /// What the patches' errors leave in it.
     error: Vec2,
+    /// What the errors of texels' light that was gathered before leave in the mean of many such samples, squared.
+    texel_variance: f32,
     /// Whether the patch that was read was checked, and by how much it is more than the real bounce.
     checked: bool,
     difference: Vec3,
@@ -89,6 +91,7 @@ impl Reading {
         light: Vec3::ZERO,
         weight: 0.0,
         error: Vec2::ZERO,
+        texel_variance: 0.0,
         checked: false,
         difference: Vec3::ZERO,
         rays: 0,
@@ -128,6 +131,8 @@ pub(crate) struct Gathered {
     pub weights: [Weights; REPLICATES],
     /// Sum over all samples of what the patches' errors add.
     pub patch_errors: Vec2,
+    /// Sum over all samples of the squared error that texels' light that was gathered before leaves in their mean.
+    pub texel_variances: f32,
     /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
     pub checks: u32,
     pub differences: Vec3,
@@ -144,6 +149,7 @@ fields!(Gathered {
     sums: [Vec3; REPLICATES],
     weights: [Weights; REPLICATES],
     patch_errors: Vec2,
+    texel_variances: f32,
     checks: u32,
     differences: Vec3,
     squared_differences: f32,
@@ -194,9 +200,10 @@ impl Gathered {
         self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 
-    /// What the patches' errors add to the mean of the replicates.
-    pub fn patch_error(&self) -> f32 {
-        self.patch_errors.length() / (self.samples.max(1) * REPLICATES as u32) as f32
+    /// The squared error that the light read adds to the mean of the replicates: the patches', and that of texels that were gathered before.
+    pub fn squared_read_error(&self) -> f32 {
+        let count = (self.samples.max(1) * REPLICATES as u32) as f32;
+        self.patch_errors.length_squared() / (count * count) + self.texel_variances / count
     }
 }
 
@@ -276,6 +283,7 @@ impl RadianceCache<'_> {
             gathered.weights[replicate].add(reading.weight, reading.light);
             gathered.rays += 1 + u64::from(reading.rays);
             gathered.patch_errors += reading.error;
+            gathered.texel_variances += reading.texel_variance;
             gathered.checks += u32::from(reading.checked);
             gathered.differences += reading.difference;
             gathered.squared_differences += (reading.difference.element_sum() / 3.0).powi(2);
@@ -284,13 +292,14 @@ impl RadianceCache<'_> {
     }
 
     /// The light that leaves a point that was met, emission apart, times a weight. Returns the surface whose patch was read, if one was; the
-    /// difference of that to a real bounce is then still to be multiplied by it.
+    /// difference of that to a real bounce is then still to be multiplied by it. Where a texel was read instead, there is nothing to check.
     fn read(&self, hit: &Hit, sequence: &TileSequence, sample: u32, reading: &mut Reading) -> Option<Hit> {
         let mut weight = reading.weight * hit.reflectance;
         let (mut light, mut last) = (weight * hit.direct, *hit);
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
-            if last.distance >= self.near || weight == Vec3::ZERO {
+            let is_coarse = last.variance.is_none() && last.distance < self.near[last.patch as usize];
+            if !is_coarse || weight == Vec3::ZERO {
                 break;
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
@@ -308,7 +317,17 @@ impl RadianceCache<'_> {
             last = hit;
         }
         reading.light = light + weight * last.indirect;
-        reading.error = last.error * (weight.element_sum() / 3.0);
+        let grey = weight.element_sum() / 3.0;
+        if let Some(variance) = last.variance {
+            // Of the samples, about this share hits what goes together with what this one has hit.
+            let facing =
+                -last.direction.dot(self.scene.triangles[last.triangle as usize].side_normal(last.side));
+            let under = self.correlated / last.distance.max(f32::MIN_POSITIVE);
+            let share = (facing.max(0.0) * under * under).min(1.0);
+            reading.texel_variance = share * grey * grey * variance;
+            return None;
+        }
+        reading.error = last.error * grey;
         if reading.checked {
             reading.difference = weight;
         }

@@ -46,11 +46,13 @@ pub(super) struct Hit {
     pub at: (f32, f32),
     pub patch: u32,
     pub reflectance: Vec3,
-    /// Irradiance there: direct, and the patch's by bounces.
+    /// Irradiance there: direct, and the texel's or patch's by bounces.
     pub direct: Vec3,
     pub indirect: Vec3,
     /// The patch's errors in that.
     pub error: Vec2,
+    /// The squared error of `indirect` where it is that of a texel that was gathered before, and not the patch's.
+    pub variance: Option<f32>,
     /// Of the ray, of unit length, and how far it went.
     pub direction: Vec3,
     pub distance: f32,
@@ -67,6 +69,7 @@ impl Hit {
         direct: Vec3::ZERO,
         indirect: Vec3::ZERO,
         error: Vec2::ZERO,
+        variance: None,
         direction: Vec3::ZERO,
         distance: 0.0,
     };
@@ -109,6 +112,7 @@ pub(super) struct SamplePath {
     region: Option<u32>,
     texel: usize,
     direct: Vec3,
+    reflectance: Vec3,
 }
 
 impl SamplePath {
@@ -120,6 +124,7 @@ impl SamplePath {
         region: None,
         texel: usize::MAX,
         direct: Vec3::ZERO,
+        reflectance: Vec3::ZERO,
     };
 }
 
@@ -180,16 +185,25 @@ impl RadianceCache<'_> {
                 _ => None,
             };
             hit.patch = patch;
-            hit.reflectance = self.reflectance(hit.triangle, hit.side, hit.at);
             path.texel = self.texel_at(hit.triangle, hit.side, hit.at);
         }
         for path in paths.iter_mut() {
             path.direct = self.direct.get(path.texel).copied().unwrap_or(Vec3::NAN);
+            path.reflectance = self.reflectance.get(path.texel).copied().unwrap_or(Vec3::NAN);
         }
         for ((path, request), found) in paths.iter_mut().zip(requests).zip(found.iter_mut()) {
             let Some(hit) = &mut found.hit else { continue };
-            hit.indirect = self.patch_indirect[hit.patch as usize];
-            hit.error = self.patch_error[hit.patch as usize];
+            hit.reflectance = match path.reflectance.x.is_nan() {
+                true => self.reflectance_at(hit.triangle, hit.side, hit.at),
+                false => path.reflectance,
+            };
+            match self.gathered.at(path.texel) {
+                Some((irradiance, variance)) => (hit.indirect, hit.variance) = (irradiance, Some(variance)),
+                None => {
+                    hit.indirect = self.patch_indirect[hit.patch as usize];
+                    hit.error = self.patch_error[hit.patch as usize];
+                }
+            }
             if let (Aim::Around(_), Some(own), Some(region)) = (&path.aim, request.region, path.region) {
                 path.part = self.guide.near_region(own, region);
             }

@@ -74,7 +74,9 @@ pub(crate) fn direct_light(
     let local = so_far.as_ref().unwrap_or(&direct);
     let local = LocalLight::new(sources, layout, texels, charts, local, watch)?;
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
-    let goal = OWN_SHARE * open * options.error.powi(2);
+    let asked = open * options.error.powi(2);
+    // A sample of sources that share them costs less than a ray of the gather, which has to make up for what is left here.
+    let goal = asked * if shared.is_some() { SHARED_SHARE } else { OWN_SHARE };
     let own_goal = if shared.is_some() { 0.5 * goal } else { goal };
 
     let mut again = in_doubt(layout, texels, &direct);
@@ -112,6 +114,8 @@ pub(crate) fn direct_light(
 
 /// Of the squared error asked for, what direct light may have for itself.
 const OWN_SHARE: f64 = 0.35;
+/// The same where sources share samples.
+const SHARED_SHARE: f64 = 0.2;
 /// Order of the variance's fall with the samples at straight edges of shadows, as measured.
 const ORDER: f64 = 1.5;
 
@@ -121,9 +125,9 @@ const PASS_OF_LOCAL_LIGHT: f32 = 0.2;
 
 /// Shadow rays of a texel when the time is up: their spread still tells the error.
 const LATE: u32 = 4;
-/// The variances, in shares of the squared light around.
+/// The variances as they are expected, in shares of the squared light around.
 fn relative(direct: &[Direct], local: &LocalLight) -> Vec<f32> {
-    let variances: Vec<f32> = direct.iter().map(|direct| direct.variance).collect();
+    let variances: Vec<f32> = direct.iter().map(|direct| direct.variance - direct.caution).collect();
     local.relative(&variances)
 }
 

@@ -31,6 +31,7 @@ pub(crate) mod smooth;
 pub(crate) mod smoothing_bias;
 pub(crate) mod straddling;
 pub(crate) mod surroundings;
+pub(crate) mod texel_radiance;
 pub(crate) mod tile_sequence;
 pub(crate) mod tiles;
 pub(crate) mod weighted_fit;

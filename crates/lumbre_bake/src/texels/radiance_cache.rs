@@ -3,12 +3,14 @@
 use glam::{Vec2, Vec3};
 
 use super::divided_light::DividedLight;
+use super::texel_radiance::GatheredLight;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::transport::patches::Patches;
 use crate::transport::sampling_guide::SamplingGuide;
 
 /// The light that leaves surfaces, as the gather reads it.
+#[derive(Clone, Copy)]
 pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
@@ -25,8 +27,14 @@ pub(crate) struct RadianceCache<'a> {
     pub patch_indirect: &'a [Vec3],
     /// Per patch, the errors of that, with their signs: by the form factors' noise, and by the patches' size.
     pub patch_error: &'a [Vec2],
-    /// Hits nearer than this get a real bounce more, canonical units.
-    pub near: f32,
+    /// Per patch, what is nearer to it than this gets a real bounce more, canonical units.
+    pub near: &'a [f32],
+    /// What the rounds so far have found of the bounces; nothing in the first.
+    pub gathered: &'a GatheredLight,
+    /// Within this distance on a surface the errors of `gathered` go together, canonical units.
+    pub correlated: f32,
+    /// Per texel of all maps, mean reflectance, where it is not the same all over the triangle; NaN elsewhere, or empty.
+    pub reflectance: &'a [Vec3],
     /// Where each patch's light comes from.
     pub guide: &'a SamplingGuide,
     /// Samples of each replicate in the first round.
@@ -37,22 +45,21 @@ impl RadianceCache<'_> {
     /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
-        let irradiance = self.direct_at(triangle, side, at, patch) + self.patch_indirect[patch as usize];
-        self.reflectance(triangle, side, at) * irradiance
+        let texel = self.texel_at(triangle, side, at);
+        let gathered = self.gathered.at(texel).map(|(irradiance, _)| irradiance);
+        let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch as usize]);
+        let direct = self.direct_of(texel);
+        let direct = direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch));
+        let irradiance = direct + indirect;
+        self.reflectance_at(triangle, side, at) * irradiance
     }
 
-    pub(super) fn reflectance(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
+    pub(super) fn reflectance_at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
         self.patches.reflectance(triangle, side).unwrap_or_else(|| {
             let triangle = &self.scene.triangles[triangle as usize];
             let surface = &self.scene.surfaces[triangle.surface as usize];
             surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
         })
-    }
-
-    /// Of the texel hit, or its part, or of the patch where no texel shows that side.
-    fn direct_at(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
-        let direct = self.direct_of(self.texel_at(triangle, side, at));
-        direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch))
     }
 
     /// The texel that shows a point, in the row of all maps; the greatest number where none does.

@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::allocation::{Allotment, allot_within};
-use super::error_estimate::{GatherErrors, PatchBias, patch_bias, spread, variances};
+use super::error_estimate::{GatherErrors, PatchBias, Variances, patch_bias, spread, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, REPLICATES, RadianceCache};
 use super::kept::Kept;
@@ -13,6 +13,7 @@ use super::late::from_patches;
 use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
+use super::texel_radiance::GatheredLight;
 use crate::chunks::in_chunks_in_time;
 use crate::progress::Watch;
 use crate::transport::direct::Direct;
@@ -22,8 +23,9 @@ use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 const WORTH_RAYS: f64 = 0.1;
 /// A round's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.7;
-/// Of the squared error asked for, what a round aims at.
-const AIM: f64 = 0.92;
+/// Of the squared error asked for, what a round aims at: as its estimates are rough, a good deal less than what ends the rounds, as another one would
+/// smooth everything once more.
+const AIM: f64 = 0.55;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
 /// The most by which a round lowers the part that rays leave: the first estimates are rough.
@@ -38,8 +40,8 @@ const STALLED: f64 = 0.95;
 pub(crate) struct Bounced {
     /// Irradiance by bounces.
     pub light: Vec<Vec3>,
-    /// Variance of what the map then holds, mean of the channels.
-    pub variances: Vec<f32>,
+    /// Of what the map then holds.
+    pub variances: Variances,
     pub gathered: Vec<Gathered>,
 }
 
@@ -83,8 +85,10 @@ pub(crate) fn gather(
     let settled = kept.is_some() && wanted.is_empty();
     let mut helped_before = f64::INFINITY;
     let mut round = 0;
+    let mut known = GatheredLight::default();
     let (light, variances) = loop {
         watch.pass(PASS);
+        let cache = RadianceCache { gathered: &known, ..*cache };
         let found = in_chunks_in_time(wanted.len(), watch, |place| {
             let Allotment { index, samples } = wanted[place];
             let mut own = gathered[index as usize];
@@ -96,7 +100,7 @@ pub(crate) fn gather(
             gathered[allotted.index as usize] = own;
         }
         if !in_time && round == 0 {
-            from_patches(cache, texels, &mut gathered);
+            from_patches(&cache, texels, &mut gathered);
         }
         round += 1;
         let raw: Vec<Estimates> = gathered.par_iter().map(Gathered::estimates).collect();
@@ -128,34 +132,40 @@ pub(crate) fn gather(
         };
         // What chance leaves in single texels falls out of their mean.
         let by_chance = of_patches(|bias| bias.rest) - of_patches(|bias| bias.expected).max(0.0);
-        let sum = open_sum(texels, &local.relative(&variances)) - by_chance;
+        let sum = open_sum(texels, &local.relative(&variances.expected)) - by_chance;
         report.estimated_error = (sum / open).max(0.0).sqrt();
-        report.error_of_mean = relative_to(total, open_sum(texels, &variances) / open);
+        report.error_of_mean = relative_to(total, open_sum(texels, &variances.expected) / open);
         report.error_reached = report.estimated_error <= options.error;
         report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
         watch.note_error(report.estimated_error);
         watch.advance(1.0)?;
         let late = !in_time || watch.clock().late();
         // Of the error, the part that more rays make smaller: what the patches leave stays.
-        let by_rays = local.relative(&errors.by_rays());
-        let helped = open_sum(texels, &by_rays);
+        let unsettled = errors.by_rays();
+        let by_rays = unsettled.relative(local);
+        let helped = open_sum(texels, &by_rays.expected);
         let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
         helped_before = helped;
         // The part that rays may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
         let rest = sum - helped;
         let asked = open * options.error.powi(2);
         let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
+        // Allotted by what is feared of each texel, down to what is expected of all.
+        let goal = goal * open_sum(texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
         let budget = (effort.budget(open as u64) / REPLICATES as u64).saturating_sub(cast);
         // What little is left of it is not worth another smoothing.
         let spent = (budget as f64) < LEAST_ROUND * cast as f64;
-        wanted = allot_within(budget, open_texels.clone(), &by_rays, &samples, most, ORDER, goal);
+        wanted = allot_within(budget, open_texels.clone(), &by_rays.cautious, &samples, most, ORDER, goal);
         report.ended =
             Ended::after(report.error_reached, late || watch.is_late(), spent || wanted.is_empty());
         if report.error_reached || late || helpless || spent || settled || wanted.is_empty() {
             break (corrected(&estimates, &patch_bias), variances);
         }
+        let light = corrected(&estimates, &patch_bias);
+        known =
+            watch.during(0.0, || GatheredLight::new(texels, &light, &unsettled.expected, cache.direct))?;
     };
     report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
     // Without rays: the patches' light, for want of time.

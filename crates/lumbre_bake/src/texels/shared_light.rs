@@ -167,11 +167,13 @@ impl<'a> SharedLight<'a> {
                 false => (raw, vec![0.0; self.found.len()]),
             })?;
             let spread = watch.during(1.0, || spread(&self.surroundings, &estimates))?;
-            let variances: Vec<f32> = spread.iter().zip(&bias).map(|(spread, bias)| spread + bias).collect();
-            let relative = local.relative(&variances);
+            let variances = spread.with(&bias);
+            let relative = variances.relative(local);
             let asked = |place: &u32| self.found[*place as usize].samples > 0;
             let places = (0..self.texels.len() as u32).filter(asked);
-            let left: f64 = places.clone().map(|place| f64::from(relative[place as usize])).sum();
+            let summed =
+                |squares: &[f32]| places.clone().map(|place| f64::from(squares[place as usize])).sum::<f64>();
+            let left = summed(&relative.expected);
             let stalled = left > STALLED * before;
             if left <= goal * ENOUGH || stalled || watch.clock().late() {
                 break (estimates, variances);
@@ -181,9 +183,11 @@ impl<'a> SharedLight<'a> {
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
             let budget = self.options.effort().budget(places.clone().count() as u64) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
-            let goal = goal.max(left / MOST_OF_A_ROUND);
+            // Allotted by what is feared of each, down to what is expected of all.
+            let feared = summed(&relative.cautious) / left;
+            let goal = feared * goal.max(left / MOST_OF_A_ROUND);
             let wanted: Vec<Allotment> =
-                allot_within(budget, places, &relative, &samples, self.most, ORDER, goal);
+                allot_within(budget, places, &relative.cautious, &samples, self.most, ORDER, goal);
             watch.pass(PASS);
             let more = in_chunks_in_time(wanted.len(), watch, |index| {
                 let Allotment { index: place, samples } = wanted[index];
@@ -198,12 +202,13 @@ impl<'a> SharedLight<'a> {
                 self.found[allotted.index as usize] = own;
             }
         };
-        let found = estimates.iter().zip(&variances).zip(&self.found);
-        for (direct, ((estimates, variance), own)) in direct.iter_mut().zip(found) {
+        for (place, (direct, own)) in direct.iter_mut().zip(&self.found).enumerate() {
             if own.samples > 0 {
+                let (estimates, variance) = (&estimates[place], variances.cautious[place]);
                 direct.baked += mean(estimates).max(Vec3::ZERO);
                 direct.mixed += own.mixed / (own.samples * REPLICATES as u32) as f32;
                 direct.variance += variance;
+                direct.caution += variance - variances.expected[place];
                 direct.rays += own.rays;
                 direct.sampled = true;
             }

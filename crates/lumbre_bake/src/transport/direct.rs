@@ -39,8 +39,10 @@ pub(crate) struct Direct {
     pub baked: Vec3,
     /// From mixed lights: bounces only.
     pub mixed: Vec3,
-    /// Variance that sampling leaves in `baked`, mean of the channels.
+    /// Variance that sampling leaves in `baked`, mean of the channels, as it is stated of this receiver alone.
     pub variance: f32,
+    /// The part of it that is caution: what it is more than is to be expected of many such receivers.
+    pub caution: f32,
     /// Rays cast.
     pub rays: u32,
     /// Whether samples had a part in it: more would tell more.
@@ -49,7 +51,15 @@ pub(crate) struct Direct {
     pub seen: Seen,
 }
 
-fields!(Direct { baked: Vec3, mixed: Vec3, variance: f32, rays: u32, sampled: bool, seen: Seen });
+fields!(Direct {
+    baked: Vec3,
+    mixed: Vec3,
+    variance: f32,
+    caution: f32,
+    rays: u32,
+    sampled: bool,
+    seen: Seen
+});
 
 /// What a receiver saw of the sources.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -28,8 +28,8 @@ pub(crate) struct Exchange {
     /// Errors of that, with their signs: a sample of how the form factors' noise spreads, and what the patches' size leaves. Mean of the
     /// channels.
     pub indirect_error: Vec<Vec2>,
-    /// Below this distance patches are too coarse to read, canonical units.
-    pub near: f32,
+    /// Of each patch, the distance below which it is too coarse to read, canonical units.
+    pub near: Vec<f32>,
     /// Where each patch's light by bounces comes from.
     pub guide: SamplingGuide,
     /// What leaves each patch without emission, W/m².
@@ -131,7 +131,7 @@ impl Exchange {
         let radiosity: Vec<f32> = exitance.iter().map(|exitance| exitance.element_sum()).collect();
         let guide =
             watch.during(0.8, || SamplingGuide::new(scene, &patches, side, &factors, &radiosity, &sky))?;
-        let near = 2.0 * side;
+        let near = patches.near_distances(scene, side);
         Ok(Some((Self { patches, direct, indirect, indirect_error, near, guide, exitance }, factors)))
     }
 }
@@ -163,7 +163,7 @@ impl Exchange {
             direct: none.clone(),
             indirect: none.clone(),
             indirect_error: exact,
-            near: 2.0 * side,
+            near: patches.near_distances(scene, side),
             patches,
             guide,
             exitance: none,

@@ -2,6 +2,8 @@
 //! ray's hit finds its own by arithmetic; cells that other surfaces stand on or pass through are cut further along those.
 //! Not their light: that is `form_factors` and `solver`.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use std::collections::BTreeMap;
 
 use glam::{DMat2, DVec2, Vec3};
@@ -230,6 +232,18 @@ impl Patches {
 }
 
 impl Patches {
+    /// Of each patch, the distance below which it is too coarse to be read as if it had one light, canonical units: twice its side, which is `side` at
+    /// most.
+    pub fn near_distances(&self, scene: &BakeScene, side: f32) -> Vec<f32> {
+        let of = |patch: &Patch| {
+            let [a, b, c] = self.corners(scene, patch);
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            // Of half a square, the longest edge is the diagonal.
+            NEAR_SIDES * side.min(longest * FRAC_1_SQRT_2)
+        };
+        self.list.iter().map(of).collect()
+    }
+
     /// The patch's corners, canonical units.
     pub fn corners(&self, scene: &BakeScene, patch: &Patch) -> [Vec3; 3] {
         let triangle = &scene.triangles[patch.triangle as usize];
@@ -239,6 +253,9 @@ impl Patches {
         })
     }
 }
+
+/// Sides of a patch within which it is too coarse.
+const NEAR_SIDES: f32 = 2.0;
 
 /// Pieces along each edge of a triangle.
 fn divisions(triangle: &SceneTriangle, side: f32) -> u32 {
