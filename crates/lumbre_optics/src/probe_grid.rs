@@ -13,7 +13,7 @@ use glam::DVec3;
 ///
 /// # Error of the f32 twin
 ///
-/// 2 u of |point scale| + |offset| before the clamp.
+/// 2 u of |point scale| + |offset|, and u of the resolution, at whose last middle it is clamped.
 pub fn probe_grid_cell(point: DVec3, scale: DVec3, offset: DVec3, resolution: DVec3) -> DVec3 {
     (point * scale + offset).max(DVec3::splat(0.5)).min(resolution - DVec3::splat(0.5))
 }
@@ -23,7 +23,7 @@ pub fn probe_grid_cell(point: DVec3, scale: DVec3, offset: DVec3, resolution: DV
 ///
 /// # Error of the f32 twin
 ///
-/// 5 u of the result, for the sum, the denominator and the quotient.
+/// 8 u of the result: a product, a sum, the denominator, and the quotient's 5 u.
 pub fn probe_grid_texel(cell: DVec3, resolution: DVec3, axis: f64, negative: bool) -> DVec3 {
     let row = cell.y + if negative { resolution.y } else { 0.0 };
     let slice = cell.z + axis * resolution.z;

@@ -162,8 +162,7 @@ pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
         .filter(|attribute| match attribute {
             Attribute::Position => true,
             Attribute::Normal => {
-                let per_fragment =
-                    variant.has(Feature::Lights) || variant.has(Feature::IrradianceVolume);
+                let per_fragment = variant.has(Feature::Lights) || variant.has(Feature::IrradianceVolume);
                 lit && (per_fragment || variant.shading != Shading::Phong)
             }
             Attribute::Uv0 => variant.has(Feature::Uv0),

@@ -105,9 +105,10 @@ impl Rehearsal {
                 let image = Arc::new(LightmapImage { name, width: 4, height: 4, texels, encoding });
                 Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image })?)
             }
-            false => key.variant.has(Feature::IrradianceVolume).then(|| {
-                Arc::new(irradiance_volumes::empty(&self.gpu, self.pipelines.volume_layout()))
-            }),
+            false => key
+                .variant
+                .has(Feature::IrradianceVolume)
+                .then(|| Arc::new(irradiance_volumes::empty(&self.gpu, self.pipelines.volume_layout()))),
         };
         let frame = self.frame_group(FrameBindings::of(&key.variant));
         let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_group());

@@ -6,8 +6,8 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use lumbre_optics::{Light, Material, ReflectionModel, Shading};
 use lumbre_scene::{
-    ActiveCamera, Camera, ChildOf, Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, IrradianceVolume, Lightmap,
-    MaterialTextures, Mesh, Name, SceneSettings, StaticObject, Transform,
+    ActiveCamera, Camera, ChildOf, Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden,
+    IrradianceVolume, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, StaticObject, Transform,
 };
 
 /// What changed in any way that a frame may show.

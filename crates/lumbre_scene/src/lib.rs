@@ -82,4 +82,4 @@ pub use quadric::{Quadric, QuadricError, QuadricShape};
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};
 pub use visibility::{hidden_entities, with_descendants};
-pub use volume_place::{IrradianceVolumeError, VolumePlace, usable_irradiance_volumes};
+pub use volume_place::{IrradianceVolumeError, VolumePlace, nearest_volume, usable_irradiance_volumes};

@@ -33,7 +33,9 @@ pub enum IrradianceVolumeError {
         resolution: UVec3,
     },
     /// The marks of the probes inside of geometry are not those of its cells.
-    #[error("it says of {found} probes whether they are inside of geometry, and has {cells}; say it of all of them, or of none")]
+    #[error(
+        "it says of {found} probes whether they are inside of geometry, and has {cells}; say it of all of them, or of none"
+    )]
     Inside {
         /// Marks there are.
         found: usize,
@@ -52,7 +54,9 @@ pub enum IrradianceVolumeError {
     #[error("it has no place: give it a finite Transform")]
     NoPlace,
     /// It is rotated or sheared.
-    #[error("it is rotated; volumes lie along the world's axes: take the rotation of its node, and of those above it, away")]
+    #[error(
+        "it is rotated; volumes lie along the world's axes: take the rotation of its node, and of those above it, away"
+    )]
     Rotated,
     /// Its box has no thickness.
     #[error("its box measures {size} m, and a cell at least a nanometre: give its Transform a scale")]
@@ -77,6 +81,11 @@ impl VolumePlace {
     /// Coordinates in cells: 0 and the resolution at the faces of the box.
     pub fn cells(&self, point: DVec3) -> DVec3 {
         self.scale * point + self.offset
+    }
+
+    /// The same place for points that are given from an origin.
+    pub fn seen_from(&self, origin: DVec3) -> Self {
+        Self { offset: self.cells(origin), ..*self }
     }
 
     /// How far a point is from the box, metres; 0 inside of it.
@@ -135,11 +144,14 @@ impl IrradianceVolume {
         resolution: UVec3,
         transform: Option<&GlobalTransform>,
     ) -> Result<VolumePlace, IrradianceVolumeError> {
-        let affine =
-            transform.map(|place| place.0).filter(|affine| affine.is_finite()).ok_or(IrradianceVolumeError::NoPlace)?;
+        let affine = transform
+            .map(|place| place.0)
+            .filter(|affine| affine.is_finite())
+            .ok_or(IrradianceVolumeError::NoPlace)?;
         let matrix = affine.matrix3;
         let size = DVec3::new(matrix.x_axis.x, matrix.y_axis.y, matrix.z_axis.z);
-        let beside = (matrix.x_axis - size.x * DVec3::X).abs() + (matrix.y_axis - size.y * DVec3::Y).abs()
+        let beside = (matrix.x_axis - size.x * DVec3::X).abs()
+            + (matrix.y_axis - size.y * DVec3::Y).abs()
             + (matrix.z_axis - size.z * DVec3::Z).abs();
         let largest = size.abs().max_element().max(beside.max_element());
         if beside.max_element() > ROTATION * largest {
@@ -181,6 +193,16 @@ impl IrradianceVolume {
     }
 }
 
+/// The volume that lights an object with this middle: the nearest one, of those that it is inside of the one with the smallest cells, of several of these the first.
+/// An object that goes from one to another takes the other's light when its middle does.
+pub fn nearest_volume<T>(volumes: &[T], place: impl Fn(&T) -> &VolumePlace, middle: DVec3) -> Option<&T> {
+    let distance = |volume: &T| (place(volume).distance(middle), place(volume).cell_size());
+    volumes.iter().min_by(|a, b| {
+        let ((far, large), (other_far, other_large)) = (distance(a), distance(b));
+        far.total_cmp(&other_far).then(large.total_cmp(&other_large))
+    })
+}
+
 /// How many irradiance volumes of a World can be used. Global transforms must be up to date.
 pub fn usable_irradiance_volumes(world: &mut World) -> usize {
     let mut query = world.query::<(&IrradianceVolume, Option<&GlobalTransform>)>();
@@ -210,13 +232,18 @@ mod tests {
     fn light_runs_straight_between_open_probes_and_stays_outside() {
         // Probes at x = 11, 13, 15 with 1, 3, 7.
         let mut volume = volume(&[1.0, 3.0, 7.0]);
-        let place = IrradianceVolume::place(volume.resolution, Some(&at(DVec3::new(6.0, 2.0, 2.0), DVec3::X * 13.0)));
+        let place =
+            IrradianceVolume::place(volume.resolution, Some(&at(DVec3::new(6.0, 2.0, 2.0), DVec3::X * 13.0)));
         let place = place.unwrap();
-        let light = |volume: &IrradianceVolume, x: f64| volume.light(&place, DVec3::new(x, 9.0, 0.0), DVec3::Y).x;
+        let light =
+            |volume: &IrradianceVolume, x: f64| volume.light(&place, DVec3::new(x, 9.0, 0.0), DVec3::Y).x;
         for (x, expected) in [(11.0, 1.0), (12.0, 2.0), (14.5, 6.0), (15.0, 7.0), (2.0, 1.0), (90.0, 7.0)] {
             assert!((light(&volume, x) - expected).abs() < 1e-12, "{x}: {}", light(&volume, x));
         }
-        assert_eq!((place.distance(DVec3::new(12.0, 0.5, 0.0)), place.distance(DVec3::new(18.0, 0.0, 5.0))), (0.0, 20f64.sqrt()));
+        assert_eq!(
+            (place.distance(DVec3::new(12.0, 0.5, 0.0)), place.distance(DVec3::new(18.0, 0.0, 5.0))),
+            (0.0, 20f64.sqrt())
+        );
         // Inside of a wall, and bright: what is beside it does not see it, what is within it does.
         volume.inside = vec![false, true, false];
         assert!((light(&volume, 12.0) - 1.0).abs() < 3e-3 && (light(&volume, 14.0) - 7.0).abs() < 5e-3);
@@ -227,12 +254,29 @@ mod tests {
     fn mirrored_volumes_turn_their_cells_and_not_their_sides() {
         let mut volume = volume(&[1.0, 3.0]);
         volume.cubes[0].0[0] = Vec3::splat(5.0);
-        let place = IrradianceVolume::place(volume.resolution, Some(&at(DVec3::new(-4.0, 1.0, 1.0), DVec3::ZERO)));
+        let place =
+            IrradianceVolume::place(volume.resolution, Some(&at(DVec3::new(-4.0, 1.0, 1.0), DVec3::ZERO)));
         let place = place.unwrap();
         assert_eq!(volume.light(&place, DVec3::X, DVec3::X), DVec3::splat(5.0));
         assert_eq!(volume.light(&place, DVec3::X, DVec3::NEG_X), DVec3::ONE);
         assert_eq!(volume.light(&place, DVec3::NEG_X, DVec3::X), DVec3::splat(3.0));
         assert_eq!(place.cell_size(), 2.0);
+    }
+
+    #[test]
+    fn the_smallest_cells_of_the_nearest_volumes() {
+        let place = |side: f64, x: f64| {
+            let transform = at(DVec3::splat(side), DVec3::X * x);
+            IrradianceVolume::place(UVec3::splat(2), Some(&transform)).unwrap()
+        };
+        // A hall, an alcove in it, a shed beside it.
+        let volumes = [place(20.0, 0.0), place(4.0, 0.0), place(4.0, 30.0)];
+        let chosen = |x: f64| {
+            let nearest = nearest_volume(&volumes, |place| place, DVec3::X * x).unwrap();
+            volumes.iter().position(|place| place == nearest).unwrap()
+        };
+        assert_eq!([0.0, 1.9, 2.1, 10.0, 18.0, 20.0, 99.0].map(chosen), [1, 1, 0, 0, 0, 2, 2]);
+        assert_eq!(nearest_volume(&volumes[..0], |place| place, DVec3::ZERO), None);
     }
 
     #[test]

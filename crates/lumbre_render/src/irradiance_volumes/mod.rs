@@ -10,7 +10,9 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use glam::DVec3;
-use lumbre_scene::{GlobalTransform, IrradianceVolume, IrradianceVolumeError, Name, VolumePlace};
+use lumbre_scene::{
+    GlobalTransform, IrradianceVolume, IrradianceVolumeError, Name, VolumePlace, nearest_volume,
+};
 
 pub(crate) use probe_texture::{empty, layout};
 
@@ -25,7 +27,7 @@ type FoundQuery<'w, 's> = Query<'w, 's, Found<'static>>;
 pub(crate) struct IrradianceVolumes {
     state: Option<(WorldId, SystemState<FoundQuery<'static, 'static>>)>,
     known: HashMap<Entity, Volume>,
-    /// Those that can be used, the one with the smallest cells first.
+    /// Those that can be used, in the order of their entities.
     usable: Vec<Usable>,
     uploaded: u64,
 }
@@ -67,9 +69,7 @@ impl IrradianceVolumes {
             }
         }
         self.known.retain(|_, volume| volume.seen);
-        self.usable.sort_by(|a, b| {
-            a.place.cell_size().total_cmp(&b.place.cell_size()).then(a.entity.cmp(&b.entity))
-        });
+        self.usable.sort_by_key(|usable| usable.entity.index_u32());
         self.state = Some((id, state));
     }
 
@@ -117,11 +117,8 @@ impl IrradianceVolumes {
         std::mem::take(&mut self.uploaded)
     }
 
-    /// The group of the volume that lights an object with this middle: the nearest one, of those that it is inside of the one with the smallest cells.
+    /// The group of the volume that lights an object with this middle.
     pub fn around(&self, center: DVec3) -> Option<&Arc<wgpu::BindGroup>> {
-        let distance = |usable: &&Usable| usable.place.distance(center);
-        // Of several as near the first.
-        let nearest = self.usable.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.and_then(|usable| usable.group.as_ref())
+        nearest_volume(&self.usable, |usable| &usable.place, center)?.group.as_ref()
     }
 }

@@ -59,7 +59,7 @@ impl ProbeTexture {
 
     /// Puts it in its place, seen from the origin of frame space.
     pub fn stand(&mut self, gpu: &Gpu, place: &VolumePlace, origin: DVec3, uploaded: &mut u64) {
-        let offset = place.cells(origin).clamp(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
+        let offset = place.seen_from(origin).offset.clamp(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
         let data = ProbeGridData {
             scale: place.scale.as_vec3(),
             offset: offset.as_vec3(),
@@ -178,8 +178,7 @@ mod tests {
         let resolution = UVec3::new(3, 2, 4);
         let light = |probe: usize, side: usize| Vec3::new(probe as f32, side as f32, 1.0);
         let cube = |probe| AmbientCube(std::array::from_fn(|side| light(probe, side)));
-        let volume =
-            IrradianceVolume { resolution, cubes: (0..24).map(cube).collect(), inside: Vec::new() };
+        let volume = IrradianceVolume { resolution, cubes: (0..24).map(cube).collect(), inside: Vec::new() };
         let found = texels(&volume);
         let sides = (resolution * UVec3::new(1, 2, 3)).as_dvec3();
         for probe in 0..24 {
