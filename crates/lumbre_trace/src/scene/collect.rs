@@ -72,10 +72,8 @@ pub(crate) fn collect(
     let hidden = hidden_entities(world);
     let query = world.query::<Found<'static>>();
     let lamps = world.query::<FoundLight<'static>>();
-    let (mut notes, mut volumes) = (Vec::new(), Vec::new());
-    if irradiance_volumes {
-        volumes = placed_volumes(world, origin, &mut notes);
-    }
+    let mut notes = Vec::new();
+    let volumes = if irradiance_volumes { placed_volumes(world, origin, &mut notes) } else { Vec::new() };
     let world = &*world;
     let mut found: Vec<_> = query.iter_manual(world).filter(|object| !hidden.contains(&object.0)).collect();
     found.sort_by_key(|(entity, ..)| entity.index_u32());
@@ -102,6 +100,10 @@ pub(crate) fn collect(
         let textures = textures.cloned().unwrap_or_default();
         let normals = GlobalTransform(place).normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        // One that has a lightmap takes no other, whether it is read or not.
+        let mapped = lightmap.is_some() && !mesh.0.uv1.is_empty();
+        let volume =
+            nearest_volume(&volumes, |(_, place)| place, middle(&mesh.0, &place)).filter(|_| !mapped);
         let object = Object {
             shape: with_tangents(&mesh.0, &textures),
             material: material.clone(),
@@ -109,9 +111,7 @@ pub(crate) fn collect(
             medium: medium.copied().unwrap_or_default(),
             model: reflection.or(own_model.copied()).unwrap_or(settings.reflection),
             lightmap: lightmap.filter(|_| lightmaps).map(|lightmap| Arc::clone(&lightmap.image)),
-            volume: (lightmap.is_none() || mesh.0.uv1.is_empty())
-                .then(|| nearest_volume(&volumes, |(_, place)| place, middle(&mesh.0, &place)).cloned())
-                .flatten(),
+            volume: volume.cloned(),
             place,
             normals: if largest > 0.0 { normals * (1.0 / largest) } else { normals },
             mirrored: GlobalTransform(place).mirrors(),
