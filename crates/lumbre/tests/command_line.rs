@@ -295,7 +295,7 @@ fn what_moves_in_a_baked_level_is_lit_by_the_bake() {
     };
     let lit = drawn(&[]);
     // The ball's left side sees the wall, its right side the panel.
-    let [left, right] = [21, 42].map(|column| lit.get_pixel(column, 32).0);
+    let [left, right] = [21, 42].map(|column| lit.get_pixel(column, 32).0.map(u32::from));
     assert!(left[0] > 30 && left[0] > 2 * left[1], "{left:?}");
     assert!(right[1] > 60 && right[0] < 2 * right[1], "{right:?}");
     let dark = drawn(&["--no-irradiance-volumes"]);

@@ -147,8 +147,8 @@ impl Draws {
         };
         let has = |feature| seen.pipeline.variant.has(feature);
         let lightmap = seen.object.lightmap.as_ref().filter(|_| has(Feature::Lightmap));
-        let volume = || volumes.around(seen.object.center).filter(|_| has(Feature::IrradianceVolume));
-        let baked_light = lightmap.or_else(volume);
+        let volume = || volumes.around(seen.object.center);
+        let baked_light = if has(Feature::IrradianceVolume) { lightmap.or_else(volume) } else { lightmap };
         // A pipeline that stands in for another may have no textures.
         let texture_set = seen.object.texture_set.as_ref().filter(|_| seen.pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {
