@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, UVec3, Vec3, Vec4};
 use lumbre_mesh::shapes;
 use lumbre_optics::{
     AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Fresnel, Light, Lobe, Material,
@@ -16,8 +16,9 @@ use lumbre_optics::{
 };
 use lumbre_render::{Display, FrameOptions, FrameReport, LightLists, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{
-    Camera, Census, EmissiveLight, Lightmap, LightmapEncoding, LightmapImage, MaterialTextures, Mesh,
-    MetallicRoughnessTexture, NormalTexture, OcclusionTexture, SceneSettings, Transform,
+    AmbientCube, Camera, Census, EmissiveLight, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
+    MaterialTextures, Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, SceneSettings,
+    Transform,
 };
 use lumbre_shaders::{Kept, MODULES, Program, UnnamedFeatures};
 use lumbre_tests::panes::{image, sharp};
@@ -371,6 +372,17 @@ const ROWS: &[Row] = &[
                 encoding: LightmapEncoding::default(),
             };
             scene.world.entity_mut(scene.ball).insert(Lightmap { image: Arc::new(lightmap) });
+        },
+    },
+    Row {
+        effect: "irradiance volumes",
+        called_for_by: "an `IrradianceVolume` that can be used, and a lit mesh without `Lightmap`",
+        features: &["IRRADIANCE_VOLUME"],
+        before: point_light,
+        add: |scene| {
+            let cubes = vec![AmbientCube([Vec3::splat(0.5); 6]); 8];
+            let volume = IrradianceVolume { resolution: UVec3::splat(2), cubes, inside: Vec::new() };
+            scene.world.spawn((volume, Transform::from_scale(4.0)));
         },
     },
     Row {

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{UVec3, Vec2, Vec3, Vec4};
 use lumbre_mesh::shapes;
 use lumbre_optics::{
     AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Light, Material, ReflectionModel, Shading,
@@ -12,8 +12,9 @@ use lumbre_optics::{
 };
 use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer, explain};
 use lumbre_scene::{
-    Camera, Census, ChildOf, DynamicObject, EmissiveLight, Hidden, Lightmap, LightmapEncoding, LightmapImage,
-    MaterialTextures, Mesh, NormalTexture, OcclusionTexture, SceneSettings, StaticObject, Transform,
+    AmbientCube, Camera, Census, ChildOf, DynamicObject, EmissiveLight, Hidden, IrradianceVolume, Lightmap,
+    LightmapEncoding, LightmapImage, MaterialTextures, Mesh, NormalTexture, OcclusionTexture, SceneSettings,
+    StaticObject, Transform,
 };
 use lumbre_tests::panes::{image, sharp};
 
@@ -138,6 +139,14 @@ fn random_world(random: &mut Random) -> World {
     for number in 0..random.below(7) {
         world.spawn((random_light(random), Transform::from_xyz(number as f64 - 3.0, 2.0, 3.0)));
     }
+    if random.once_in(3) {
+        let cubes = vec![AmbientCube([Vec3::splat(0.3); 6]); random.one_of(&[1, 2])];
+        // Of two cubes for one cell nothing can be made.
+        world.spawn((
+            IrradianceVolume { resolution: UVec3::ONE, cubes, inside: Vec::new() },
+            Transform::IDENTITY,
+        ));
+    }
     world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 6.0)));
     let fog = Fog { mode: FogMode::Exponential { density: 0.1 }, color: Vec3::splat(0.3) };
     world.insert_resource(SceneSettings {
@@ -164,6 +173,7 @@ fn what_is_explained_is_what_is_drawn() {
         let mut world = random_world(&mut random);
         let options = FrameOptions {
             lightmaps: !random.once_in(4),
+            irradiance_volumes: !random.once_in(4),
             shadows: !random.once_in(4),
             multisample: random.once_in(8),
             full_precision: random.once_in(8),
@@ -199,6 +209,7 @@ fn what_is_explained_is_what_is_drawn() {
                 "emissive textures" => ("EMISSIVE_TEXTURE", true),
                 "alpha mask" => ("ALPHA_MASK", true),
                 "lightmaps" => ("LIGHTMAP", false),
+                "irradiance volumes" => ("IRRADIANCE_VOLUME", false),
                 "two-sided" => ("TWO_SIDED", false),
                 "normal textures" => ("NORMAL_TEXTURE", false),
                 "occlusion textures" => ("OCCLUSION_TEXTURE", false),

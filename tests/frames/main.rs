@@ -17,6 +17,7 @@ mod faces;
 mod flat_rules;
 mod gltf_materials;
 mod highlights;
+mod irradiance_volumes;
 mod level;
 mod light_lists;
 mod materials;

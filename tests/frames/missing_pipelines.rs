@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material, Shading, SpotCone};
 use lumbre_render::{FrameOptions, FrameReport, MissingPipelines, Offscreen, OffscreenFormat, Renderer};
-use lumbre_scene::{Camera, MaterialTextures, Mesh, SceneSettings, Transform};
+use lumbre_scene::{AmbientCube, Camera, IrradianceVolume, MaterialTextures, Mesh, SceneSettings, Transform};
 use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::gpu;
@@ -117,6 +117,9 @@ fn what_is_switched_on_for_the_first_time_is_shown_when_its_pipelines_are_there(
         let place = Transform::from_xyz(0.0, 5.0, 3.0).looking_at(DVec3::ZERO, DVec3::Y);
         scene.world.spawn((Light::directional(Vec3::ONE), place));
     });
+    scene.change("irradiance volume", true, |scene| {
+        scene.world.spawn((volume(), Transform::from_scale(6.0)));
+    });
     scene.change("flat shading", true, |scene| scene.options.shading = Some(Shading::Flat));
     // Several samples are drawn into another format, and shown by a pass of their own.
     scene.change("multisampling", true, |scene| scene.options.multisample = true);
@@ -167,6 +170,26 @@ fn lamps_that_go_out_are_out_at_once() {
     assert!(last == fresh);
     let farthest = first.iter().zip(&fresh).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
     assert!(farthest <= 1, "{farthest} of 255 apart");
+}
+
+/// Two cells of light.
+fn volume() -> IrradianceVolume {
+    let cubes =
+        [Vec3::new(0.6, 0.2, 0.1), Vec3::new(0.1, 0.2, 0.6)].map(|light| AmbientCube([light; 6])).to_vec();
+    IrradianceVolume { resolution: UVec3::new(2, 1, 1), cubes, inside: Vec::new() }
+}
+
+#[test]
+fn a_volume_that_is_gone_gives_no_light_even_if_the_frame_has_to_wait_for_that() {
+    let mut scene = scene();
+    let volume = scene.world.spawn((volume(), Transform::from_scale(6.0))).id();
+    let [_, (lit, _)] = scene.until_there();
+    // And something else that no frame had before.
+    scene.options.shading = Some(Shading::Gouraud);
+    scene.world.despawn(volume);
+    let (first, report) = scene.frame();
+    assert_eq!(report.statistics.pipelines_awaited, 0, "it has waited");
+    assert!(first == scene.fresh() && first != lit);
 }
 
 #[test]

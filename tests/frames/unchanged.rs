@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3};
 use lumbre_graph::Status;
 use lumbre_mesh::shapes;
 use lumbre_optics::{Light, Material, ReflectionModel, Shading};
@@ -14,7 +14,8 @@ use lumbre_render::{
     Renderer, SceneFacts,
 };
 use lumbre_scene::{
-    ActiveCamera, Camera, ChildOf, EmissiveLight, Hidden, MaterialTextures, Mesh, SceneSettings, Transform,
+    ActiveCamera, AmbientCube, Camera, ChildOf, EmissiveLight, Hidden, IrradianceVolume, MaterialTextures,
+    Mesh, SceneSettings, Transform,
 };
 use lumbre_tests::panes::{image, sharp};
 
@@ -141,7 +142,7 @@ type Change = (&'static str, fn(&mut Scene));
 
 #[test]
 fn whatever_changes_is_seen() {
-    let changes: [Change; 16] = [
+    let changes: [Change; 18] = [
         ("transform", |s| s.world.get_mut::<Transform>(s.ball).unwrap().translation.x += 0.3),
         ("transform of a parent", |s| {
             let parent = s.world.get::<ChildOf>(s.ball).unwrap().parent();
@@ -174,6 +175,16 @@ fn whatever_changes_is_seen() {
         ("emissive light", |s| {
             s.world.get_mut::<Material>(s.ball).unwrap().front.emission = Vec3::splat(2.0);
             s.world.entity_mut(s.ball).insert(EmissiveLight);
+        }),
+        ("irradiance volume", |s| {
+            let cubes = vec![AmbientCube([Vec3::new(0.2, 0.4, 0.3); 6])];
+            let volume = IrradianceVolume { resolution: UVec3::ONE, cubes, inside: Vec::new() };
+            s.world.spawn((volume, Transform::IDENTITY));
+        }),
+        ("an irradiance volume that is gone", |s| {
+            let mut volumes = s.world.query_filtered::<Entity, With<IrradianceVolume>>();
+            let volume = volumes.single(&s.world).unwrap();
+            s.world.despawn(volume);
         }),
         ("settings", |s| s.world.resource_mut::<SceneSettings>().ambient = Vec3::splat(0.4)),
         ("camera", |s| s.world.get_mut::<Camera>(s.camera).unwrap().exposure = 0.5),

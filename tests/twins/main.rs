@@ -17,6 +17,7 @@ mod materials;
 mod microfacets;
 mod negative_controls;
 mod polygons;
+mod probes;
 mod refraction;
 mod regressions;
 mod shading;
@@ -49,6 +50,7 @@ fn all() -> &'static [Twin] {
             shading::twins(),
             materials::twins(),
             polygons::twins(),
+            probes::twins(),
             atmosphere::twins(),
         ]
     };

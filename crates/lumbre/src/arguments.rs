@@ -482,6 +482,9 @@ pub struct Frame {
     /// Leaves the lightmaps out.
     #[arg(long)]
     pub no_lightmaps: bool,
+    /// Leaves the irradiance volumes out: what moves takes the scene's ambient light.
+    #[arg(long)]
+    pub no_irradiance_volumes: bool,
     /// Draws no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,

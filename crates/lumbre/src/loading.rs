@@ -120,6 +120,7 @@ pub fn frame_options(
         flat_rule: frame.flat_rule,
         specular_antialiasing: frame.specular_antialiasing,
         lightmaps: !frame.no_lightmaps,
+        irradiance_volumes: !frame.no_irradiance_volumes,
         shadows: !frame.no_shadows,
         multisample: frame.msaa,
         display,

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use lumbre::bake::{BakeOptions, Probes, bake};
+use lumbre::bake::{BakeOptions, bake};
 use lumbre::demo::{self, Opened};
 use lumbre::render::{FrameOptions, Gpu};
 use lumbre::scene;
@@ -103,8 +103,7 @@ fn bake_demo_level(source: &Path, baked: &Path) -> anyhow::Result<()> {
     eprintln!("lumbre: baking {} (once)", source.display());
     let (file, Loaded { mut world, .. }) = load_source(source, &Reading::default())?;
     let mut shown = Shown::new(false);
-    // Frames do not read probes.
-    let options = BakeOptions { error: 0.02, probes: Probes::Never, ..BakeOptions::default() };
+    let options = BakeOptions { error: 0.02, ..BakeOptions::default() };
     bake(&mut world, &options, &mut |progress| {
         shown.update(progress);
         ControlFlow::Continue(())

@@ -79,6 +79,7 @@ fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions 
         weight: asked.weight,
         shadows: !asked.frame.no_shadows,
         lightmaps: !asked.frame.no_lightmaps,
+        irradiance_volumes: !asked.frame.no_irradiance_volumes,
         samples: asked
             .samples
             .or((asked.frame.msaa && asked.integrator == Integrator::Whitted).then_some(MULTISAMPLES)),
@@ -110,6 +111,10 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
         (
             !trees && asked.frame.no_lightmaps,
             "--no-lightmaps is for the ray tree: paths never read lightmaps, they find that light themselves",
+        ),
+        (
+            !trees && asked.frame.no_irradiance_volumes,
+            "--no-irradiance-volumes is for the ray tree: paths never read volumes, they find that light themselves",
         ),
         (
             trees && asked.adaptive.is_some() && asked.samples.unwrap_or(1) < 4,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre::optics::{Light, Material, Surface};
-use lumbre::scene::{Camera, Mesh, StaticObject, Transform};
+use lumbre::scene::{Camera, DynamicObject, Mesh, StaticObject, Transform};
 
 fn lumbre(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lumbre")).args(arguments).output().unwrap()
@@ -256,4 +256,48 @@ fn playing_without_a_display_draws_a_tour() {
     let pictures: Vec<_> = paths.iter().map(|path| image::open(path).unwrap().to_rgb8()).collect();
     assert!(pictures.iter().all(|picture| picture.dimensions() == (192, 108)));
     assert!(pictures[0] != pictures[pictures.len() / 2], "the tour stands still");
+}
+
+#[test]
+fn what_moves_in_a_baked_level_is_lit_by_the_bake() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    // A red wall that is bright under a panel, and a white ball before it that moves.
+    let mut world = World::new();
+    let block = |size: Vec3| Mesh(Arc::new(lumbre::mesh::shapes::cuboid(size, 1)));
+    let wall = (block(Vec3::new(0.2, 3.0, 3.0)), Material::matt(Vec3::new(0.8, 0.05, 0.05)), StaticObject);
+    world.spawn((wall, Transform::from_xyz(-1.5, 0.0, 0.0)));
+    let glow = Surface { emission: Vec3::splat(12.0), ..Surface::default() };
+    let panel =
+        (block(Vec3::new(0.1, 1.0, 1.0)), Material { front: glow, ..Material::default() }, StaticObject);
+    world.spawn((panel, Transform::from_xyz(2.5, 0.0, 0.0)));
+    let ball = Mesh(Arc::new(lumbre::mesh::shapes::uv_sphere(0.5, 24, 12)));
+    world.spawn((ball, Material::matt(Vec3::splat(0.8)), DynamicObject, Transform::from_xyz(-0.6, 0.0, 0.0)));
+    let eye = Transform::from_xyz(-0.6, 0.0, 3.0).looking_at(DVec3::new(-0.6, 0.0, 0.0), DVec3::Y);
+    world.spawn((Camera::default(), eye));
+    lumbre::scene::save(&mut world, &path("level.glb")).unwrap();
+
+    let explained = |file: &str| stdout(&lumbre(&["explain", text(&path(file)), "--all"]));
+    assert!(explained("level.glb").contains("no volume, though 1 mesh moves: `lumbre bake`"));
+    let (level, baked) = (path("level.glb"), path("baked.glb"));
+    let bake = ["bake", text(&level), "-o", text(&baked), "--map-size", "32", "--quality", "draft"];
+    let output = lumbre(&bake);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(explained("baked.glb").contains("1 mesh without a lightmap, lit by 1 volume"));
+
+    let drawn = |more: &[&str]| {
+        let picture = path("picture.png");
+        let mut arguments = vec!["render", text(&baked), "-o", text(&picture), "--size", "64x64"];
+        arguments.extend(more);
+        let output = lumbre(&arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        image::open(&picture).unwrap().into_rgb8()
+    };
+    let lit = drawn(&[]);
+    // The ball's left side sees the wall, its right side the panel.
+    let [left, right] = [21, 42].map(|column| lit.get_pixel(column, 32).0.map(u32::from));
+    assert!(left[0] > 30 && left[0] > 2 * left[1], "{left:?}");
+    assert!(right[1] > 60 && right[0] < 2 * right[1], "{right:?}");
+    let dark = drawn(&["--no-irradiance-volumes"]);
+    assert_eq!([21, 42].map(|column| dark.get_pixel(column, 32).0), [[0; 3]; 2], "negative control");
 }

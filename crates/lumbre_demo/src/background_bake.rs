@@ -14,11 +14,12 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
+use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
 use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
-    DynamicObject, GlobalTransform, Lightmap, LoadError, LoadOptions, MaterialTextures, Mesh, PackedFormat,
-    Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject, hidden_entities, save_baked,
+    DynamicObject, GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures,
+    Mesh, Name, PackedFormat, Primitive, SaveError, SaveOptions, SceneSettings, SourceFile, StaticObject,
+    Transform, hidden_entities, save_baked,
 };
 
 /// One bake of several, each better than the one before.
@@ -83,10 +84,11 @@ pub struct BakeStatus {
     pub elapsed: Duration,
 }
 
-/// Meshes and lightmaps by node and primitive of the file.
+/// Meshes and lightmaps by node and primitive of the file, and the light for what moves.
 #[derive(Debug, Default)]
 pub struct BakedLight {
     parts: HashMap<(usize, usize), (Mesh, Option<MaterialTextures>, Lightmap)>,
+    volumes: Vec<(IrradianceVolume, Transform)>,
     /// Which of the bakes it is from, in words.
     pub pass: &'static str,
     /// Its estimated relative error.
@@ -109,7 +111,9 @@ impl BakedLight {
                 Some(((node, primitive.index), (mesh.clone(), textures.cloned(), lightmap.clone())))
             })
             .collect();
-        Self { parts, error: report.estimated_error, ..Self::default() }
+        let mut volumes = world.query::<(&IrradianceVolume, &Transform)>();
+        let volumes = volumes.iter(world).map(|(volume, place)| (volume.clone(), *place)).collect();
+        Self { parts, volumes, error: report.estimated_error, ..Self::default() }
     }
 
     /// Surfaces that have a lightmap.
@@ -127,6 +131,19 @@ impl BakedLight {
         let stale: Vec<Entity> = world.query_filtered::<Entity, With<Lightmap>>().iter(world).collect();
         for entity in stale {
             world.entity_mut(entity).remove::<Lightmap>();
+        }
+        let stale: Vec<Entity> =
+            world.query_filtered::<Entity, With<IrradianceVolume>>().iter(world).collect();
+        for entity in stale {
+            // Those of the file are its nodes, the others were put here by an earlier bake.
+            if nodes.contains(&entity) {
+                world.entity_mut(entity).remove::<IrradianceVolume>();
+            } else {
+                world.despawn(entity);
+            }
+        }
+        for (volume, place) in &self.volumes {
+            world.spawn((Name::new("irradiance volume"), volume.clone(), *place));
         }
         let node_of: HashMap<Entity, usize> =
             nodes.iter().enumerate().map(|(index, &entity)| (entity, index)).collect();
@@ -395,8 +412,7 @@ fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
         }
     };
     let (error, quality) = (pass.error.max(wanted.error), pass.quality);
-    // Frames do not read probes; the file that may be saved has them.
-    BakeOptions { density, error, quality, resolution_error: false, probes: Probes::Never, ..*wanted }
+    BakeOptions { density, error, quality, resolution_error: false, ..*wanted }
 }
 
 /// One core is left to the frames, unless threads were asked for.

@@ -12,7 +12,8 @@ use lumbre_demo::{BackgroundBake, BakeError, BakeNews, BakedLight, OpenOptions, 
 use lumbre_mesh::shapes::cuboid;
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{
-    ChildOf, DynamicObject, Lightmap, LoadOptions, Mesh, Name, StaticObject, Transform, load, save,
+    ChildOf, DynamicObject, IrradianceVolume, Lightmap, LoadOptions, Mesh, Name, StaticObject, Transform,
+    load, save,
 };
 
 /// A red and a blue block far apart under a panel each, a block that moves, and a node without a mesh before them.
@@ -93,7 +94,16 @@ fn light_comes_in_steps_and_lands_where_it_belongs() {
         let (red, blue) = (mean_light(world, "red").unwrap(), mean_light(world, "blue").unwrap());
         assert!(red.x > 0.01 && red.x > 50.0 * red.z, "{}: {red}", light.pass);
         assert!(blue.z > 0.01 && blue.z > 50.0 * blue.x, "{}: {blue}", light.pass);
+        // What moves has its own, and no more of it than the last.
         assert_eq!(mean_light(world, "moves"), None);
+        let mut volumes = world.query::<(&IrradianceVolume, &Name)>();
+        let (volume, name) = volumes.single(world).unwrap();
+        assert!(name.as_str() == "irradiance volume" && volume.validate().is_ok());
+        let brightest = volume.cubes.iter().flat_map(|cube| cube.0).map(|side| side.x).fold(0.0, f32::max);
+        assert!(brightest > 0.1, "{brightest}");
+        let mut names = world.query::<&Name>();
+        let left = names.iter(world).filter(|name| name.as_str() == "irradiance volume").count();
+        assert_eq!(left, 1);
         let mut maps = world.query::<&Lightmap>();
         sides.push(maps.iter(world).map(|map| map.image.width).max());
     }

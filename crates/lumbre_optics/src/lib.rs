@@ -43,6 +43,7 @@
 //! # Ok::<(), lumbre_optics::LightError>(())
 //! ```
 
+mod ambient_cube;
 mod angle;
 mod attenuation;
 mod blinn_phong;
@@ -68,6 +69,7 @@ mod occlusion;
 mod phong;
 mod polygon_light;
 mod power;
+mod probe_grid;
 mod roughness;
 mod shade;
 mod shading;
@@ -80,6 +82,7 @@ mod two_sided;
 mod validation;
 mod viewer;
 
+pub use ambient_cube::{LEAST_OPENNESS, ambient_cube};
 pub use angle::quarter_angle;
 pub use attenuation::{
     Attenuation, MAXIMUM_DISTANCE, MINIMUM_DISTANCE, UNLIMITED_RANGE, attenuate, attenuate_quadratic,
@@ -126,6 +129,7 @@ pub use polygon_light::{
     HIGHLIGHT_SAMPLES, PolygonLight, polygon_form_factor, polygon_highlight, polygon_light_contribution,
 };
 pub use power::{cosine_lobe, power_of_cosine, safe_pow};
+pub use probe_grid::{probe_grid_cell, probe_grid_texel};
 pub use roughness::{MAX_SHININESS, shininess_from_roughness};
 pub use shade::{
     Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, model_exponent, shade, specular_factor,

@@ -8,6 +8,7 @@ use lumbre_scene::{ObjectTraits, SceneSettings};
 
 use crate::extract::{CameraView, LitPass, Object, Objects};
 use crate::features::{self, FrameFeatures};
+use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::MeshKey;
@@ -21,7 +22,8 @@ pub(crate) struct Batch {
     pub pipeline: PipelineKey,
     pub mesh: MeshKey,
     pub texture_set: Option<Arc<TextureSet>>,
-    pub lightmap: Option<Arc<wgpu::BindGroup>>,
+    /// Group 2: a lightmap or an irradiance volume.
+    pub baked_light: Option<Arc<wgpu::BindGroup>>,
     /// Into the frame's instances.
     pub instances: Range<u32>,
 }
@@ -61,7 +63,7 @@ impl Draws {
         settings: &SceneSettings,
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
-        lights: &mut ObjectLightLists,
+        (lights, volumes): (&mut ObjectLightLists, &IrradianceVolumes),
         choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
     ) -> Self {
         let mut draws = Self::default();
@@ -122,13 +124,13 @@ impl Draws {
         order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
         draws.instances.reserve(visible.len());
         for (_, _, index) in order {
-            draws.push(&visible[index], lights);
+            draws.push(&visible[index], lights, volumes);
         }
         draws
     }
 
     /// Adds an instance, to the last batch if it fits.
-    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists) {
+    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists, volumes: &IrradianceVolumes) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
         let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
         let list = lights.reaching(
@@ -143,14 +145,17 @@ impl Draws {
             LitPass::Forward => &mut self.opaque,
             LitPass::Transparent => &mut self.transparent,
         };
-        let lightmap = seen.object.lightmap.as_ref().filter(|_| seen.pipeline.variant.has(Feature::Lightmap));
+        let has = |feature| seen.pipeline.variant.has(feature);
+        let lightmap = seen.object.lightmap.as_ref().filter(|_| has(Feature::Lightmap));
+        let volume = || volumes.around(seen.object.center);
+        let baked_light = if has(Feature::IrradianceVolume) { lightmap.or_else(volume) } else { lightmap };
         // A pipeline that stands in for another may have no textures.
         let texture_set = seen.object.texture_set.as_ref().filter(|_| seen.pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {
             batch.pipeline == seen.pipeline
                 && batch.mesh == seen.object.mesh
                 && same(batch.texture_set.as_ref(), texture_set)
-                && same(batch.lightmap.as_ref(), lightmap)
+                && same(batch.baked_light.as_ref(), baked_light)
                 && batch.instances.end == instance
         };
         match batches.last_mut() {
@@ -159,7 +164,7 @@ impl Draws {
                 pipeline: seen.pipeline,
                 mesh: seen.object.mesh,
                 texture_set: texture_set.cloned(),
-                lightmap: lightmap.cloned(),
+                baked_light: baked_light.cloned(),
                 instances: instance..instance + 1,
             }),
         }

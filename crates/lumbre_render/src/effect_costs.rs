@@ -78,6 +78,7 @@ const EFFECTS: &[Removable] = &[
         without: |world, _| each_surface(world, |surface| surface.emission = Vec3::ZERO),
     },
     Removable { effect: "lightmaps", without: |_, options| options.lightmaps = false },
+    Removable { effect: "irradiance volumes", without: |_, options| options.irradiance_volumes = false },
     Removable { effect: "textures", without: |world, _| remove::<MaterialTextures>(world) },
     Removable {
         effect: "normal textures",

@@ -6,7 +6,9 @@ use std::fmt::Write;
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Explanation, PassExplanation, TextureDescriptor};
 use lumbre_optics::Shading;
-use lumbre_scene::{Census, HiddenCone, ObjectCensus, SceneSettings, hidden_cones, shown_objects};
+use lumbre_scene::{
+    Census, HiddenCone, ObjectCensus, SceneSettings, hidden_cones, shown_objects, usable_irradiance_volumes,
+};
 
 use crate::effect_costs::FrameCost;
 use crate::effects::{self, Effect, Stage};
@@ -83,7 +85,8 @@ fn explain_with(
         lights = lights.without_shadows();
     }
     let objects = shown_objects(world);
-    let facts = SceneFacts::new(&ObjectCensus::of(&objects), &lights, &settings, options);
+    let volumes = usable_irradiance_volumes(world);
+    let facts = SceneFacts::new(&ObjectCensus::of(&objects), &lights, volumes, &settings, options);
     let mut radiance = false;
     for effect in effects.iter_mut() {
         let called_for = effect.extract(world, &facts, options);
@@ -91,7 +94,7 @@ fn explain_with(
     }
     let plan = FramePlan::new(&facts, options, target_format, radiance);
     let half = plan.ending == Ending::DisplayPass && !options.full_precision;
-    let common = FrameFeatures::new(options, &settings, lights, (plan.ending, target_format, half));
+    let common = FrameFeatures::new(options, &settings, &facts, lights, (plan.ending, target_format, half));
     let mut variants = BTreeMap::new();
     let (mut clustered, mut bindings) = (0, FrameBindings::default());
     for (object, _) in &objects {

@@ -29,16 +29,18 @@ pub struct SceneFacts {
 }
 
 impl SceneFacts {
+    /// Of objects, lights, and so many irradiance volumes that can be used.
     pub(crate) fn new(
         objects: &ObjectCensus,
         lights: &LightSet,
+        irradiance_volumes: usize,
         settings: &SceneSettings,
         options: &FrameOptions,
     ) -> Self {
         let lightmapped = objects.lightmapped - objects.lightmapped_blended;
         let by_lightmap = if options.lightmaps { lightmapped } else { 0 };
         Self {
-            census: Arc::new(Census::new(objects, lights.census, settings)),
+            census: Arc::new(Census::new(objects, lights.census, irradiance_volumes, settings)),
             opaque: objects.meshes - objects.alpha_blend - by_lightmap,
             lightmapped,
             transparent: objects.alpha_blend,
@@ -46,5 +48,10 @@ impl SceneFacts {
             shadow_lights: lights.every.shadows.lights,
             settings: *settings,
         }
+    }
+
+    /// Whether anything of a frame is lit by an irradiance volume.
+    pub(crate) fn calls_for_irradiance_volumes(&self, options: &FrameOptions) -> bool {
+        options.irradiance_volumes && self.census.lit_by_volume > 0
     }
 }

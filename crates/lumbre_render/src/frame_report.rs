@@ -59,7 +59,7 @@ pub struct Uploads {
     pub shadows: u64,
     /// Attributes and indices of meshes, those of casters of shadows too.
     pub meshes: u64,
-    /// Textures with their mip levels, and lightmaps.
+    /// Textures with their mip levels, lightmaps and irradiance volumes.
     pub textures: u64,
 }
 

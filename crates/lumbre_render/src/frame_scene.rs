@@ -127,8 +127,8 @@ impl<'a> FrameScene<'a> {
                 pass.set_bind_group(index, None::<&wgpu::BindGroup>, &[]);
                 pass.set_bind_group(index, group, &[]);
             };
-            if let Some(lightmap) = &batch.lightmap {
-                bind_again(2, lightmap);
+            if let Some(baked_light) = &batch.baked_light {
+                bind_again(2, baked_light);
             }
             if batch.pipeline.variant.has(Feature::Shadows) {
                 let maps = self.shadows.device().and_then(|maps| maps.receiver_group.as_ref());

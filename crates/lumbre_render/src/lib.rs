@@ -52,6 +52,7 @@ mod frame_report;
 mod frame_scene;
 mod gpu;
 mod growable_buffer;
+mod irradiance_volumes;
 mod layout;
 mod light_clusters;
 mod light_grid;

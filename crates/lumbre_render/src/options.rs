@@ -89,6 +89,8 @@ pub struct FrameOptions {
     pub light_lists: LightLists,
     /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
     pub lightmaps: bool,
+    /// Lights what has no lightmap by the irradiance volumes of a bake, where there are any. Without them it takes the scene's ambient light.
+    pub irradiance_volumes: bool,
     /// Draws the shadows of lights that ask for them.
     pub shadows: bool,
     /// Four samples per pixel instead of one.
@@ -120,6 +122,7 @@ impl Default for FrameOptions {
             specular_antialiasing: None,
             light_lists: LightLists::Auto,
             lightmaps: true,
+            irradiance_volumes: true,
             shadows: true,
             multisample: false,
             display: Display::Srgb,

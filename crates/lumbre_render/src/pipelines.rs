@@ -8,6 +8,7 @@ use lumbre_optics::Shading;
 
 use crate::deferred::Deferred;
 use crate::frame_bindings::FrameBindings;
+use crate::irradiance_volumes;
 use crate::mesh_buffers::Attribute;
 use crate::shader::{self, Feature, Variant};
 use crate::shadows;
@@ -43,6 +44,7 @@ pub(crate) struct Pipeline {
 pub(crate) struct Pipelines {
     frame_layouts: HashMap<FrameBindings, wgpu::BindGroupLayout>,
     shadow_layout: wgpu::BindGroupLayout,
+    volume_layout: wgpu::BindGroupLayout,
     modules: Modules,
     pipelines: HashMap<PipelineKey, Deferred<Pipeline>>,
 }
@@ -58,6 +60,7 @@ impl Pipelines {
         Self {
             frame_layouts: HashMap::new(),
             shadow_layout: shadows::receiver_layout(gpu),
+            volume_layout: irradiance_volumes::layout(gpu),
             modules: Modules::default(),
             pipelines: HashMap::new(),
         }
@@ -71,6 +74,11 @@ impl Pipelines {
     /// The layout of group 3, of variants that read shadow maps.
     pub fn shadow_layout(&self) -> &wgpu::BindGroupLayout {
         &self.shadow_layout
+    }
+
+    /// The layout of group 2, of variants that read an irradiance volume.
+    pub fn volume_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.volume_layout
     }
 
     /// Number of shader variants compiled so far.
@@ -98,10 +106,13 @@ impl Pipelines {
     ) -> Result<bool, RenderError> {
         if !self.pipelines.contains_key(&key) {
             let textures = sets.layout(gpu, key.texture_mask);
-            let lightmap = key.variant.has(Feature::Lightmap).then(|| sets.lightmap_layout(gpu));
+            let baked_light = match key.variant.has(Feature::Lightmap) {
+                true => Some(sets.lightmap_layout(gpu)),
+                false => key.variant.has(Feature::IrradianceVolume).then(|| self.volume_layout.clone()),
+            };
             let frame = self.frame_layout(gpu, FrameBindings::of(&key.variant)).clone();
             let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_layout.clone());
-            let groups = [Some(frame), textures, lightmap, shadows];
+            let groups = [Some(frame), textures, baked_light, shadows];
             let (device, modules) = (gpu.device.clone(), Arc::clone(&self.modules));
             let afterwards = if wait { None } else { afterwards() };
             let make = move || match make(&device, &modules, &groups, key) {
@@ -150,7 +161,10 @@ pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
         .into_iter()
         .filter(|attribute| match attribute {
             Attribute::Position => true,
-            Attribute::Normal => lit && (variant.has(Feature::Lights) || variant.shading != Shading::Phong),
+            Attribute::Normal => {
+                let per_fragment = variant.has(Feature::Lights) || variant.has(Feature::IrradianceVolume);
+                lit && (per_fragment || variant.shading != Shading::Phong)
+            }
             Attribute::Uv0 => variant.has(Feature::Uv0),
             Attribute::Uv1 => variant.has(Feature::Uv1),
             Attribute::Color => variant.has(Feature::VertexColor),

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, MaterialTextures};
 
 use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::irradiance_volumes;
 use crate::pipelines::{Afterwards, Pipeline, PipelineKey, Pipelines};
 use crate::shader::Feature;
 use crate::shadows::CasterPipelines;
@@ -97,20 +98,23 @@ impl Rehearsal {
             Some(textures) => self.sets.set(&self.gpu, &mut self.textures, textures)?,
             None => None,
         };
-        let lightmap = match key.variant.has(Feature::Lightmap) {
+        let baked_light = match key.variant.has(Feature::Lightmap) {
             true => {
                 let (name, encoding) = ("rehearsal".to_owned(), LightmapEncoding::default());
                 let texels = vec![glam::Vec3::ZERO; 16];
                 let image = Arc::new(LightmapImage { name, width: 4, height: 4, texels, encoding });
                 Some(self.sets.lightmap(&self.gpu, &mut self.textures, &Lightmap { image })?)
             }
-            false => None,
+            false => key
+                .variant
+                .has(Feature::IrradianceVolume)
+                .then(|| Arc::new(irradiance_volumes::empty(&self.gpu, self.pipelines.volume_layout()))),
         };
         let frame = self.frame_group(FrameBindings::of(&key.variant));
         let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_group());
         let Some(pipeline) = self.pipelines.get(&key) else { return Ok(()) };
         let groups =
-            [Some(&frame), set.as_ref().map(|set| &set.bind_group), lightmap.as_deref(), shadows.as_ref()];
+            [Some(&frame), set.as_ref().map(|set| &set.bind_group), baked_light.as_deref(), shadows.as_ref()];
         let drawn = self.submit(key, pipeline, groups);
         self.sets.sweep();
         self.textures.sweep();

@@ -21,6 +21,7 @@ use crate::frame_graph::{Overlay, run_graph};
 use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
 use crate::frame_scene::FrameScene;
 use crate::growable_buffer::GrowableBuffer;
+use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::{FrameData, InstanceData, LightData, radiance};
 use crate::light_clusters::ClusteredView;
 use crate::light_lists::ObjectLightLists;
@@ -44,6 +45,7 @@ pub struct Renderer {
     executor: Executor,
     objects: Objects,
     emitters: Emitters,
+    volumes: IrradianceVolumes,
     lights: GrowableBuffer<LightData>,
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
@@ -104,6 +106,7 @@ impl Renderer {
             executor: Executor::new(),
             objects: Objects::new(),
             emitters: Emitters::default(),
+            volumes: IrradianceVolumes::default(),
             lights: GrowableBuffer::new("lights"),
             instances: GrowableBuffer::new("instances"),
             light_list: GrowableBuffer::new("light list"),
@@ -282,12 +285,15 @@ impl Renderer {
             view.eye,
             &mut left_out,
         )?;
+        self.volumes.extract(world, &mut left_out);
         cpu.objects_ms = clock.lap();
         let seen = Seen { target, view, exposure };
         let mut timed = Timed { cpu: &mut cpu, clock };
         let mut decided = self.decide(world, &seen, (options, &settings), None, &mut left_out, &mut timed)?;
         self.warn_once(&left_out);
         let former = self.decisions.former(world, target, options);
+        // A frame cannot go on with light that has left the World.
+        let former = former.filter(|former| !former.features.irradiance_volumes || self.volumes.len() > 0);
         let awaited = self.make_pipelines(&mut decided, &seen, former.is_none())?;
         match former.filter(|_| awaited > 0) {
             Some(former) => {
@@ -331,7 +337,7 @@ impl Renderer {
             lights.shadows.clear();
         }
         timed.cpu.lights_ms += timed.clock.lap();
-        let facts = SceneFacts::new(&self.objects.census, &lights.set, settings, options);
+        let facts = SceneFacts::new(&self.objects.census, &lights.set, self.volumes.len(), settings, options);
         let called_for: Vec<bool> =
             self.effects.iter_mut().map(|effect| effect.extract(world, &facts, options)).collect();
         let called = || self.effects.iter().zip(&called_for).filter(|(_, called)| **called);
@@ -342,12 +348,15 @@ impl Renderer {
                 FramePlan::for_device(&facts, options, radiance, (&self.gpu, seen.target, seen.exposure));
             let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
             let ending = (plan.ending, seen.target.format, half);
-            let features = FrameFeatures::new(options, settings, lights.set, ending);
+            let features = FrameFeatures::new(options, settings, &facts, lights.set, ending);
             Decision { options: options.clone(), settings: *settings, plan, features }
         });
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
+        if decision.features.irradiance_volumes {
+            self.volumes.upload(world, &self.gpu, self.pipelines.volume_layout(), self.objects.origin);
+        }
         let pipelines = &self.pipelines;
         let choose = |wanted: PipelineKey| match former {
             Some(_) if pipelines.get(&wanted).is_none() => pipelines.nearest(&wanted),
@@ -359,7 +368,7 @@ impl Renderer {
             settings,
             &decision.features,
             (decision.plan.lit_format, decision.plan.samples),
-            &mut lists,
+            (&mut lists, &self.volumes),
             &choose,
         );
         lists.check()?;
@@ -478,7 +487,7 @@ impl Renderer {
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
-        uploads.textures = self.textures.take_uploaded();
+        uploads.textures = self.textures.take_uploaded() + self.volumes.take_uploaded();
         cpu.upload_ms = clock.lap();
         let clusters = &self.clusters.clusters;
         let light_lists = LightListing {

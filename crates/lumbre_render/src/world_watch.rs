@@ -6,8 +6,8 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use lumbre_optics::{Light, Material, ReflectionModel, Shading};
 use lumbre_scene::{
-    ActiveCamera, Camera, ChildOf, Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap,
-    MaterialTextures, Mesh, Name, SceneSettings, StaticObject, Transform,
+    ActiveCamera, Camera, ChildOf, Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden,
+    IrradianceVolume, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, StaticObject, Transform,
 };
 
 /// What changed in any way that a frame may show.
@@ -16,7 +16,7 @@ type Changes = Or<(
     Or<(Changed<Shading>, Changed<ReflectionModel>, Changed<EmissiveLight>, Changed<Hidden>)>,
     Or<(Changed<StaticObject>, Changed<DynamicObject>, Changed<Name>)>,
     Or<(Changed<Transform>, Changed<GlobalTransform>, Changed<ChildOf>, Changed<Children>)>,
-    Or<(Changed<Light>, Changed<Camera>, Changed<ActiveCamera>)>,
+    Or<(Changed<Light>, Changed<IrradianceVolume>, Changed<Camera>, Changed<ActiveCamera>)>,
 )>;
 type Watch = SystemState<Query<'static, 'static, (), Changes>>;
 

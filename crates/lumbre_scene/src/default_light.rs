@@ -6,8 +6,8 @@ use glam::{DQuat, EulerRot, Vec3};
 use lumbre_optics::{BakeMode, Light, Material};
 
 use crate::{
-    ChildOf, EmissiveLight, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, Transform,
-    hidden_entities, update_transforms,
+    ChildOf, EmissiveLight, IrradianceVolume, Lightmap, MaterialTextures, Mesh, Name, SceneSettings,
+    Transform, hidden_entities, update_transforms,
 };
 
 /// Radiance of a white surface that faces the key light.
@@ -29,6 +29,7 @@ pub fn is_without_light(world: &mut World) -> bool {
     if world.get_resource::<SceneSettings>().is_some_and(|settings| shines(settings.ambient_with_sky()))
         || world.query::<&Light>().iter(world).any(lamp)
         || world.query_filtered::<(), (With<Lightmap>, With<Mesh>)>().iter(world).next().is_some()
+        || world.query_filtered::<(), With<IrradianceVolume>>().iter(world).next().is_some()
         || world
             .query_filtered::<&Material, (With<EmissiveLight>, With<Mesh>)>()
             .iter(world)
@@ -102,6 +103,10 @@ mod tests {
         assert!(is_without_light(&mut beside), "emission lights nothing else");
         beside.entity_mut(emitter).insert(EmissiveLight);
         assert!(!is_without_light(&mut beside));
+
+        let mut baked = grey();
+        baked.spawn(IrradianceVolume { resolution: glam::UVec3::ONE, cubes: Vec::new(), inside: Vec::new() });
+        assert!(!is_without_light(&mut baked), "a bake has put light where nothing stands still");
 
         for (light, dark) in [
             (Light::point(Vec3::ONE), false),

@@ -49,6 +49,7 @@ mod quadric;
 mod settings;
 mod transform;
 mod visibility;
+mod volume_place;
 
 pub use bevy_ecs::hierarchy::{ChildOf, Children};
 pub use bevy_ecs::name::Name;
@@ -81,3 +82,4 @@ pub use quadric::{Quadric, QuadricError, QuadricShape};
 pub use settings::SceneSettings;
 pub use transform::{GlobalTransform, Transform, propagate_transforms, update_transforms};
 pub use visibility::{hidden_entities, with_descendants};
+pub use volume_place::{IrradianceVolumeError, VolumePlace, nearest_volume, usable_irradiance_volumes};

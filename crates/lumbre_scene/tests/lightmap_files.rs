@@ -280,7 +280,7 @@ fn irradiance_volumes_are_laid_out_as_bevy_samples_them() {
     let colors = light(6, 24).texels;
     let cubes: Vec<AmbientCube> =
         colors.chunks_exact(6).map(|sides| AmbientCube(sides.try_into().unwrap())).collect();
-    let volume = IrradianceVolume { resolution, cubes };
+    let volume = IrradianceVolume { resolution, cubes, inside: Vec::new() };
     let (bytes, error) = volume.to_ktx2(PackedFormat::Rgb9E5, Supercompression::Zstandard).unwrap();
     assert!(error.relative_rmse > 0.0 && error.largest <= 256.0 / 511.5 / mean(&light(6, 24)), "{error:?}");
     let (header, words) = by_the_ktx2_crate(&bytes);
@@ -319,7 +319,8 @@ fn irradiance_volumes_are_laid_out_as_bevy_samples_them() {
 fn an_irradiance_volume_comes_back_in_its_place() {
     let cubes =
         light(6, 12).texels.chunks_exact(6).map(|sides| AmbientCube(sides.try_into().unwrap())).collect();
-    let volume = IrradianceVolume { resolution: glam::UVec3::new(2, 3, 2), cubes };
+    let inside: Vec<bool> = (0..12).map(|probe| probe % 5 > 2).collect();
+    let volume = IrradianceVolume { resolution: glam::UVec3::new(2, 3, 2), cubes, inside };
     let place = Transform::from_xyz(1.0, 2.0, 3.0).with_scale(DVec3::new(4.0, 5.0, 6.0));
     let mut world = world(light(4, 4));
     world.spawn((Name::new("floor"), volume.clone(), place));
@@ -338,6 +339,7 @@ fn an_irradiance_volume_comes_back_in_its_place() {
         let mut query = world.query::<(&IrradianceVolume, &Transform, &Name)>();
         let (found, at, name) = query.single(&world).unwrap();
         assert_eq!((found.resolution, *at, name.as_str()), (volume.resolution, place, "floor"));
+        assert_eq!(found.inside, volume.inside);
         for (found, original) in found.cubes.iter().zip(&volume.cubes) {
             for (found, original) in found.0.iter().zip(&original.0) {
                 let bound = PackedFormat::Rgb9E5.largest_error(*original);

@@ -74,13 +74,17 @@ pub(crate) fn direct_light(
     let mut light = DirectLight { emission: point.emission, ..DirectLight::default() };
     let mapped = point.baked.is_some();
     light.baked = point.baked.unwrap_or(DVec3::ZERO);
-    if !mapped {
-        light.ambient = point.surface.ambient * scene.settings.ambient_with_sky().as_dvec3();
-    }
+    // Either holds what the ambient term stands for.
+    let indirect = mapped || point.from_volume.is_some();
+    light.ambient = match point.from_volume {
+        Some(from_volume) => from_volume,
+        None if mapped => DVec3::ZERO,
+        None => point.surface.ambient * scene.settings.ambient_with_sky().as_dvec3(),
+    };
     let passing = object.transmission();
     for (number, placed) in scene.lights.iter().enumerate() {
         let sample = evaluate_light(&placed.light, placed.position, placed.axis, point.position);
-        if sample.attenuation * sample.spot == 0.0 || (mapped && placed.light.kind == LightKind::Ambient) {
+        if sample.attenuation * sample.spot == 0.0 || (indirect && placed.light.kind == LightKind::Ambient) {
             continue;
         }
         let mut added = light_contribution(object.model, point.surface, &sample, point.normal, viewer);

@@ -58,6 +58,8 @@ pub struct TraceOptions {
     pub shadows: bool,
     /// The ray tree reads lightmaps as a frame does. Paths never do.
     pub lightmaps: bool,
+    /// The ray tree reads irradiance volumes as a frame does. Paths never do.
+    pub irradiance_volumes: bool,
     /// Samples of every pixel: exactly so many of the ray tree, at most so many paths.
     pub samples: Option<u32>,
     /// Relative standard error of the whole picture at which paths are enough.
@@ -84,6 +86,7 @@ impl Default for TraceOptions {
             weight: DEFAULT_WEIGHT,
             shadows: true,
             lightmaps: true,
+            irradiance_volumes: true,
             samples: None,
             error: None,
             time: None,

@@ -29,6 +29,8 @@ pub(crate) struct SurfacePoint {
     pub coverage: f64,
     /// k_d E/π of its lightmap.
     pub baked: Option<DVec3>,
+    /// k_d E/π of the irradiance volume around it, where it has no lightmap.
+    pub from_volume: Option<DVec3>,
     /// Largest coordinate of what was met: its rounding is relative to that.
     pub extent: f64,
     /// Number of the triangle in the scene, if it is one.
@@ -135,17 +137,20 @@ impl SurfacePoint {
             let uv = object.coordinates(1, vertices, weights);
             surface.diffuse * sample_lightmap(image, uv) * unoccluded
         });
+        let normal = facing_normal(normal, lit_as_front);
+        let from_volume = object.volume_light(position, normal, surface.diffuse * unoccluded);
         Self {
             object: meeting.crossing.object,
             position,
             distance,
             geometric: towards(face, ray),
-            normal: facing_normal(normal, lit_as_front),
+            normal,
             front,
             surface,
             emission,
             coverage: coverage(object, f64::from(object.material.alpha) * tint.w),
             baked,
+            from_volume,
             extent,
             triangle: meeting.triangle,
         }
@@ -161,17 +166,19 @@ impl SurfacePoint {
         let front = meeting.crossing.front;
         let lit_as_front = front || !backs_are_lit(object);
         let surface = SurfaceSample::new(&object.material, lit_as_front);
+        let lit_normal = facing_normal(normal, lit_as_front);
         Self {
             object: meeting.crossing.object,
             position,
             distance: meeting.distance,
             geometric: towards(normal, ray),
-            normal: facing_normal(normal, lit_as_front),
+            normal: lit_normal,
             front,
             surface,
             emission: object.material.surface(lit_as_front).emission.as_dvec3(),
             coverage: coverage(object, f64::from(object.material.alpha)),
             baked: None,
+            from_volume: object.volume_light(position, lit_normal, surface.diffuse),
             // The point is as uncertain as the coordinates of what the ray began with.
             extent: position.abs().max(ray.origin.abs()).max_element(),
             triangle: None,

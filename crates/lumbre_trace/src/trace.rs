@@ -70,7 +70,8 @@ impl Tracer {
         options.validate()?;
         update_transforms(world);
         let camera = CameraRays::new(world, options.camera, options.size)?;
-        let scene = Scene::new(world, camera.eye, options.reflection, options.lightmaps)?;
+        let baked_light = [options.lightmaps, options.irradiance_volumes];
+        let scene = Scene::new(world, camera.eye, options.reflection, baked_light)?;
         let camera = camera.relative_to(scene.origin);
         let media = MediumStack::at(&scene, camera.place());
         Ok(Self {

@@ -1,11 +1,12 @@
 //! The f64 twin of a frame: the same scene rasterized and shaded on the CPU with `lumbre_optics`, pixel centres exactly, no
-//! multisampling, no textures but lightmaps, normal maps and occlusion textures (first level only), no transparency. It shares no code with
-//! the renderer but the components.
+//! multisampling, no textures but lightmaps, normal maps and occlusion textures (first level only), no transparency, one irradiance volume at
+//! most. It shares no code with the renderer but the components.
 
 mod raster;
 mod scene;
 mod shading;
 mod texture;
+mod volume;
 
 use glam::DVec3;
 use lumbre_optics::{FlatRule, ReflectionModel, Shading};

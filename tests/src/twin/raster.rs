@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::scene::{Object, Scene, Vertex, collect};
 use super::shading::{PixelWeights, ShadedTriangle};
+use super::volume::Volume;
 use super::{TwinFrame, TwinOptions};
 
 /// Draws `world` from its first camera.
@@ -34,7 +35,8 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
     let specular_antialiasing = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
     let objects = collect(world, &settings, &options);
     let polygons = objects.iter().flat_map(Object::polygons).collect();
-    let scene = Scene { settings, flat_rule, specular_antialiasing, lights, polygons, eye, basis };
+    let volume = Volume::of(world);
+    let scene = Scene { settings, flat_rule, specular_antialiasing, lights, polygons, volume, eye, basis };
 
     let mut frame = TwinFrame {
         width,

@@ -12,6 +12,7 @@ use lumbre_scene::{
 };
 
 use super::TwinOptions;
+use super::volume::Volume;
 
 pub(super) struct Vertex {
     pub(super) point: DVec3,
@@ -27,6 +28,7 @@ pub(super) struct Scene {
     pub(super) specular_antialiasing: bool,
     pub(super) lights: Vec<(Light, DVec3, DVec3)>,
     pub(super) polygons: Vec<Polygon>,
+    pub(super) volume: Option<Volume>,
     pub(super) eye: DVec3,
     pub(super) basis: DMat3,
 }

@@ -138,15 +138,18 @@ impl<'a> ShadedTriangle<'a> {
         }
         let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
         let mapped = self.object.lightmap.is_some();
+        let volume = scene.volume.as_ref().filter(|_| !mapped);
         let mut sum = Contribution::ZERO;
-        if !mapped {
+        if let Some(volume) = volume {
+            sum.ambient += surface.diffuse * volume.light(point, normal);
+        } else if !mapped {
             sum.ambient +=
                 surface.ambient * (scene.settings.ambient.as_dvec3() + scene.settings.sky.as_dvec3());
         }
         for (light, position, axis) in &scene.lights {
             let sample: LightSample = evaluate_light(light, *position, *axis, point);
             let mut added = light_contribution(self.object.reflection, surface, &sample, normal, viewer);
-            if mapped && light.kind == LightKind::Ambient {
+            if (mapped || volume.is_some()) && light.kind == LightKind::Ambient {
                 added = Contribution::ZERO;
             }
             if mapped && light.bake == lumbre_optics::BakeMode::Static {

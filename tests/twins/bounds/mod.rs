@@ -10,6 +10,7 @@ pub mod materials;
 pub mod microfacets;
 pub mod polygons;
 pub mod powers;
+pub mod probes;
 pub mod refraction;
 pub mod shading;
 pub mod vectors;

@@ -78,7 +78,8 @@ pub(crate) fn bake(
                 .into(),
         );
     }
-    let volume = IrradianceVolume { resolution: grid.resolution, cubes };
+    let inside = if valid.contains(&false) { valid.iter().map(|valid| !valid).collect() } else { Vec::new() };
+    let volume = IrradianceVolume { resolution: grid.resolution, cubes, inside };
     Ok(Some(PlacedVolume { volume, grid }))
 }
 

@@ -26,6 +26,7 @@ mod limits;
 mod many_lamps;
 mod metamorphic;
 mod path_tracer;
+mod probe_light;
 mod probes;
 mod real_client;
 mod rebake;

@@ -182,6 +182,8 @@ impl App {
             shading: view.shading,
             reflection: view.reflection,
             lightmaps: view.lightmaps,
+            // What moves is lit as what stands still is: by the bake, or without it.
+            irradiance_volumes: view.lightmaps,
             multisample: view.multisample,
             missing_pipelines: MissingPipelines::Background,
             measure: if view.overlay { Measure::Time } else { Measure::Nothing },

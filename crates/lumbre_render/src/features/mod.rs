@@ -4,6 +4,7 @@
 mod alpha;
 mod display;
 mod fog;
+mod irradiance_volume;
 mod lightmap;
 mod lights;
 mod specular;
@@ -15,6 +16,7 @@ use lumbre_optics::{ReflectionModel, Shading};
 use lumbre_scene::{ObjectTraits, SceneSettings};
 
 use crate::extract::LightSet;
+use crate::facts::SceneFacts;
 use crate::frame_plan::Ending;
 use crate::shader::{DisplayVariant, Feature, Variant};
 use crate::{Display, FrameOptions};
@@ -25,6 +27,8 @@ pub(crate) struct FrameFeatures {
     pub shading: Option<Shading>,
     pub reflection: Option<ReflectionModel>,
     pub lightmaps: bool,
+    /// What has no lightmap is lit by an irradiance volume.
+    pub irradiance_volumes: bool,
     pub specular_antialiasing: bool,
     pub clamp: bool,
     /// The frame is kept in half floats.
@@ -37,10 +41,12 @@ pub(crate) struct FrameFeatures {
 }
 
 impl FrameFeatures {
-    /// What options and settings come to for a frame of these lights that ends so in a target of this format; `half` if its radiance is kept in half floats.
+    /// What options and settings come to for a frame of such a scene and these lights that ends so in a target of this format; `half` if its radiance is kept in half
+    /// floats.
     pub fn new(
         options: &FrameOptions,
         settings: &SceneSettings,
+        facts: &SceneFacts,
         lights: LightSet,
         (ending, target, half): (Ending, wgpu::TextureFormat, bool),
     ) -> Self {
@@ -49,6 +55,7 @@ impl FrameFeatures {
             reflection: options.reflection,
             specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
             lightmaps: options.lightmaps,
+            irradiance_volumes: facts.calls_for_irradiance_volumes(options),
             clamp: options.display == Display::Clamp,
             half,
             lights,
@@ -89,6 +96,7 @@ pub(crate) fn variant(object: &ObjectTraits, settings: &SceneSettings, frame: &F
         alpha::call,
         two_sided::call,
         lightmap::call,
+        irradiance_volume::call,
         lights::call,
         specular::call,
         specular_antialiasing::call,

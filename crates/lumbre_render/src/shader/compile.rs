@@ -117,6 +117,8 @@ mod tests {
             "inverse_square",
             "shadow",
             "tone_curve",
+            "probe",
+            "ambient_cube",
         ] {
             assert!(!plain.contains(word), "{word} is left in:\n{plain}");
         }
@@ -154,6 +156,18 @@ mod tests {
         }
         let dark = valid(&variant(Shading::Phong, &[Feature::Lit]));
         assert!(!dark.contains("for ("), "a scene without lights loops:\n{dark}");
+        // An irradiance volume by itself: at its rate, on the normals of a map, without a loop or a highlight.
+        let by_volume = [Feature::Lit, Feature::IrradianceVolume, Feature::Uv0, Feature::NormalTexture];
+        for shading in Shading::ALL {
+            let variant = variant(*shading, &by_volume);
+            assert_eq!((variant.shading, variant.has(Feature::Matt)), (*shading, true));
+            let shader = valid(&variant);
+            assert!(shader.contains("ambient_cube"), "{shader}");
+            assert_eq!(shader.contains("map_normal"), *shading == Shading::Phong, "{shader}");
+            for word in ["for (", "viewer_direction", "filtered_lobe", "frame_ambient"] {
+                assert!(!shader.contains(word), "{word} is left in:\n{shader}");
+            }
+        }
         let lit = valid(&variant(Shading::Phong, &[LIT.as_slice(), &[Feature::SpotLights]].concat()));
         assert!(
             lit.contains("for (") && lit.contains("spot_factor"),

@@ -134,10 +134,13 @@ features! {
     Constant = 52 => "CONSTANT",
     /// Some of a cluster's inverse-square lights have a cone.
     InverseSquareSpots = 53 => "INVERSE_SQUARE_SPOTS",
+    /// Samples an irradiance volume.
+    IrradianceVolume = 54 => "IRRADIANCE_VOLUME",
 }
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
 const OF_THE_FRAME: u64 = Feature::Lightmap as u64
+    | Feature::IrradianceVolume as u64
     | Feature::Lit as u64
     | Feature::DynamicLights as u64
     | Feature::StaticLights as u64
@@ -171,6 +174,7 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
 /// Features that make a colour differ from place to place on a surface, or from its front to its back.
 const VARYING: u64 = Feature::Lights as u64
     | Feature::Lightmap as u64
+    | Feature::IrradianceVolume as u64
     | Feature::VertexColor as u64
     | Feature::BaseColorTexture as u64
     | Feature::EmissiveTexture as u64
@@ -230,6 +234,7 @@ impl Variant {
                 | Feature::LocalViewer as u64
                 | Feature::TwoSided as u64
                 | Feature::Lightmap as u64
+                | Feature::IrradianceVolume as u64
                 | Feature::NormalTexture as u64
                 | Feature::OcclusionTexture as u64
                 | Feature::MetallicRoughnessTexture as u64);
@@ -266,7 +271,8 @@ impl Variant {
         self.bits &= !(Feature::Lights as u64 | Feature::Constant as u64);
         self.set(Feature::Lights, listed || clusters);
         if !listed && !clusters {
-            if self.has(Feature::Lit) && !self.has(Feature::ClampVertices) {
+            let by_volume = self.has(Feature::IrradianceVolume);
+            if self.has(Feature::Lit) && !self.has(Feature::ClampVertices) && !by_volume {
                 // How often nothing is evaluated makes no difference.
                 self.shading = Shading::Phong;
                 self.bits &= !(Feature::Modulated as u64);
@@ -274,9 +280,14 @@ impl Variant {
             self.bits &= !(Feature::SharpHighlights as u64
                 | Feature::SpecularAntialiasing as u64
                 | Feature::LocalViewer as u64
-                | Feature::NormalTexture as u64
                 | Feature::EnergyKeeping as u64
                 | Feature::Matt as u64);
+            if by_volume {
+                // It lights the normals of a map, and makes no highlight.
+                self.set(Feature::Matt, true);
+            } else {
+                self.bits &= !(Feature::NormalTexture as u64);
+            }
             self.reflection = ReflectionModel::Phong;
         }
         if self.has(Feature::Matt) {

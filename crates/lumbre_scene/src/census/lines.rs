@@ -19,6 +19,25 @@ pub struct CensusLine {
 }
 
 impl Census {
+    /// Irradiance volumes: what they light, or why there is none, and where one is missing.
+    fn volumes(&self) -> CensusLine {
+        let count = |count: usize, singular: &str, plural: &str| match count {
+            1 => format!("1 {singular}"),
+            count => format!("{count} {plural}"),
+        };
+        let volumes = count(self.irradiance_volumes, "volume", "volumes");
+        let lit = count(self.lit_by_volume, "mesh", "meshes");
+        let moving = count(self.dynamic_objects, "mesh moves", "meshes move");
+        let reason = match (self.lit_by_volume, self.irradiance_volumes, self.dynamic_objects) {
+            (1.., ..) => format!("{lit} without a lightmap, lit by {volumes}"),
+            (0, 1.., _) => format!("{volumes}, and no lit mesh without a lightmap"),
+            (0, 0, 1..) => format!("no volume, though {moving}: `lumbre bake` puts one into the file"),
+            (0, 0, 0) => "no volume, and nothing moves".to_owned(),
+        };
+        let count = self.lit_by_volume;
+        CensusLine { effect: "irradiance volumes", called_for: count > 0, count, reason }
+    }
+
     /// Every effect that a frame may have, called for or not, in the order in which a frame is made.
     pub fn lines(&self) -> Vec<CensusLine> {
         let line = |effect, count: usize, singular: &str, plural: &str, none: &str| CensusLine {
@@ -104,6 +123,7 @@ impl Census {
             mesh("specular", self.specular, "with a highlight", "every specular coefficient is 0"),
             mesh("emission", self.emissive, "with emission", "no material emits"),
             mesh("lightmaps", self.lightmapped, "with a lightmap", "no mesh has a lightmap"),
+            self.volumes(),
             mesh("textures", self.textured, "with a textured material", "no material has a texture"),
             mesh("base colour textures", self.base_color_textures, "with one", "no material has one"),
             mesh("emissive textures", self.emissive_textures, "with one", "no material has one"),

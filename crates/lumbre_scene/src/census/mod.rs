@@ -3,6 +3,7 @@
 //! ```text
 //!  components ──► ObjectTraits, one object ──► ObjectCensus, all of them ─┐
 //!  lights     ──► LightCensus ────────────────────────────────────────────┼──► Census ──► lines
+//!  volumes    ──► how many can be used ───────────────────────────────────┤
 //!  SceneSettings ─────────────────────────────────────────────────────────┘
 //! ```
 
@@ -23,7 +24,7 @@ pub use lines::CensusLine;
 pub use object::{Mobility, ObjectComponents, ObjectItem, ObjectTraits, shown_objects};
 pub use object_census::ObjectCensus;
 
-use crate::SceneSettings;
+use crate::{SceneSettings, usable_irradiance_volumes};
 
 /// Counts of what is in a World. Lights that are off and meshes that are hidden count only as such.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -46,6 +47,10 @@ pub struct Census {
     pub dynamic_objects: usize,
     /// Meshes that are lit by a lightmap.
     pub lightmapped: usize,
+    /// Irradiance volumes that can be used.
+    pub irradiance_volumes: usize,
+    /// Meshes without a lightmap that are lit by one of them.
+    pub lit_by_volume: usize,
     /// Meshes with a texture of any kind.
     pub textured: usize,
     /// Meshes with a base colour texture.
@@ -99,11 +104,16 @@ impl Census {
     pub fn of(world: &mut World) -> Self {
         let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
         let objects = ObjectCensus::of(&shown_objects(world));
-        Self::new(&objects, LightCensus::of(world), &settings)
+        Self::new(&objects, LightCensus::of(world), usable_irradiance_volumes(world), &settings)
     }
 
-    /// What objects and lights come to under the settings of their scene.
-    pub fn new(objects: &ObjectCensus, lights: LightCensus, settings: &SceneSettings) -> Self {
+    /// What objects, lights and so many usable irradiance volumes come to under the settings of their scene.
+    pub fn new(
+        objects: &ObjectCensus,
+        lights: LightCensus,
+        irradiance_volumes: usize,
+        settings: &SceneSettings,
+    ) -> Self {
         let [base_color, emissive, metallic_roughness, normal, occlusion] = objects.textures;
         let two_sided = |count| if settings.two_sided { count } else { 0 };
         let highlights = ReflectionModel::ALL
@@ -121,6 +131,8 @@ impl Census {
             static_objects: objects.static_objects,
             dynamic_objects: objects.dynamic_objects,
             lightmapped: objects.lightmapped,
+            irradiance_volumes,
+            lit_by_volume: if irradiance_volumes > 0 { objects.without_lightmap } else { 0 },
             textured: objects.textured,
             base_color_textures: base_color,
             emissive_textures: emissive,

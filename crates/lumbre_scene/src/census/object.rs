@@ -127,6 +127,11 @@ impl ObjectTraits {
     pub fn is_lit_by_lightmap(&self) -> bool {
         self.lightmapped && !self.unlit
     }
+
+    /// Whether its light comes from an irradiance volume, where there is one: it has no lightmap, whether lightmaps are used or not.
+    pub fn is_lit_by_irradiance_volume(&self) -> bool {
+        !self.lightmapped && !self.unlit
+    }
 }
 
 /// The traits and the number of triangles of each object of a World that is shown.

@@ -21,6 +21,8 @@ pub struct ObjectCensus {
     pub lightmapped: usize,
     /// Of these, the blended ones.
     pub lightmapped_blended: usize,
+    /// Lit objects without a lightmap.
+    pub without_lightmap: usize,
     /// Objects by texture, in the order of [`MaterialTextures::slots`].
     pub textures: [usize; MaterialTextures::SLOTS],
     /// Objects with a texture of any kind.
@@ -90,6 +92,7 @@ impl ObjectCensus {
             (&mut self.dynamic_objects, traits.mobility == Mobility::Dynamic),
             (&mut self.lightmapped, by_lightmap),
             (&mut self.lightmapped_blended, by_lightmap && blended),
+            (&mut self.without_lightmap, traits.is_lit_by_irradiance_volume()),
             (&mut self.textured, traits.texture_mask != 0),
             (&mut self.vertex_colors, traits.vertex_color),
             (&mut self.alpha_mask, matches!(traits.alpha_mode, AlphaMode::Mask { .. })),

@@ -376,7 +376,11 @@ impl LightmapFiles {
         index: usize,
     ) -> Value {
         let name = self.file_name(node, index, "ktx2");
-        let reference = json!({"image": self.uri(&name), "encoding": PackedFormat::Rgb9E5.name()});
+        let mut reference = json!({"image": self.uri(&name), "encoding": PackedFormat::Rgb9E5.name()});
+        let runs = runs(&volume.inside);
+        if !runs.is_empty() {
+            reference["inside"] = runs.into();
+        }
         self.volumes.push((name, volume.clone()));
         reference
     }
@@ -400,4 +404,17 @@ impl LightmapFiles {
             candidates.into_iter().find(|name| self.names.insert(name.to_lowercase())).unwrap_or_default();
         format!("{name}.{extension}")
     }
+}
+
+/// Where marks stand: the first of each run, and how many.
+fn runs(marks: &[bool]) -> Vec<usize> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    for run in marks.chunk_by(|a, b| a == b) {
+        if run[0] {
+            runs.extend([first, run.len()]);
+        }
+        first += run.len();
+    }
+    runs
 }

@@ -173,6 +173,9 @@ pub(crate) struct LightmapExtension {
 #[derive(Deserialize, Serialize, Clone, Debug)]
 pub(crate) struct IrradianceVolumeExtension {
     pub image: String,
+    /// Runs of probes inside of geometry: the first of a run, how many, and so on. Along x first, then y, then z.
+    #[serde(default)]
+    pub inside: Vec<u32>,
 }
 
 /// `nodes[i].extensions.LUMBRE_object`.

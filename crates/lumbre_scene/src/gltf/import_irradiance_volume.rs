@@ -28,5 +28,49 @@ pub(crate) fn irradiance_volume(
     }
     // As bytes, as packed texels and as colours.
     budget.charge(header.texels, 4 + 4 + 12, || place.clone())?;
-    IrradianceVolume::from_ktx2(&bytes, header.texels).map_err(unreadable)
+    let volume = IrradianceVolume::from_ktx2(&bytes, header.texels).map_err(unreadable)?;
+    let inside = marks(&source.inside, volume.cubes.len()).ok_or_else(|| LoadProblem::Value {
+        place: place.clone(),
+        field: "inside".to_owned(),
+        value: format!("a list of {} numbers", source.inside.len()),
+        expected: format!(
+            "it must be runs of probes, first and how many, in order and among the {} of the image; bake again",
+            volume.cubes.len()
+        ),
+    })?;
+    Ok(IrradianceVolume { inside, ..volume })
+}
+
+/// The mark of each probe; none without runs, `None` for runs that do not fit.
+fn marks(runs: &[u32], probes: usize) -> Option<Vec<bool>> {
+    if runs.is_empty() {
+        return Some(Vec::new());
+    }
+    let mut marks = Vec::with_capacity(probes);
+    for run in runs.chunks(2) {
+        let &[first, count] = run else { return None };
+        let (first, end) = (first as usize, first as usize + count as usize);
+        if first < marks.len() || end > probes {
+            return None;
+        }
+        marks.resize(first, false);
+        marks.resize(end, true);
+    }
+    marks.resize(probes, false);
+    Some(marks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_in_order_and_among_the_probes() {
+        assert_eq!(marks(&[], 3), Some(vec![]));
+        assert_eq!(marks(&[1, 2, 4, 1], 6), Some(vec![false, true, true, false, true, false]));
+        assert_eq!(marks(&[0, 3], 3), Some(vec![true; 3]));
+        for faulty in [&[1][..], &[0, 4], &[2, 1, 1, 1], &[u32::MAX, u32::MAX], &[0, 1, 2]] {
+            assert_eq!(marks(faulty, 3), None, "{faulty:?}");
+        }
+    }
 }

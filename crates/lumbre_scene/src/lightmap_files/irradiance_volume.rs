@@ -38,6 +38,9 @@ pub struct IrradianceVolume {
     pub resolution: UVec3,
     /// Along x first, then y, then z.
     pub cubes: Vec<AmbientCube>,
+    /// In the same order, whether a probe lies inside of geometry, where nothing is lit; empty where none does, or nobody has looked. Its cube is what the bake put
+    /// there in place of nothing, for readers that ask no further. The KTX2 file does not hold these marks, the glTF that names it does.
+    pub inside: Vec<bool>,
 }
 
 impl IrradianceVolume {
@@ -98,7 +101,7 @@ impl IrradianceVolume {
             let (cube, side) = place(resolution, at);
             cubes[cube].0[side] = color;
         }
-        Ok(Self { resolution, cubes })
+        Ok(Self { resolution, cubes, inside: Vec::new() })
     }
 }
 

@@ -215,7 +215,11 @@ fn volumes_lights_and_the_sky_are_written_and_taken_back() {
     let lamp = world.query::<&Light>().single(&world).unwrap().clone();
     bake(&mut world);
     world.resource_mut::<SceneSettings>().sky = Vec3::new(0.5, 0.75, 1.0);
-    let volume = IrradianceVolume { resolution: glam::UVec3::ONE, cubes: vec![AmbientCube::default()] };
+    let volume = IrradianceVolume {
+        resolution: glam::UVec3::ONE,
+        cubes: vec![AmbientCube::default()],
+        inside: Vec::new(),
+    };
     world.spawn((Name::new("volume"), Transform::from_xyz(1.0, 2.0, 3.0), volume));
     save_baked(&mut world, &source, &output, &SaveOptions::default()).unwrap();
 

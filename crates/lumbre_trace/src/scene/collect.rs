@@ -7,8 +7,9 @@ use glam::{DAffine3, DVec3};
 use lumbre_mesh::{TextureCoordinateSet, TriangleMesh};
 use lumbre_optics::{Light, LightKind, Material, ReflectionModel};
 use lumbre_scene::{
-    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, Lightmap, MaterialTextures, Medium, Mesh, Name,
-    Primitive, Quadric, SceneSettings, StaticObject, hidden_entities,
+    ChildOf, DynamicObject, EmissiveLight, GlobalTransform, IrradianceVolume, Lightmap, MaterialTextures,
+    Medium, Mesh, Name, Primitive, Quadric, SceneSettings, StaticObject, VolumePlace, hidden_entities,
+    nearest_volume,
 };
 
 use super::emissive_polygons::{EmissivePolygon, emissive_polygons};
@@ -57,6 +58,7 @@ type Found<'a> = (
     (Has<StaticObject>, Has<EmissiveLight>),
 );
 
+type PlacedVolume = (Arc<IrradianceVolume>, VolumePlace);
 type FoundLight<'a> = (Entity, &'a Light, &'a GlobalTransform, Option<&'a Name>);
 
 /// Everything that is shown, with `origin` as the tracer's origin. `reflection` in place of the scene's model, if it is given.
@@ -64,12 +66,14 @@ pub(crate) fn collect(
     world: &mut World,
     origin: DVec3,
     reflection: Option<ReflectionModel>,
-    lightmaps: bool,
+    [lightmaps, irradiance_volumes]: [bool; 2],
 ) -> Result<Collected, TraceError> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let hidden = hidden_entities(world);
     let query = world.query::<Found<'static>>();
     let lamps = world.query::<FoundLight<'static>>();
+    let mut notes = Vec::new();
+    let volumes = if irradiance_volumes { placed_volumes(world, origin, &mut notes) } else { Vec::new() };
     let world = &*world;
     let mut found: Vec<_> = query.iter_manual(world).filter(|object| !hidden.contains(&object.0)).collect();
     found.sort_by_key(|(entity, ..)| entity.index_u32());
@@ -79,7 +83,7 @@ pub(crate) fn collect(
         quadrics: Vec::new(),
         lights: Vec::new(),
         polygons: Vec::new(),
-        notes: Vec::new(),
+        notes,
     };
     collected.lights = lights(world, &lamps, origin, &mut collected.notes);
     for (entity, (mesh, material, place), choices, exact, (fixed, shines)) in found {
@@ -96,6 +100,10 @@ pub(crate) fn collect(
         let textures = textures.cloned().unwrap_or_default();
         let normals = GlobalTransform(place).normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        // One that has a lightmap takes no other, whether it is read or not.
+        let mapped = lightmap.is_some() && !mesh.0.uv1.is_empty();
+        let volume =
+            nearest_volume(&volumes, |(_, place)| place, middle(&mesh.0, &place)).filter(|_| !mapped);
         let object = Object {
             shape: with_tangents(&mesh.0, &textures),
             material: material.clone(),
@@ -103,6 +111,7 @@ pub(crate) fn collect(
             medium: medium.copied().unwrap_or_default(),
             model: reflection.or(own_model.copied()).unwrap_or(settings.reflection),
             lightmap: lightmap.filter(|_| lightmaps).map(|lightmap| Arc::clone(&lightmap.image)),
+            volume: volume.cloned(),
             place,
             normals: if largest > 0.0 { normals * (1.0 / largest) } else { normals },
             mirrored: GlobalTransform(place).mirrors(),
@@ -131,6 +140,30 @@ pub(crate) fn collect(
 
 fn relative(place: &GlobalTransform, origin: DVec3) -> DAffine3 {
     DAffine3 { translation: place.0.translation - origin, ..place.0 }
+}
+
+/// The volumes that can be used, in the tracer's space.
+fn placed_volumes(world: &mut World, origin: DVec3, notes: &mut Vec<String>) -> Vec<PlacedVolume> {
+    let mut query = world.query::<(Entity, &IrradianceVolume, Option<&GlobalTransform>)>();
+    let mut found: Vec<_> = query.iter(world).collect();
+    found.sort_by_key(|(entity, ..)| entity.index_u32());
+    let mut volumes = Vec::new();
+    for (_, volume, transform) in found {
+        let place = volume.validate().and_then(|()| IrradianceVolume::place(volume.resolution, transform));
+        match place {
+            Ok(place) => volumes.push((Arc::new(volume.clone()), place.seen_from(origin))),
+            Err(fault) => notes.push(format!("an irradiance volume is left out: {fault}")),
+        }
+    }
+    volumes
+}
+
+/// The middle of the box around a mesh in its place, as a frame has it.
+fn middle(mesh: &TriangleMesh, place: &DAffine3) -> DVec3 {
+    let positions = || mesh.positions.iter().map(|position| position.as_dvec3());
+    let low = positions().fold(DVec3::INFINITY, DVec3::min);
+    let high = positions().fold(DVec3::NEG_INFINITY, DVec3::max);
+    place.transform_point3(0.5 * (low + high))
 }
 
 /// The lights that are on, in the order of their entities.

@@ -43,15 +43,15 @@ const FAR: f64 = 512.0;
 const MOST_TRIANGLES: usize = 1 << 29;
 
 impl Scene {
-    /// Reads a World whose global transforms are up to date, seen from an eye.
+    /// Reads a World whose global transforms are up to date, seen from an eye, with its lightmaps and its irradiance volumes or without.
     pub fn new(
         world: &mut World,
         eye: DVec3,
         reflection: Option<ReflectionModel>,
-        lightmaps: bool,
+        baked_light: [bool; 2],
     ) -> Result<Self, TraceError> {
         let origin = if eye.length() > FAR { eye } else { DVec3::ZERO };
-        let collected = collect::collect(world, origin, reflection, lightmaps)?;
+        let collected = collect::collect(world, origin, reflection, baked_light)?;
         let exact = |index: usize| collected.quadrics.iter().any(|(own, _)| *own == index);
         let mut triangles = Vec::new();
         for (index, object) in collected.objects.iter().enumerate().filter(|(index, _)| !exact(*index)) {

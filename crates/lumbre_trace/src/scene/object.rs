@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Material, ReflectionModel};
-use lumbre_scene::{LightmapImage, MaterialTextures, Medium};
+use lumbre_scene::{IrradianceVolume, LightmapImage, MaterialTextures, Medium, VolumePlace};
 
 /// One object of the scene.
 #[derive(Debug)]
@@ -18,6 +18,8 @@ pub(crate) struct Object {
     pub medium: Medium,
     pub model: ReflectionModel,
     pub lightmap: Option<Arc<LightmapImage>>,
+    /// What lights it, if it has no lightmap, and where that stands in the tracer's space.
+    pub volume: Option<(Arc<IrradianceVolume>, VolumePlace)>,
     /// From the object's space to the tracer's.
     pub place: DAffine3,
     /// Of unit size, so that what counts as no normal does not depend on the scale.
@@ -76,6 +78,11 @@ impl Object {
         let high = positions().fold(DVec3::NEG_INFINITY, DVec3::max);
         // A sheet has no inside.
         low.cmplt(high).all() && own.cmpge(low).all() && own.cmple(high).all()
+    }
+
+    /// k_d E/π of the irradiance volume that lights it.
+    pub fn volume_light(&self, point: DVec3, normal: DVec3, diffuse: DVec3) -> Option<DVec3> {
+        self.volume.as_ref().map(|(volume, place)| diffuse * volume.light(place, point, normal))
     }
 
     /// It has an inside that light is refracted into.

@@ -1,0 +1,63 @@
+//! The ambient cube: the light at a point as six surfaces would take it, one along each axis, and what any other surface makes of it
+//! (Mitchell, McTaggart and Green, "Shading in Valve's Source Engine", SIGGRAPH 2006). Not where the light comes from, nor the
+//! interpolation between cubes.
+
+use glam::{DVec3, DVec4};
+
+/// How open a point is at least where anything is known of its light: below, there is none.
+pub const LEAST_OPENNESS: f64 = 1e-12;
+
+/// E/π for a surface with this unit normal: the three sides that it faces, weighted by the squares of its components, which add up to 1.
+///
+/// Each side is E/π for a surface along its axis, times how open the probes are that it was interpolated from, and that openness in `w`
+/// (above 0, at most 1, the same for the three): a probe inside of a wall counts so little that only where there is no other does its
+/// light show. What was interpolated is divided by its own weight, so that such probes neither darken nor colour what is beside them.
+/// No openness, or a normal without a direction, gives no light.
+///
+/// ```
+/// use glam::{DVec3, DVec4};
+/// use lumbre_optics::ambient_cube;
+///
+/// let (sky, ground) = (DVec4::splat(1.0), DVec4::new(0.2, 0.2, 0.2, 1.0));
+/// assert_eq!(ambient_cube(DVec3::Y, ground, sky, ground), DVec3::ONE);
+/// // Half of the points between were inside of a wall, and hold nothing.
+/// assert_eq!(ambient_cube(DVec3::Y, 0.5 * ground, 0.5 * sky, 0.5 * ground), DVec3::ONE);
+/// ```
+///
+/// # Error of the f32 twin
+///
+/// The sums of three products of squares are off by 4 u of their terms by magnitudes; the quotient by that over the openness, by as much
+/// of the result for the openness itself, and by 2.5 units in the last place (5 u).
+pub fn ambient_cube(normal: DVec3, x: DVec4, y: DVec4, z: DVec4) -> DVec3 {
+    let weights = normal * normal;
+    let sum = weights.x * x + weights.y * y + weights.z * z;
+    sum.truncate() / sum.w.max(LEAST_OPENNESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn even_light_is_even_from_every_side() {
+        let light = DVec4::new(0.3, 0.5, 0.7, 1.0);
+        for normal in [DVec3::X, DVec3::NEG_Z, DVec3::new(0.6, -0.64, 0.48)] {
+            let lit = ambient_cube(normal, light, light, light);
+            assert!((lit - light.truncate()).length() < 1e-15, "{lit}");
+        }
+    }
+
+    #[test]
+    fn each_side_counts_by_the_square_of_its_cosine() {
+        let side = |light: f64| DVec4::new(light, 0.0, 0.0, 1.0);
+        let lit = ambient_cube(DVec3::new(0.6, 0.0, -0.8), side(1.0), side(100.0), side(2.0));
+        assert!((lit.x - (0.36 + 2.0 * 0.64)).abs() < 1e-15, "{lit}");
+    }
+
+    #[test]
+    fn without_openness_or_direction_there_is_no_light_and_no_nan() {
+        let light = DVec4::ONE;
+        assert_eq!(ambient_cube(DVec3::ZERO, light, light, light), DVec3::ZERO);
+        assert_eq!(ambient_cube(DVec3::X, DVec4::ZERO, light, light), DVec3::ZERO);
+    }
+}
