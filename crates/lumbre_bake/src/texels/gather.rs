@@ -13,6 +13,7 @@ use super::tile_sequence::TileSequence;
 use crate::checkpoint::record::fields;
 use crate::sampling::Stream;
 use crate::scene::material::Side;
+use crate::transport::direct::Receiver;
 
 /// Independent replicates per texel: their spread is the texel's error.
 pub(crate) const REPLICATES: usize = 4;
@@ -263,7 +264,8 @@ impl RadianceCache<'_> {
             let turn =
                 (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.wrapping_mul(7));
             reading.checked = turn.is_multiple_of(CHECKED);
-            let last = self.read(hit, &sequences[replicate], sample, reading);
+            let receiver = &samples.requests[place].receiver;
+            let last = self.read(receiver, hit, &sequences[replicate], sample, reading);
             if let Some(last) = last.filter(|_| reading.checked) {
                 let [u, v, ..] = sequences[replicate].point(sample, 1);
                 let region = self.guide.regions.at(last.triangle, last.side, last.at);
@@ -293,9 +295,17 @@ impl RadianceCache<'_> {
 
     /// The light that leaves a point that was met, emission apart, times a weight. Returns the surface whose patch was read, if one was; the
     /// difference of that to a real bounce is then still to be multiplied by it. Where a texel was read instead, there is nothing to check.
-    fn read(&self, hit: &Hit, sequence: &TileSequence, sample: u32, reading: &mut Reading) -> Option<Hit> {
+    fn read(
+        &self,
+        receiver: &Receiver,
+        hit: &Hit,
+        sequence: &TileSequence,
+        sample: u32,
+        reading: &mut Reading,
+    ) -> Option<Hit> {
         let mut weight = reading.weight * hit.reflectance;
         let (mut light, mut last) = (weight * hit.direct, *hit);
+        let mut receiver = *receiver;
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
             let is_coarse = last.variance.is_none() && last.distance < self.near[last.patch as usize];
@@ -304,7 +314,8 @@ impl RadianceCache<'_> {
             }
             let [u, v, ..] = sequence.point(sample, 2 + bounce);
             reading.rays += 1;
-            let request = GatherRequest { receiver: self.receiver_at(&last), region: None, u, v };
+            receiver = self.receiver_at(&last);
+            let request = GatherRequest { receiver, region: None, u, v };
             let mut found = [IncidentSample::NOTHING];
             self.incident(&[request], &mut [SamplePath::NONE], &mut found);
             let [found] = found;
@@ -319,11 +330,11 @@ impl RadianceCache<'_> {
         reading.light = light + weight * last.indirect;
         let grey = weight.element_sum() / 3.0;
         if let Some(variance) = last.variance {
-            // Of the samples, about this share hits what goes together with what this one has hit.
-            let facing =
-                -last.direction.dot(self.scene.triangles[last.triangle as usize].side_normal(last.side));
+            // Of cosine rays, the share that hits what goes together with what this one has hit: the form factor of that disc.
+            let normal = self.scene.triangles[last.triangle as usize].side_normal(last.side);
+            let cosines = -last.direction.dot(normal) * last.direction.dot(receiver.normal);
             let under = self.correlated / last.distance.max(f32::MIN_POSITIVE);
-            let share = (facing.max(0.0) * under * under).min(1.0);
+            let share = (cosines.max(0.0) * under * under).min(1.0);
             reading.texel_variance = share * grey * grey * variance;
             return None;
         }
