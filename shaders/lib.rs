@@ -36,6 +36,7 @@ modules!(
     "forward",
     "frame",
     "light_clusters",
+    "light_counts",
     "lighting",
     "lightmap",
     "material_textures",

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
+mod accounting;
 mod adapter;
 mod baked;
 mod balls;
@@ -18,6 +19,7 @@ mod flat_rules;
 mod gltf_materials;
 mod highlights;
 mod level;
+mod light_counts;
 mod light_lists;
 mod materials;
 mod missing_pipelines;

@@ -46,7 +46,7 @@ pub fn explain(
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
-    explain_with(world, &mut effects::own(), options, width, height)
+    explain_with(world, &mut effects::own(&[]), options, width, height)
 }
 
 impl Renderer {
@@ -61,7 +61,8 @@ impl Renderer {
         width: u32,
         height: u32,
     ) -> Result<SceneExplanation, RenderError> {
-        explain_with(world, self.effects_mut(), options, width, height)
+        let options = self.possible(options);
+        explain_with(world, self.effects_mut(), &options, width, height)
     }
 }
 

@@ -51,8 +51,10 @@ pub(crate) fn declare<'a>(
         board.lit_by_buffer(handle, read);
     }
     for effect in effects {
+        graph.set_owner(effect.name());
         effect.declare(&mut graph, &mut board);
     }
+    graph.set_owner("overlay");
     graph
         .raster_pass("overlay")
         .calls_for(overlay.is_some(), "overlay")

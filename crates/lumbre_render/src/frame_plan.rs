@@ -1,6 +1,7 @@
 //! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
 
 use crate::facts::SceneFacts;
+use crate::statistics::Uploads;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
 
 /// How radiance reaches the target.
@@ -92,6 +93,7 @@ impl FramePlan {
             exposure,
             display_pass: self.ending == Ending::DisplayPass,
             shadow_atlas: None,
+            uploads: Uploads::default(),
         }
     }
 }
@@ -120,11 +122,14 @@ pub struct FrameShape {
     pub display_pass: bool,
     /// The atlas of shadow maps, where the frame has any.
     pub(crate) shadow_atlas: Option<ShadowAtlas>,
+    /// What has been uploaded for the frame.
+    pub(crate) uploads: Uploads,
 }
 
-/// The atlas of shadow maps, and whether any of them has to be drawn.
+/// The atlas of shadow maps, whether any of them has to be drawn, and how many pipelines draw them.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShadowAtlas {
     pub view: wgpu::TextureView,
     pub stale: bool,
+    pub pipelines: usize,
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_graph::{LoadOp, wgpu};
-use lumbre_render::effects::{Board, Effect, FrameGraph, Stage};
+use lumbre_render::effects::{Board, Effect, EffectWork, FrameGraph, Stage};
 use lumbre_render::{EffectError, FrameOptions, FrameShape, Gpu, SceneFacts};
 
 /// Draws a rim around an object.
@@ -21,6 +21,8 @@ pub struct OutlineEffect {
     width: f32,
     outlined: HashMap<Entity, Vec3>,
     device: Option<OnDevice>,
+    /// So far.
+    work: EffectWork,
 }
 
 struct OnDevice {
@@ -44,7 +46,12 @@ const SHAPES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 impl OutlineEffect {
     /// Rims of this width in pixels, up to 16.
     pub fn new(width: f32) -> Self {
-        Self { width: width.clamp(1.0, 16.0), outlined: HashMap::new(), device: None }
+        Self {
+            width: width.clamp(1.0, 16.0),
+            outlined: HashMap::new(),
+            device: None,
+            work: EffectWork::default(),
+        }
     }
 }
 
@@ -76,11 +83,19 @@ impl Effect for OutlineEffect {
         let (count, format) = (self.outlined.len() as u64, frame.target_format);
         if self.device.as_ref().is_none_or(|device| device.format != format || device.capacity < count) {
             self.device = Some(OnDevice::new(&gpu.device, format, count.next_power_of_two()));
+            self.work.pipelines_made += 2;
         }
         if let Some(device) = &self.device {
-            gpu.queue.write_buffer(&device.width, 0, &self.width.to_le_bytes());
+            let width = self.width.to_le_bytes();
+            gpu.queue.write_buffer(&device.width, 0, &width);
+            // The records of the objects are written when they are drawn.
+            self.work.uploaded_bytes += width.len() as u64 + STRIDE * count;
         }
         Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        self.work
     }
 
     fn draws_objects(&self) -> bool {

@@ -9,7 +9,7 @@ use lumbre_graph::LoadOp;
 use lumbre_optics::{decode_srgb, encode_srgb, tone_curve};
 use wgpu::util::DeviceExt;
 
-use super::{Board, Effect, FrameGraph, Stage};
+use super::{Board, Effect, EffectWork, FrameGraph, Stage};
 use crate::deferred::Deferred;
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
@@ -51,6 +51,8 @@ struct OnDevice {
     uniform: wgpu::Buffer,
     /// What the uniform holds: the exposure, and the viewport's corner.
     written: [f32; 4],
+    /// Bytes written so far.
+    uploaded: u64,
 }
 
 impl Effect for DisplayPass {
@@ -85,6 +87,15 @@ impl Effect for DisplayPass {
             self.key = Some(Key::of(frame));
         }
         Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        let made = |device: &OnDevice| {
+            device.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
+        };
+        self.device
+            .as_ref()
+            .map_or_else(EffectWork::default, |device| EffectWork::new(device.uploaded, made(device)))
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
@@ -140,7 +151,7 @@ impl OnDevice {
             contents: bytemuck::bytes_of(&UNEXPOSED),
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         });
-        Self { layout, pipelines: HashMap::new(), uniform, written: UNEXPOSED }
+        Self { layout, pipelines: HashMap::new(), uniform, written: UNEXPOSED, uploaded: 0 }
     }
 
     /// Makes the pipeline for a target, or begins to; whether it is there.
@@ -157,6 +168,7 @@ impl OnDevice {
     fn write(&mut self, gpu: &Gpu, numbers: [f32; 4]) {
         if numbers != self.written {
             self.written = numbers;
+            self.uploaded += size_of_val(&numbers) as u64;
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&numbers));
         }
     }

@@ -4,6 +4,7 @@
 mod alpha;
 mod display;
 mod fog;
+mod light_counts;
 mod lightmap;
 mod lights;
 mod specular;
@@ -16,6 +17,7 @@ use lumbre_scene::{ObjectTraits, SceneSettings};
 
 use crate::extract::LightSet;
 use crate::frame_plan::Ending;
+use crate::light_counter::CountedStages;
 use crate::shader::{DisplayVariant, Feature, Variant};
 use crate::{Display, FrameOptions};
 
@@ -34,6 +36,8 @@ pub(crate) struct FrameFeatures {
     pub clustered: bool,
     /// Colours are made as the target holds them.
     pub display: Option<DisplayVariant>,
+    /// Where lights are counted: nowhere, unless the frame is measured so.
+    pub counted: CountedStages,
 }
 
 impl FrameFeatures {
@@ -54,6 +58,7 @@ impl FrameFeatures {
             lights,
             clustered: lights.are_clustered(options.light_lists),
             display: (ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target)),
+            counted: CountedStages::default(),
         }
     }
 }
@@ -90,6 +95,7 @@ pub(crate) fn variant(object: &ObjectTraits, settings: &SceneSettings, frame: &F
         two_sided::call,
         lightmap::call,
         lights::call,
+        light_counts::call,
         specular::call,
         specular_antialiasing::call,
         fog::call,

@@ -134,6 +134,8 @@ features! {
     Constant = 52 => "CONSTANT",
     /// Some of a cluster's inverse-square lights have a cone.
     InverseSquareSpots = 53 => "INVERSE_SQUARE_SPOTS",
+    /// Counts the lights that it tests and those that contribute.
+    CountLights = 54 => "COUNT_LIGHTS",
 }
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
@@ -166,7 +168,8 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::Shadows as u64
     | Feature::ShadowCubes as u64
     | Feature::ShadowCascades as u64
-    | Feature::SoftShadows as u64;
+    | Feature::SoftShadows as u64
+    | Feature::CountLights as u64;
 
 /// Features that make a colour differ from place to place on a surface, or from its front to its back.
 const VARYING: u64 = Feature::Lights as u64
@@ -276,6 +279,7 @@ impl Variant {
                 | Feature::LocalViewer as u64
                 | Feature::NormalTexture as u64
                 | Feature::EnergyKeeping as u64
+                | Feature::CountLights as u64
                 | Feature::Matt as u64);
             self.reflection = ReflectionModel::Phong;
         }
