@@ -108,10 +108,18 @@ fn stages_passes_and_effects_sum_to_the_frame() {
     assert!(second.effects.iter().all(|effect| effect.pipelines_made == 0), "{:#?}", second.effects);
     assert_eq!((of(&second, "shadow maps").passes.len(), second.uploads.lights), (0, 0));
     assert!(second.frame == first.frame + 1);
-    // Frames that nobody measures have no account, and frames that nobody waits for no sum.
+    // Frames that nobody measures have no account; of several on their way the last one is waited for.
     let report =
         canvas.renderer.render(&mut world, &canvas.target.target(), &FrameOptions::default()).unwrap();
-    assert!(report.accounting.is_none() && canvas.renderer.accounting().is_none());
+    assert!(report.accounting.is_none() && canvas.renderer.accounting() == Some(&second));
+    let options = FrameOptions { measure: Measure::Time, ..FrameOptions::default() };
+    for _ in 0..3 {
+        canvas.renderer.render(&mut world, &canvas.target.target(), &options).unwrap();
+    }
+    canvas.renderer.wait().unwrap();
+    let waited = canvas.renderer.accounting().unwrap().clone();
+    assert_eq!((waited.frame, waited.wall_ms.is_some()), (second.frame + 4, true));
+    check_sums(&waited);
     let lights = canvas.account(&mut world, Measure::Lights);
     check_sums(&lights);
 }

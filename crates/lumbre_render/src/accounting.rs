@@ -185,6 +185,17 @@ impl Accounting {
         Some(self.wall_ms? - self.accounted_ms())
     }
 
+    /// Takes the lights that another frame of the same scene counted, pass by pass: what counts takes longer, so that times and counts are best of two frames.
+    pub fn take_lights_of(&mut self, counted: &Self) {
+        for pass in &mut self.passes {
+            let same = counted.passes.iter().find(|other| other.pass == pass.pass);
+            pass.lights = same.and_then(|same| same.lights);
+        }
+        self.notes.extend(
+            counted.notes.iter().filter(|note| !self.notes.contains(note)).cloned().collect::<Vec<_>>(),
+        );
+    }
+
     /// For people: stages, passes, their sum, effects.
     pub fn to_text(&self) -> String {
         let mut text = String::new();

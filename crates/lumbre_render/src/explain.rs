@@ -140,7 +140,7 @@ impl SceneExplanation {
         }
         let objects: usize = self.variants.values().sum();
         let _ = writeln!(text, "\n  {} shader variants for {objects} objects", self.variants.len());
-        text
+        text + &self.account()
     }
 
     fn heading(&self) -> String {
@@ -193,6 +193,14 @@ impl SceneExplanation {
         for (variant, count) in &self.variants {
             let _ = writeln!(text, "  {count} x {variant}");
         }
-        text
+        text + &self.account()
+    }
+
+    /// What a frame went into, where it was measured.
+    fn account(&self) -> String {
+        let accounting = self.cost.as_ref().and_then(|cost| cost.accounting.as_ref());
+        accounting.map_or_else(String::new, |accounting| {
+            format!("\nThe account of a frame\n{}", accounting.to_text())
+        })
     }
 }

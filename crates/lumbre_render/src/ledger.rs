@@ -42,12 +42,6 @@ impl Ledger {
         self.open.push_back(frame);
     }
 
-    /// Forgets what was measured before: frames are not measured any more.
-    pub fn clear(&mut self) {
-        self.open.clear();
-        self.newest = None;
-    }
-
     /// Takes what the graph measured.
     pub fn note_report(&mut self, report: &GraphReport) {
         if let Some(frame) =

@@ -197,7 +197,7 @@ impl Renderer {
         Ok(self.executor.latest_report())
     }
 
-    /// The account of the newest measured frame of which all has arrived: after [`wait`](Self::wait) of the last one. Nothing if the last frame was not measured.
+    /// The account of the newest measured frame of which all has arrived: after [`wait`](Self::wait) of the last one.
     pub fn accounting(&self) -> Option<&Accounting> {
         self.ledger.newest().map(Arc::as_ref)
     }
@@ -641,7 +641,8 @@ impl Renderer {
         let census = Arc::clone(&frame.decided.census);
         frame.statistics.cpu = clock.stages();
         match options.measure {
-            Measure::Nothing => self.ledger.clear(),
+            // Another frame, metered say, may come between two that are measured.
+            Measure::Nothing => {}
             measure => {
                 let shares = FrameShares {
                     stages: frame.statistics.cpu,
@@ -671,7 +672,7 @@ impl Renderer {
             census,
             measured: self.executor.latest_report().cloned(),
             left_out: self.left_out.clone(),
-            accounting: self.ledger.newest().cloned(),
+            accounting: self.ledger.newest().filter(|_| options.measure != Measure::Nothing).cloned(),
         };
         self.last = Some(frame);
         Ok(report)

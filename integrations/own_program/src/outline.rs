@@ -1,6 +1,7 @@
 //! Outlines: a rim around chosen objects, seen through whatever stands before them. An effect over the finished picture.
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -21,8 +22,9 @@ pub struct OutlineEffect {
     width: f32,
     outlined: HashMap<Entity, Vec3>,
     device: Option<OnDevice>,
-    /// So far.
-    work: EffectWork,
+    pipelines_made: usize,
+    /// Bytes, so far.
+    uploaded: AtomicU64,
 }
 
 struct OnDevice {
@@ -50,7 +52,8 @@ impl OutlineEffect {
             width: width.clamp(1.0, 16.0),
             outlined: HashMap::new(),
             device: None,
-            work: EffectWork::default(),
+            pipelines_made: 0,
+            uploaded: AtomicU64::new(0),
         }
     }
 }
@@ -83,19 +86,18 @@ impl Effect for OutlineEffect {
         let (count, format) = (self.outlined.len() as u64, frame.target_format);
         if self.device.as_ref().is_none_or(|device| device.format != format || device.capacity < count) {
             self.device = Some(OnDevice::new(&gpu.device, format, count.next_power_of_two()));
-            self.work.pipelines_made += 2;
+            self.pipelines_made += 2;
         }
         if let Some(device) = &self.device {
             let width = self.width.to_le_bytes();
             gpu.queue.write_buffer(&device.width, 0, &width);
-            // The records of the objects are written when they are drawn.
-            self.work.uploaded_bytes += width.len() as u64 + STRIDE * count;
+            *self.uploaded.get_mut() += width.len() as u64;
         }
         Ok(())
     }
 
     fn work(&self) -> EffectWork {
-        self.work
+        EffectWork::new(self.uploaded.load(Ordering::Relaxed), self.pipelines_made)
     }
 
     fn draws_objects(&self) -> bool {
@@ -127,6 +129,7 @@ impl Effect for OutlineEffect {
                 }
                 // Written before any pass of this frame runs.
                 context.resources.queue.write_buffer(&device.records, 0, &records);
+                self.uploaded.fetch_add(records.len() as u64, Ordering::Relaxed);
                 Ok(())
             });
         graph

@@ -184,7 +184,11 @@ impl App {
             lightmaps: view.lightmaps,
             multisample: view.multisample,
             missing_pipelines: MissingPipelines::Background,
-            measure: if view.overlay { Measure::Time } else { Measure::Nothing },
+            measure: match (view.overlay, view.count_lights) {
+                (false, _) => Measure::Nothing,
+                (true, false) => Measure::TimeAndInvocations,
+                (true, true) => Measure::Lights,
+            },
             ..FrameOptions::default()
         }
     }

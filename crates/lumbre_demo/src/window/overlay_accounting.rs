@@ -1,0 +1,101 @@
+//! The overlay's account of a frame: what its effects cost, and what the CPU did stage by stage. The passes and their reasons are `overlay`'s.
+
+use egui::{RichText, Ui};
+use lumbre_render::{Accounting, EffectAccount, PassAccount, StageAccount};
+
+use super::overlay_file::{DIM, WARM};
+
+/// Stages shorter than this are shown as one, in milliseconds.
+const SHORT: f64 = 0.02;
+
+/// The account of the newest frame whose numbers have arrived.
+pub fn account(ui: &mut Ui, accounting: &Accounting) {
+    let heading = |name| egui::CollapsingHeader::new(name);
+    heading("by effect").default_open(true).show(ui, |ui| effects(ui, accounting));
+    heading("stages on the CPU").default_open(false).show(ui, |ui| stages(ui, accounting));
+    for note in &accounting.notes {
+        ui.label(RichText::new(note).color(WARM).small());
+    }
+}
+
+/// Lights that a pass tested and that contributed, where they are counted.
+pub fn lights(pass: Option<&PassAccount>) -> String {
+    let counts = pass.and_then(|pass| pass.lights);
+    counts.map_or_else(String::new, |counts| {
+        let part = 100.0 * counts.contributing as f64 / counts.tested.max(1) as f64;
+        format!("{} ({part:.0} %)", short_count(counts.tested))
+    })
+}
+
+fn effects(ui: &mut Ui, accounting: &Accounting) {
+    egui::Grid::new("effects").num_columns(6).spacing([10.0, 2.0]).show(ui, |ui| {
+        for heading in ["", "CPU ms", "GPU ms", "fragments", "bytes", "pipelines"] {
+            ui.label(RichText::new(heading).color(DIM).small());
+        }
+        ui.end_row();
+        for effect in accounting.effects.iter().filter(|effect| does_something(effect)) {
+            ui.label(&effect.effect);
+            ui.label(format!("{:.2}", effect.cpu_ms));
+            ui.label(effect.gpu_ms.map_or_else(String::new, |ms| format!("{ms:.2}")));
+            ui.label(effect.invocations.map_or_else(String::new, |counts| short_count(counts.fragment)));
+            ui.label(effect.uploaded_bytes.to_string());
+            ui.label(effect.pipelines_made.to_string());
+            ui.end_row();
+        }
+    });
+}
+
+fn does_something(effect: &EffectAccount) -> bool {
+    !effect.passes.is_empty() || effect.gpu_ms.is_some() || effect.uploaded_bytes > 0 || effect.cpu_ms > SHORT
+}
+
+fn stages(ui: &mut Ui, accounting: &Accounting) {
+    let is_short = |stage: &&StageAccount| stage.ms < SHORT;
+    let shown = accounting.stages.iter().filter(|stage| !is_short(stage));
+    let rest: f64 = accounting.stages.iter().filter(is_short).map(|stage| stage.ms).sum();
+    let sum: f64 = accounting.stages.iter().map(|stage| stage.ms).sum();
+    let others =
+        [("shorter ones", rest), ("of no stage", accounting.cpu_ms - sum), ("all", accounting.cpu_ms)];
+    egui::Grid::new("stages").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (stage, ms) in shown.map(|stage| (stage.stage, stage.ms)).chain(others) {
+            ui.label(stage);
+            ui.label(format!("{ms:.3} ms"));
+            ui.end_row();
+        }
+    });
+}
+
+/// A number of up to three figures and a word.
+fn short_count(count: u64) -> String {
+    match count {
+        0..10_000 => count.to_string(),
+        10_000..10_000_000 => format!("{} thousand", count / 1000),
+        _ => format!("{} million", count / 1_000_000),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_render::LightCount;
+
+    use super::*;
+
+    #[test]
+    fn counts_are_short() {
+        let counts = [0, 9_999, 10_000, 9_999_999, 10_000_000].map(short_count);
+        assert_eq!(counts, ["0", "9999", "10 thousand", "9999 thousand", "10 million"]);
+        let pass = |tested, contributing| PassAccount {
+            pass: "forward".to_owned(),
+            effect: "forward".to_owned(),
+            group: 0,
+            cpu_ms: None,
+            gpu_ms: None,
+            shared: false,
+            invocations: None,
+            lights: Some(LightCount { tested, contributing }),
+        };
+        assert_eq!(lights(Some(&pass(20_000, 5_000))), "20 thousand (25 %)");
+        assert_eq!(lights(Some(&pass(0, 0))), "0 (0 %)");
+        assert_eq!(lights(None), "");
+    }
+}
