@@ -1,6 +1,7 @@
 //! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
 
 use crate::facts::SceneFacts;
+use crate::rehearsal::Rehearsals;
 use crate::statistics::Uploads;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
 
@@ -94,6 +95,7 @@ impl FramePlan {
             display_pass: self.ending == Ending::DisplayPass,
             shadow_atlas: None,
             uploads: Uploads::default(),
+            rehearsals: None,
         }
     }
 }
@@ -124,6 +126,8 @@ pub struct FrameShape {
     pub(crate) shadow_atlas: Option<ShadowAtlas>,
     /// What has been uploaded for the frame.
     pub(crate) uploads: Uploads,
+    /// First draws where no frame waits for them, if the frame is to have any.
+    pub(crate) rehearsals: Option<Rehearsals>,
 }
 
 /// The atlas of shadow maps, whether any of them has to be drawn, and how many pipelines draw them.

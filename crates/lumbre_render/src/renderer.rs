@@ -480,7 +480,8 @@ impl Renderer {
 
     /// By effect, whether it can be drawn without waiting for it.
     fn ready_effects(&mut self, decided: &Decided, seen: &Seen<'_>) -> Result<Vec<bool>, RenderError> {
-        let shape = decided.decision.shape(seen);
+        let mut shape = decided.decision.shape(seen);
+        shape.rehearsals = Some(self.rehearsals.clone());
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms).zip(&decided.called_for);
         let ready = effects.map(|((effect, ms), called)| {
             let (called, name) = (*called, effect.name());
