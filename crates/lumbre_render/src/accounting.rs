@@ -75,8 +75,9 @@ pub struct PassAccount {
     pub lights: Option<LightCount>,
 }
 
-/// How many lights a pass tests, and how many of these contribute. Counted while the pass draws, by vertices under flat and Gouraud shading and by fragments under Phong shading,
-/// those included that something nearer covers later.
+/// How many lights a pass tests, and how many of these contribute. Counted while the pass draws, by vertices under flat and Gouraud shading and by fragments under Phong shading:
+/// those that something nearer covers later too, but not those that are hidden already, as they are not shaded (but for masked surfaces, whose fragments are tested for depth
+/// after they have run).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct LightCount {
     /// Evaluations of a light at a point: a light of the object's list or of the cluster's. Neither ambient lights nor what pads a cluster's list are any.

@@ -80,6 +80,62 @@ mod tests {
 
     use super::*;
 
+    /// All that is written in the overlay.
+    fn texts(shape: &egui::Shape, text: &mut String) {
+        match shape {
+            egui::Shape::Text(one) => *text += &(one.galley.text().to_owned() + "\n"),
+            egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| texts(shape, text)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn effects_that_do_something_are_said_with_what_they_cost() {
+        let effect = |name: &str, gpu_ms, uploaded_bytes| EffectAccount {
+            effect: name.to_owned(),
+            gpu_ms,
+            uploaded_bytes,
+            pipelines_made: 7,
+            ..EffectAccount::default()
+        };
+        let accounting = Accounting {
+            frame: 1,
+            wall_ms: None,
+            cpu_ms: 2.5,
+            stages: vec![
+                StageAccount { stage: "recording", ms: 2.0 },
+                StageAccount { stage: "census", ms: 0.001 },
+            ],
+            between_ms: None,
+            waiting_ms: None,
+            gpu_ms: None,
+            passes_ms: None,
+            passes: Vec::new(),
+            effects: vec![
+                effect("forward", Some(12.25), 0),
+                effect("glow", None, 4321),
+                effect("idle", None, 0),
+            ],
+            uploads: lumbre_render::Uploads::default(),
+            notes: vec!["not measured: something".to_owned()],
+        };
+        let context = egui::Context::default();
+        let mut text = String::new();
+        // What is laid out on the first frame is shown on the second.
+        for _ in 0..2 {
+            text.clear();
+            let output = context.run_ui(egui::RawInput::default(), |ui| account(ui, &accounting));
+            output.shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut text));
+            output.drop_without_applying_deltas();
+        }
+        for wanted in
+            ["by effect", "forward", "12.25", "glow", "4321", "stages on the CPU", "not measured: something"]
+        {
+            assert!(text.contains(wanted), "{wanted} is not in:\n{text}");
+        }
+        assert!(!text.contains("idle"), "{text}");
+    }
+
     #[test]
     fn counts_are_short() {
         let counts = [0, 9_999, 10_000, 9_999_999, 10_000_000].map(short_count);
