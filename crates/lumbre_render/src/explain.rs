@@ -14,7 +14,7 @@ use crate::extract::LightSet;
 use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
 use crate::frame_bindings::FrameBindings;
-use crate::frame_graph::declare;
+use crate::frame_graph::{Last, declare};
 use crate::frame_plan::{Ending, FramePlan};
 use crate::shader::Feature;
 use crate::{FrameOptions, RenderError, Renderer};
@@ -105,7 +105,8 @@ fn explain_with(
     let target = TextureDescriptor::new_2d(width, height, target_format);
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
     let light = bindings.light_resources().map(|(name, buffer)| (name, buffer, usage));
-    let frame = declare(effects.iter(), &plan, (target, None, &mut { light }), None).compile()?.explain();
+    let frame =
+        declare(effects.iter(), &plan, (target, None, &mut { light }), Last::default()).compile()?.explain();
     let hidden_cones = match options.shading {
         // Whatever the objects ask for.
         Some(Shading::Phong) => Vec::new(),

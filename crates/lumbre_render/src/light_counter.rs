@@ -119,23 +119,22 @@ impl LightCounter {
         self.counts.as_ref().map(|buffer| wgpu::BufferBinding { buffer, offset, size })
     }
 
-    /// Sends for the counts of a frame that was submitted; whether they will come: not if too many are on their way.
-    pub fn send_for(&mut self, gpu: &Gpu, frame: u64) -> bool {
-        let Some(counts) = self.counts.as_ref().filter(|_| self.on_the_way.len() < MOST_ON_THE_WAY) else {
-            return false;
-        };
+    /// The counts and a buffer to copy them to, within the frame's own commands; nothing if too many are on their way.
+    pub fn copy(&mut self, gpu: &Gpu) -> Option<[wgpu::Buffer; 2]> {
+        let counts = self.counts.clone().filter(|_| self.on_the_way.len() < MOST_ON_THE_WAY)?;
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let copy = self.free.pop().unwrap_or_else(|| buffer(gpu, "light counts on their way", usage));
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(counts, 0, &copy, 0, counts.size());
-        gpu.queue.submit([encoder.finish()]);
+        Some([counts, copy])
+    }
+
+    /// After a frame was submitted: asks for the copy of its counts.
+    pub fn send_for(&mut self, frame: u64, copy: wgpu::Buffer) {
         let state = Arc::new(AtomicU8::new(WAITING));
         let arrived = Arc::clone(&state);
         copy.map_async(wgpu::MapMode::Read, .., move |result| {
             arrived.store(if result.is_ok() { ARRIVED } else { FAILED }, Ordering::Release);
         });
         self.on_the_way.push(Copied { frame, buffer: copy, state });
-        true
     }
 
     /// The counts that have arrived, each with its frame's number. The device has to be polled before, as the graph does.

@@ -21,7 +21,7 @@ use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBuffer;
 use crate::frame_decision::{AskedFrame, Decided, Decision, Decisions, LastFrame, Seen, with_camera};
-use crate::frame_graph::{Overlay, run_graph};
+use crate::frame_graph::{Last, Overlay, run_graph};
 use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
 use crate::frame_scene::{FrameGroup, FrameScene};
 use crate::growable_buffer::GrowableBuffer;
@@ -629,8 +629,11 @@ impl Renderer {
         let light = decided.bindings().light_resources();
         let bound = |buffer| self.frame_buffer(buffer, None).map(|bound| bound.buffer.clone());
         let light: Vec<_> = light.filter_map(|(name, of)| Some((name, of, bound(of)?))).collect();
-        let drawn = run_graph(&mut self.executor, &self.gpu, effects, (target, &light), &mut scene, overlay)?;
-        let counts_lights = decided.counts_lights() && self.light_counter.send_for(&self.gpu, drawn.number);
+        let counts = if decided.counts_lights() { self.light_counter.copy(&self.gpu) } else { None };
+        let last = Last { overlay, counts: counts.clone() };
+        let drawn = run_graph(&mut self.executor, &self.gpu, effects, (target, &light), &mut scene, last)?;
+        let counts_lights = counts.is_some();
+        counts.into_iter().for_each(|[_, copy]| self.light_counter.send_for(drawn.number, copy));
         self.gpu.check()?;
         if options.measure != Measure::Nothing {
             frame.statistics.lit_passes = decided.lit_passes();

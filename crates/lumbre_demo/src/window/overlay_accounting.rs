@@ -10,9 +10,12 @@ const SHORT: f64 = 0.02;
 
 /// The account of the newest frame whose numbers have arrived.
 pub fn account(ui: &mut Ui, accounting: &Accounting) {
-    let heading = |name| egui::CollapsingHeader::new(name);
-    heading("by effect").default_open(true).show(ui, |ui| effects(ui, accounting));
-    heading("stages on the CPU").default_open(false).show(ui, |ui| stages(ui, accounting));
+    // Folded, so that the keys below stay in a small window.
+    let gpu = accounting.gpu_ms.map_or_else(String::new, |ms| format!(", {ms:.1} ms on the GPU"));
+    let by_effect = format!("by effect: {:.1} ms on the CPU{gpu}", accounting.cpu_ms);
+    let heading = |text: String, name| egui::CollapsingHeader::new(text).id_salt(name).default_open(false);
+    heading(by_effect, "by effect").show(ui, |ui| effects(ui, accounting));
+    heading("by stage on the CPU".to_owned(), "by stage").show(ui, |ui| stages(ui, accounting));
     for note in &accounting.notes {
         ui.label(RichText::new(note).color(WARM).small());
     }
@@ -38,8 +41,9 @@ fn effects(ui: &mut Ui, accounting: &Accounting) {
             ui.label(format!("{:.2}", effect.cpu_ms));
             ui.label(effect.gpu_ms.map_or_else(String::new, |ms| format!("{ms:.2}")));
             ui.label(effect.invocations.map_or_else(String::new, |counts| short_count(counts.fragment)));
-            ui.label(effect.uploaded_bytes.to_string());
-            ui.label(effect.pipelines_made.to_string());
+            let but_zero = |count: u64| if count == 0 { String::new() } else { count.to_string() };
+            ui.label(but_zero(effect.uploaded_bytes));
+            ui.label(but_zero(effect.pipelines_made as u64));
             ui.end_row();
         }
     });
