@@ -23,20 +23,17 @@ impl EffectShares {
 
     /// Ends a frame: what each effect did in it. What they uploaded themselves is added to the frame's uploads.
     pub fn end(&mut self, effects: &[Box<dyn Effect>], uploads: &mut Uploads) -> Vec<EffectShare> {
-        let share = |((effect, ms), worked): ((&Box<dyn Effect>, &f64), &mut EffectWork)| {
+        let mut shares = Vec::with_capacity(effects.len());
+        for ((effect, ms), worked) in effects.iter().zip(&self.ms).zip(&mut self.worked) {
             let work = effect.work();
             let own = work.uploaded_bytes.saturating_sub(worked.uploaded_bytes);
             let of_renderer = work.of_renderer.saturating_sub(worked.of_renderer);
             let pipelines_made = work.pipelines_made.saturating_sub(worked.pipelines_made);
             *worked = work;
             uploads.effects += own;
-            EffectShare {
-                name: effect.name(),
-                cpu_ms: *ms,
-                uploaded_bytes: own + of_renderer,
-                pipelines_made,
-            }
-        };
-        effects.iter().zip(&self.ms).zip(&mut self.worked).map(share).collect()
+            let uploaded_bytes = own + of_renderer;
+            shares.push(EffectShare { name: effect.name(), cpu_ms: *ms, uploaded_bytes, pipelines_made });
+        }
+        shares
     }
 }

@@ -112,7 +112,7 @@ mod tests {
             ],
             between_ms: None,
             waiting_ms: None,
-            gpu_ms: None,
+            gpu_ms: Some(13.5),
             passes_ms: None,
             passes: Vec::new(),
             effects: vec![
@@ -128,13 +128,27 @@ mod tests {
         // What is laid out on the first frame is shown on the second.
         for _ in 0..2 {
             text.clear();
-            let output = context.run_ui(egui::RawInput::default(), |ui| account(ui, &accounting));
+            let output = context.run_ui(egui::RawInput::default(), |ui| {
+                account(ui, &accounting);
+                effects(ui, &accounting);
+                stages(ui, &accounting);
+            });
             output.shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut text));
             output.drop_without_applying_deltas();
         }
-        for wanted in
-            ["by effect", "forward", "12.25", "glow", "4321", "stages on the CPU", "not measured: something"]
-        {
+        for wanted in [
+            "by effect: 2.5 ms on the CPU, 13.5 ms on the GPU",
+            "by stage",
+            "forward",
+            "12.25",
+            "glow",
+            "4321",
+            "recording",
+            "2.000 ms",
+            "of no stage",
+            "0.499 ms",
+            "not measured: something",
+        ] {
             assert!(text.contains(wanted), "{wanted} is not in:\n{text}");
         }
         assert!(!text.contains("idle"), "{text}");
