@@ -112,7 +112,6 @@ fn contributing<'a>(reflected: impl IntoIterator<Item = &'a f64> + Clone) -> [u6
 /// Fails unless a count is what the twin has, and that is telling: many contribute and many do not, and rounding leaves few open.
 fn check(name: &str, count: LightCount, tested: u64, reflected: &[Vec<f64>]) {
     let [least, most] = contributing(reflected.iter().flatten());
-    println!("{name}: {count:?}, the twin has {least} to {most} of {tested}");
     assert_eq!(count.tested, tested, "{name}");
     assert!(
         (least..=most).contains(&count.contributing),
