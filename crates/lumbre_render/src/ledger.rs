@@ -31,6 +31,8 @@ pub(crate) struct OpenFrame {
 #[derive(Debug, Default)]
 pub(crate) struct Ledger {
     open: VecDeque<OpenFrame>,
+    /// A frame was drawn since that is not measured: nobody waits for the open ones alone.
+    passed_over: bool,
     newest: Option<Arc<Accounting>>,
 }
 
@@ -40,6 +42,12 @@ impl Ledger {
             self.open.pop_front();
         }
         self.open.push_back(frame);
+        self.passed_over = false;
+    }
+
+    /// Notes that a frame was drawn that is not measured.
+    pub fn pass_over(&mut self) {
+        self.passed_over = true;
     }
 
     /// Takes what the graph measured.
@@ -64,7 +72,7 @@ impl Ledger {
         let is_complete =
             |open: &OpenFrame| open.report.is_some() && (open.lights.is_some() || !open.counts_lights);
         let Some(newest) = self.open.iter().rposition(is_complete) else { return };
-        let is_last = newest + 1 == self.open.len();
+        let is_last = newest + 1 == self.open.len() && !self.passed_over;
         let Some(open) = self.open.drain(..=newest).next_back() else { return };
         let Some(mut report) = open.report else { return };
         report.notes.extend(open.notes);
@@ -118,6 +126,16 @@ mod tests {
         let settled = ledger.newest().unwrap();
         assert_eq!(settled.frame, 3);
         assert!(settled.wall_ms >= settled.waiting_ms && settled.waiting_ms.is_some());
+    }
+
+    #[test]
+    fn waiting_for_another_frame_is_no_frames_wall_clock() {
+        let mut ledger = Ledger::default();
+        ledger.open(frame(1, false));
+        ledger.pass_over();
+        ledger.note_report(&report(1));
+        ledger.settle(Some(Instant::now()));
+        assert_eq!(ledger.newest().map(|settled| settled.wall_ms), Some(None));
     }
 
     #[test]

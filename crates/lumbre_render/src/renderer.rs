@@ -646,7 +646,7 @@ impl Renderer {
         frame.statistics.cpu = clock.stages();
         match options.measure {
             // Another frame, metered say, may come between two that are measured.
-            Measure::Nothing => {}
+            Measure::Nothing => self.ledger.pass_over(),
             measure => {
                 let shares = FrameShares {
                     stages: frame.statistics.cpu,
