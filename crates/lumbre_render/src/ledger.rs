@@ -33,6 +33,8 @@ pub(crate) struct Ledger {
     open: VecDeque<OpenFrame>,
     /// A frame was drawn since that is not measured: nobody waits for the open ones alone.
     passed_over: bool,
+    /// The last frame, if it was settled before anybody waited for it: all had arrived at once, as nothing of it is measured on the device.
+    settled_at_once: Option<OpenFrame>,
     newest: Option<Arc<Accounting>>,
 }
 
@@ -42,12 +44,12 @@ impl Ledger {
             self.open.pop_front();
         }
         self.open.push_back(frame);
-        self.passed_over = false;
+        (self.passed_over, self.settled_at_once) = (false, None);
     }
 
     /// Notes that a frame was drawn that is not measured.
     pub fn pass_over(&mut self) {
-        self.passed_over = true;
+        (self.passed_over, self.settled_at_once) = (true, None);
     }
 
     /// Takes what the graph measured.
@@ -71,22 +73,33 @@ impl Ledger {
     pub fn settle(&mut self, waited: Option<Instant>) {
         let is_complete =
             |open: &OpenFrame| open.report.is_some() && (open.lights.is_some() || !open.counts_lights);
-        let Some(newest) = self.open.iter().rposition(is_complete) else { return };
-        let is_last = newest + 1 == self.open.len() && !self.passed_over;
-        let Some(open) = self.open.drain(..=newest).next_back() else { return };
-        let Some(mut report) = open.report else { return };
-        report.notes.extend(open.notes);
+        let newest = self.open.iter().rposition(is_complete);
+        let is_last = newest.is_none_or(|newest| newest + 1 == self.open.len()) && !self.passed_over;
+        let complete = newest.and_then(|newest| self.open.drain(..=newest).next_back());
+        let Some(frame) = complete.or_else(|| self.settled_at_once.take_if(|_| waited.is_some())) else {
+            return;
+        };
         let waited = waited.filter(|_| is_last).map(|since| Waited {
-            wall_ms: milliseconds(open.begun.elapsed()),
+            wall_ms: milliseconds(frame.begun.elapsed()),
             waiting_ms: milliseconds(since.elapsed()),
         });
-        let lights = |pass: &str| -> Option<LightCount> { open.lights.as_ref()?.of(pass) };
-        self.newest = Some(Arc::new(Accounting::new(&open.shares, &report, lights, waited)));
+        self.newest = frame.account(waited).map(Arc::new);
+        self.settled_at_once = Some(frame).filter(|_| is_last && waited.is_none());
     }
 
     /// The newest account that is settled.
     pub fn newest(&self) -> Option<&Arc<Accounting>> {
         self.newest.as_ref()
+    }
+}
+
+impl OpenFrame {
+    /// Its account, once its report is there.
+    fn account(&self, waited: Option<Waited>) -> Option<Accounting> {
+        let mut report = self.report.clone()?;
+        report.notes.extend(self.notes.iter().cloned());
+        let lights = |pass: &str| -> Option<LightCount> { self.lights.as_ref()?.of(pass) };
+        Some(Accounting::new(&self.shares, &report, lights, waited))
     }
 }
 
@@ -126,6 +139,21 @@ mod tests {
         let settled = ledger.newest().unwrap();
         assert_eq!(settled.frame, 3);
         assert!(settled.wall_ms >= settled.waiting_ms && settled.waiting_ms.is_some());
+    }
+
+    #[test]
+    fn what_is_settled_at_once_can_be_waited_for_once() {
+        let mut ledger = Ledger::default();
+        ledger.open(frame(1, false));
+        ledger.note_report(&report(1));
+        ledger.settle(None);
+        let wall = |ledger: &Ledger| ledger.newest().and_then(|settled| settled.wall_ms);
+        assert_eq!(wall(&ledger), None);
+        ledger.settle(Some(Instant::now()));
+        let waited = wall(&ledger);
+        assert!(waited.is_some());
+        ledger.settle(Some(Instant::now()));
+        assert_eq!(wall(&ledger), waited);
     }
 
     #[test]
