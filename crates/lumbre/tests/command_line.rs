@@ -159,7 +159,8 @@ fn frames_and_timings_are_written_whole() {
     let number = |value: &serde_json::Value| value.as_f64().unwrap();
     assert!(number(&account["wall_ms"]) <= wall, "{account}");
     let stages: f64 = account["stages"].as_array().unwrap().iter().map(|stage| number(&stage["ms"])).sum();
-    let parts = stages + number(&account["between_ms"]) + number(&account["passes_ms"]);
+    let parts = stages + number(&account["between_ms"]) + number(&account["passes_ms"])
+        - number(&account["overlapped_ms"]);
     let remainder = number(&frames[2]["remainder_ms"]);
     assert!((parts + remainder - number(&account["wall_ms"])).abs() < 1e-6, "{account}");
     let effects = account["effects"].as_array().unwrap();

@@ -11,8 +11,8 @@ use crate::statistics::{CpuStages, Uploads};
 /// What a frame cost, and where.
 ///
 /// The stages of the CPU follow each other without a gap, and the passes follow each other on the device. So a frame that was waited for lasts as long as its stages and its
-/// passes together, but for a [`remainder`](Self::remainder_ms): what the device does between passes and before the first, and what it does already while the CPU
-/// still works (then it is below zero). A frame that was not waited for overlaps with its neighbours, and its parts have no sum.
+/// passes together, less what the device did already while the CPU still worked ([`overlapped_ms`](Self::overlapped_ms)), but for a [`remainder`](Self::remainder_ms): what the device
+/// does between passes and before the first, and what belongs to no stage. A frame that was not waited for overlaps with its neighbours, and its parts have no sum.
 ///
 /// By effects the same is cut in another way: [`effects`](Self::effects) sum to all that was spent on the CPU, on the device, and uploaded. What all passes draw with (lists of
 /// lights, buffers, meshes, pipelines of lit surfaces) is [`SCENE`]'s. An effect that is a feature of the lit shaders (spot lights, fog, textures) has no time of its own within
@@ -31,6 +31,8 @@ pub struct Accounting {
     pub between_ms: Option<f64>,
     /// Milliseconds in which the CPU waited for the device.
     pub waiting_ms: Option<f64>,
+    /// Milliseconds of passes that the device ran while the CPU still worked, if it was waited for: at least what passes took longer than the waiting.
+    pub overlapped_ms: Option<f64>,
     /// Milliseconds on the device from the first pass's begin to the last one's end.
     pub gpu_ms: Option<f64>,
     /// Milliseconds on the device within passes.
@@ -166,6 +168,9 @@ impl Accounting {
             stages,
             between_ms: waited.map(|waited| waited.wall_ms - cpu_ms - waited.waiting_ms),
             waiting_ms: waited.map(|waited| waited.waiting_ms),
+            overlapped_ms: waited
+                .zip(report.passes_gpu_ms())
+                .map(|(waited, passes)| (passes - waited.waiting_ms).max(0.0)),
             gpu_ms: report.gpu_ms,
             passes_ms: report.passes_gpu_ms(),
             effects: by_effect(shares, &passes),
@@ -175,10 +180,12 @@ impl Accounting {
         }
     }
 
-    /// Milliseconds of the stages and passes together, with what the caller did between drawing and waiting. Where the device has no timestamps the time of waiting stands for its passes.
+    /// Milliseconds of the stages and passes together, with what the caller did between drawing and waiting; what overlapped counts once. Where the device has no timestamps the time of
+    /// waiting stands for its passes.
     pub fn accounted_ms(&self) -> f64 {
         let stages: f64 = self.stages.iter().map(|stage| stage.ms).sum();
-        stages + self.between_ms.unwrap_or(0.0) + self.passes_ms.or(self.waiting_ms).unwrap_or(0.0)
+        let passes = self.passes_ms.or(self.waiting_ms).unwrap_or(0.0) - self.overlapped_ms.unwrap_or(0.0);
+        stages + self.between_ms.unwrap_or(0.0) + passes
     }
 
     /// Milliseconds of the wall clock that neither stages nor passes answer for; nothing if the frame was not waited for.
@@ -278,7 +285,13 @@ impl Accounting {
                 text,
                 "  of the remainder {:.3} ms are of no stage, and {:.3} ms are what waiting for the device ({waiting:.3} ms) took beyond its passes",
                 self.cpu_ms - self.stages.iter().map(|stage| stage.ms).sum::<f64>(),
-                waiting - passes
+                (waiting - passes).max(0.0)
+            );
+        }
+        if let Some(overlapped) = self.overlapped_ms.filter(|ms| *ms > 0.0) {
+            let _ = writeln!(
+                text,
+                "  {overlapped:.3} ms of the passes, which count once, ran while the CPU still worked: the wait was shorter than they"
             );
         }
     }
@@ -402,9 +415,13 @@ mod tests {
     }
 
     fn settled(passes: Vec<PassReport>) -> Accounting {
+        let waited = Waited { wall_ms: 14.0, waiting_ms: 10.0 };
+        settled_after(passes, waited)
+    }
+
+    fn settled_after(passes: Vec<PassReport>, waited: Waited) -> Accounting {
         let report = GraphReport { frame: 7, gpu_ms: Some(9.5), passes, ..GraphReport::default() };
-        let waited = Some(Waited { wall_ms: 14.0, waiting_ms: 10.0 });
-        Accounting::new(&shares(), &report, |_| None, waited)
+        Accounting::new(&shares(), &report, |_| None, Some(waited))
     }
 
     #[test]
@@ -433,6 +450,16 @@ mod tests {
             text.contains("stages and passes: 12.500 ms; wall clock: 14.000 ms; remainder: 1.500 ms, 10.7 %"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn what_the_device_did_beside_the_cpu_counts_once() {
+        let passes = vec![pass("forward", "forward", 0, GpuTime::Pass { ms: 9.0 })];
+        let accounting = settled_after(passes, Waited { wall_ms: 10.0, waiting_ms: 6.0 });
+        assert_eq!((accounting.overlapped_ms, accounting.between_ms), (Some(3.0), Some(0.5)));
+        // Half a millisecond of the CPU is of no stage.
+        assert_eq!((accounting.accounted_ms(), accounting.remainder_ms()), (9.5, Some(0.5)));
+        assert!(accounting.to_text().contains("3.000 ms of the passes"));
     }
 
     #[test]

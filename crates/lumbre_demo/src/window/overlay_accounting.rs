@@ -112,6 +112,7 @@ mod tests {
             ],
             between_ms: None,
             waiting_ms: None,
+            overlapped_ms: None,
             gpu_ms: Some(13.5),
             passes_ms: None,
             passes: Vec::new(),
