@@ -37,6 +37,7 @@ modules!(
     "frame",
     "irradiance_volume",
     "light_clusters",
+    "light_counts",
     "lighting",
     "lightmap",
     "material_textures",

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use bevy_ecs::world::World;
 use glam::DVec3;
 use lumbre_render::{
-    Display, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer,
+    Accounting, Display, FrameOptions, FrameReport, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer,
 };
 
 /// What wgpu's validation complained about, and nobody caught.
@@ -66,6 +66,12 @@ impl Canvas {
         let report = self.probed(world, options);
         let pixels = self.frame.read_linear(gpu()).unwrap();
         (pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(), report)
+    }
+
+    /// The account of the last frame, if it was measured.
+    #[allow(dead_code, reason = "shared with the hard cases, which count nothing")]
+    pub fn accounting(&self) -> &Accounting {
+        self.renderer.accounting().expect("the frame was measured")
     }
 
     /// Every frame of a test goes through here, whatever its options say: the hard cases look that there is no other way.

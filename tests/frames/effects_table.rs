@@ -14,7 +14,10 @@ use lumbre_optics::{
     AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Fresnel, Light, Lobe, Material,
     ReflectionModel, Shading, SpotCone,
 };
-use lumbre_render::{Display, FrameOptions, FrameReport, LightLists, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::effects::BuiltIn;
+use lumbre_render::{
+    Display, FrameOptions, FrameReport, LightLists, Measure, Offscreen, OffscreenFormat, Renderer,
+};
 use lumbre_scene::{
     AmbientCube, Camera, Census, EmissiveLight, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
     MaterialTextures, Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, SceneSettings,
@@ -569,6 +572,13 @@ const ROWS: &[Row] = &[
         add: |scene| scene.options.multisample = true,
     },
     Row {
+        effect: "counts of lights",
+        called_for_by: "`Measure::Lights`",
+        features: &["COUNT_LIGHTS"],
+        before: point_light,
+        add: |scene| scene.options.measure = Measure::Lights,
+    },
+    Row {
         effect: "bloom (a program's own)",
         called_for_by: "a camera with `Bloom` of integrations/own_program",
         features: &["HALF_RANGE"],
@@ -740,8 +750,9 @@ fn line(row: &Row) -> String {
     let plain = draw(&mut Renderer::new(gpu()), &mut without());
     let mut renderer = renderer();
     let effect = draw(&mut renderer, &mut with);
-    // Lists of lights are another way to the same picture.
-    let shown = effect.bytes != plain.bytes || row.features.contains(&"CLUSTERS");
+    // Lists of lights are another way to the same picture, and what counts draws the same one.
+    let same_picture = ["CLUSTERS", "COUNT_LIGHTS"].iter().any(|feature| row.features.contains(feature));
+    let shown = effect.bytes != plain.bytes || same_picture;
     assert!(shown, "{}: the scene does not show it", row.effect);
     // What is left of it in a renderer that has drawn it, and in one that knows it and never did.
     let after = draw(&mut renderer, &mut without());
@@ -751,6 +762,13 @@ fn line(row: &Row) -> String {
         assert_eq!(other.passes, plain.passes, "{}: other passes {what}", row.effect);
         assert_eq!(other.variants, plain.variants, "{}: other shaders {what}", row.effect);
     }
+    // A renderer that is built without the effects that have nothing to do here draws the same.
+    let idle =
+        BuiltIn::ALL.into_iter().filter(|effect| !plain.passes.iter().any(|pass| pass == effect.name()));
+    let smaller = idle.fold(Renderer::builder(), |builder, effect| builder.without(effect));
+    let smaller = draw(&mut smaller.build(gpu()), &mut without());
+    assert!(smaller.bytes == plain.bytes, "{}: other bits in a renderer without what is idle", row.effect);
+    assert_eq!((&smaller.passes, &smaller.variants), (&plain.passes, &plain.variants), "{}", row.effect);
     let uploads = |drawn: &Drawn| drawn.report.statistics.uploads;
     assert_eq!(uploads(&beside), uploads(&plain), "{}: something is uploaded for it", row.effect);
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
+mod accounting;
 mod adapter;
 mod baked;
 mod balls;
@@ -19,6 +20,7 @@ mod gltf_materials;
 mod highlights;
 mod irradiance_volumes;
 mod level;
+mod light_counts;
 mod light_lists;
 mod materials;
 mod missing_pipelines;

@@ -44,7 +44,8 @@ Keys:
   W A S D, Shift, Space       walk or fly     K         keep the bake: writes NAME.baked.glb beside the file
   click                       look around     E         adapt the exposure
   drop a file                 open it         1 2 3 G R L M T F   shading, reflection, lightmaps, multisampling, torch, flight
-  Tab                         the overlay     Q         quit
+  Tab                         the overlay     N         how many lights are tested
+                                              Q         quit
 
 Examples:
   lumbre play
@@ -64,7 +65,8 @@ Examples:
 Examples:
   lumbre render room.baked.glb -o room.png --size 1920x1080
   lumbre render ball.glb -o ball.exr --shading gouraud --display linear
-  lumbre render room.glb -o room.png --frames 20 --timings times.json")]
+  lumbre render room.glb -o room.png --frames 20 --timings times.json
+  lumbre render room.glb -o room.png --frames 5 --timings account.txt --count-lights")]
     Render(Render),
     /// Trace rays: mirrors, glass and shadows, or all light as it is.
     #[command(after_help = "\
@@ -315,9 +317,12 @@ pub struct Render {
     /// Draws so many frames and writes the last one.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), allow_negative_numbers = true)]
     pub frames: u32,
-    /// Writes what each frame and each of its passes cost, as JSON.
-    #[arg(long, value_name = "OUT.json")]
+    /// Writes what each frame went into, by stages, passes and effects: as JSON, or for .txt as text of the last frame.
+    #[arg(long, value_name = "OUT.json|OUT.txt")]
     pub timings: Option<PathBuf>,
+    /// Counts the lights that each pass tests, and those that contribute more than 1/255, by one more frame.
+    #[arg(long, requires = "timings")]
+    pub count_lights: bool,
 }
 
 #[derive(Args, Debug)]

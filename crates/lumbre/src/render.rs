@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use lumbre::graph;
-use lumbre::render::{Display, Gpu, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
+use lumbre::render::{Accounting, Display, Gpu, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
 use lumbre::scene::Census;
 use serde::Serialize;
 
@@ -34,6 +34,10 @@ struct FrameTimes {
     gpu_ms: Option<f64>,
     statistics: Statistics,
     passes: Vec<PassTimes>,
+    /// What the frame went into, by stages, passes and effects, with what is left of its wall clock.
+    accounting: Option<Accounting>,
+    /// Milliseconds of the wall clock that neither stages nor passes answer for.
+    remainder_ms: Option<f64>,
 }
 
 /// One pass.
@@ -51,6 +55,9 @@ struct PassTimes {
     /// Lights in the list of an object in view, on average: its vertices or fragments evaluate those. What fragments find by clusters beside
     /// them stands in the frame's `light_lists`.
     lights_shaded: f32,
+    /// Evaluations of lights, and of these the ones that contributed more than 1/255 (`--count-lights`).
+    light_evaluations: Option<u64>,
+    light_contributions: Option<u64>,
 }
 
 /// Runs the command.
@@ -60,6 +67,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
         "exr" => true,
         other => bail!("{}: .{other} is not written, only .png and .exr", asked.output.display()),
     };
+    let is_text = asked.timings.as_deref().and_then(Path::extension).is_some_and(|end| end == "txt");
     let mut loaded = load(&asked.input, &asked.reading)?;
     let (width, height) = asked.size;
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
@@ -83,7 +91,8 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
             .with_context(|| format!("{} could not be drawn", asked.input.display()))?;
         let measured = renderer.wait()?.cloned();
         let wall_ms = start.elapsed().as_secs_f64() * 1e3;
-        frames.push(frame_times(wall_ms, report.statistics, measured));
+        let accounting = renderer.accounting().filter(|_| asked.timings.is_some()).cloned();
+        frames.push(frame_times(wall_ms, report.statistics, measured, accounting));
         census = Some(Census::clone(&report.census));
     }
     let shows_something = write_frame(&asked.output, &gpu, &target, floats)?;
@@ -93,14 +102,54 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
             asked.input.display()
         );
     }
+    if asked.count_lights {
+        options.measure = Measure::Lights;
+        renderer
+            .render(&mut loaded.world, &target.target(), &options)
+            .with_context(|| format!("{} could not be drawn", asked.input.display()))?;
+        renderer.wait()?;
+        if let Some(counted) = renderer.accounting() {
+            frames.iter_mut().for_each(|frame| frame.take_lights_of(counted));
+        }
+    }
     if let Some(path) = &asked.timings {
         let timings = Timings { device: gpu.describe(), width, height, census, frames };
-        write_file(path, |path| Ok(std::fs::write(path, serde_json::to_string_pretty(&timings)? + "\n")?))?;
+        let text = if is_text { timings.to_text() } else { serde_json::to_string_pretty(&timings)? + "\n" };
+        write_file(path, |path| Ok(std::fs::write(path, text)?))?;
     }
     Ok(())
 }
 
-fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::GraphReport>) -> FrameTimes {
+impl Timings {
+    /// The last frame, for people.
+    fn to_text(&self) -> String {
+        let account = self.frames.last().and_then(|frame| frame.accounting.as_ref());
+        let account = account.map_or_else(String::new, Accounting::to_text);
+        format!("{}, {} x {}\n{account}", self.device, self.width, self.height)
+    }
+}
+
+impl FrameTimes {
+    /// Takes the lights that another frame of the same scene counted.
+    fn take_lights_of(&mut self, counted: &Accounting) {
+        for pass in &mut self.passes {
+            let same = counted.passes.iter().find(|other| other.pass == pass.name);
+            let lights = same.and_then(|same| same.lights);
+            pass.light_evaluations = lights.map(|lights| lights.tested);
+            pass.light_contributions = lights.map(|lights| lights.contributing);
+        }
+        if let Some(accounting) = &mut self.accounting {
+            accounting.take_lights_of(counted);
+        }
+    }
+}
+
+fn frame_times(
+    wall_ms: f64,
+    statistics: Statistics,
+    measured: Option<graph::GraphReport>,
+    accounting: Option<Accounting>,
+) -> FrameTimes {
     let measured = measured.unwrap_or_default();
     let passes = measured.passes.iter().map(|pass| {
         let lights = statistics.lit_passes.of(&pass.name).copied().unwrap_or_default();
@@ -113,6 +162,8 @@ fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::Gra
             fragment_invocations: pass.invocations.map(|counts| counts.fragment),
             lights_tested: lights.lights,
             lights_shaded: lights.lights_per_object,
+            light_evaluations: None,
+            light_contributions: None,
         }
     });
     FrameTimes {
@@ -121,6 +172,8 @@ fn frame_times(wall_ms: f64, statistics: Statistics, measured: Option<graph::Gra
         gpu_ms: measured.gpu_ms,
         statistics,
         passes: passes.collect(),
+        remainder_ms: accounting.as_ref().and_then(Accounting::remainder_ms),
+        accounting,
     }
 }
 

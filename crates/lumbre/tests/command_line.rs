@@ -152,7 +152,50 @@ fn frames_and_timings_are_written_whole() {
         frames[2]["passes"].as_array().unwrap().iter().find(|pass| pass["name"] == "forward").unwrap();
     assert_eq!(forward["lights_tested"], 1);
     assert!(forward["fragment_invocations"].as_u64().unwrap() > 500);
-    assert!(frames[2]["wall_ms"].as_f64().unwrap() > 0.0);
+    let wall = frames[2]["wall_ms"].as_f64().unwrap();
+    assert!(wall > 0.0 && forward["light_evaluations"].is_null());
+    // What was measured from outside holds what the renderer measured, and that sums.
+    let account = &frames[2]["accounting"];
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    assert!(number(&account["wall_ms"]) <= wall, "{account}");
+    let stages: f64 = account["stages"].as_array().unwrap().iter().map(|stage| number(&stage["ms"])).sum();
+    let parts = stages + number(&account["between_ms"]) + number(&account["passes_ms"])
+        - number(&account["overlapped_ms"]);
+    let remainder = number(&frames[2]["remainder_ms"]);
+    assert!((parts + remainder - number(&account["wall_ms"])).abs() < 1e-6, "{account}");
+    let effects = account["effects"].as_array().unwrap();
+    let bytes: u64 = effects.iter().map(|effect| effect["uploaded_bytes"].as_u64().unwrap()).sum();
+    assert_eq!(bytes, 0, "nothing changes between the frames");
+    assert!(frames[0]["accounting"]["effects"].as_array().unwrap().iter().any(|effect| {
+        effect["effect"] == "scene"
+            && effect["uploaded_bytes"].as_u64() > Some(0)
+            && effect["pipelines_made"].as_u64() > Some(0)
+    }));
+
+    let account = folder.path().join("account.txt");
+    let output = lumbre(&[
+        "render",
+        text(&path),
+        "-o",
+        text(&png),
+        "--size",
+        "96x64",
+        "--camera",
+        "view",
+        "--timings",
+        text(&account),
+        "--count-lights",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let account = std::fs::read_to_string(&account).unwrap();
+    let of_forward: Vec<&str> =
+        account.lines().find(|line| line.contains("  forward ")).unwrap().split_whitespace().collect();
+    let [tested, contributing] = [of_forward.len() - 2, of_forward.len() - 1]
+        .map(|column| of_forward[column].parse::<u64>().unwrap_or_else(|_| panic!("{account}")));
+    assert!(tested > 500 && contributing > 0 && contributing <= tested, "{account}");
+    assert!(account.contains("wall clock") && account.contains("remainder"), "{account}");
+    let unmeasured = lumbre(&["render", text(&path), "-o", text(&png), "--count-lights"]);
+    assert_eq!(unmeasured.status.code(), Some(2), "nobody would see the counts");
 
     let output = lumbre(&[
         "render",
@@ -170,7 +213,7 @@ fn frames_and_timings_are_written_whole() {
     let linear = image::open(&exr).unwrap().to_rgb32f();
     assert!(linear.pixels().any(|pixel| pixel.0[0] > 1.0), "an EXR keeps the lamp's radiance");
     let left_over = std::fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(left_over, 4, "level, two frames and the timings; nothing half-written");
+    assert_eq!(left_over, 5, "level, two frames, the timings and an account; nothing half-written");
 }
 
 #[test]
@@ -194,6 +237,7 @@ fn a_bake_is_loaded_explained_and_drawn() {
     let measured = stdout(&lumbre(&["explain", text(&path), "--measure=0.1", "--size", "64x48"]));
     let of_emission = measured.lines().find(|line| line.contains("+ emission: 1 mesh")).unwrap_or(&measured);
     assert!(of_emission.contains(" ms, ") && of_emission.ends_with(" % of the picture)"), "{measured}");
+    assert!(measured.contains("The account of a frame") && measured.contains("lights tested"), "{measured}");
     let before = stdout(&lumbre(&["explain", text(&path), "--all"]));
     assert!(before.contains("the scene has no lightmapped mesh"), "{before}");
     assert!(!before.contains("LIGHTMAP"), "{before}");

@@ -115,6 +115,8 @@ pub enum Action {
     ToggleMultisample,
     /// The overlay on or off.
     ToggleOverlay,
+    /// Counts of lights in the overlay on or off.
+    ToggleLightCounts,
     /// The torch on or off.
     ToggleTorch,
     /// Walk, or fly through walls.

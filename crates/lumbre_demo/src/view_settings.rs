@@ -17,11 +17,20 @@ pub struct ViewSettings {
     pub multisample: bool,
     /// Whether the overlay is shown.
     pub overlay: bool,
+    /// Whether the overlay says how many lights are tested and contribute.
+    pub count_lights: bool,
 }
 
 impl Default for ViewSettings {
     fn default() -> Self {
-        Self { shading: None, reflection: None, lightmaps: true, multisample: true, overlay: true }
+        Self {
+            shading: None,
+            reflection: None,
+            lightmaps: true,
+            multisample: true,
+            overlay: true,
+            count_lights: false,
+        }
     }
 }
 
@@ -37,6 +46,7 @@ impl ViewSettings {
             Action::ToggleLightmaps => self.lightmaps = !self.lightmaps,
             Action::ToggleMultisample => self.multisample = !self.multisample,
             Action::ToggleOverlay => self.overlay = !self.overlay,
+            Action::ToggleLightCounts => self.count_lights = !self.count_lights,
             Action::ToggleTorch
             | Action::ToggleFlight
             | Action::OrbitEverything
@@ -83,7 +93,8 @@ mod tests {
         view.apply(Action::ToggleLightmaps);
         view.apply(Action::ToggleMultisample);
         view.apply(Action::ToggleOverlay);
-        assert!(!view.lightmaps && !view.multisample && !view.overlay);
+        view.apply(Action::ToggleLightCounts);
+        assert!(!view.lightmaps && !view.multisample && !view.overlay && view.count_lights);
         assert!(!view.apply(Action::ToggleTorch));
     }
 }

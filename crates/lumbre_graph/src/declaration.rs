@@ -56,6 +56,8 @@ impl AccessDeclaration {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PassDeclaration {
     pub name: Label,
+    /// The part of the program that declared it, see `Graph::set_owner`.
+    pub owner: Option<Label>,
     pub kind: PassKind,
     pub accesses: Vec<AccessDeclaration>,
     /// What the pass calls for, and whether it is there.

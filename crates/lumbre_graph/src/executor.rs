@@ -15,7 +15,7 @@ use crate::run::measure::Ring;
 use crate::run::pool::{GpuObject, Pool, PoolStatistics};
 use crate::run::probe::FiniteProbe;
 use crate::run::record::{FrameResources, Recorder, looks};
-use crate::run::report::{GraphReport, Measurements};
+use crate::run::report::{ExecutionStages, GraphReport, Measurements};
 
 /// Plans that are kept.
 const KEPT_PLANS: usize = 8;
@@ -48,6 +48,21 @@ pub struct Frame {
     pub plan: Arc<Plan>,
     /// For waiting until it is done.
     pub submission: wgpu::SubmissionIndex,
+    /// What it took on the CPU, if that was measured.
+    pub stages: Option<ExecutionStages>,
+}
+
+/// Times the stages of an execution.
+struct Laps(Instant);
+
+impl Laps {
+    /// Milliseconds since the last call.
+    fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let lap = (now - self.0).as_secs_f64() * 1e3;
+        self.0 = now;
+        lap
+    }
 }
 
 impl Executor {
@@ -147,10 +162,14 @@ impl Executor {
         user: &mut User,
     ) -> Result<Frame, RunError> {
         let begun = self.begun.take();
-        let start = self.measure.cpu.then(|| begun.unwrap_or_else(Instant::now));
+        let mut laps = Laps(Instant::now());
+        let mut stages = ExecutionStages::default();
+        let start = self.measure.cpu.then(|| begun.unwrap_or(laps.0));
         self.collect(device, queue);
+        stages.collecting_ms = laps.lap();
         self.frame += 1;
         let plan = self.plan(&graph)?;
+        stages.planning_ms = laps.lap();
         let frame = FrameResources { plan: &plan, objects: self.objects(device, &plan, imports)? };
         let passes = plan.steps.iter().map(|step| step.passes.len()).sum();
         let queries = self.ring.begin(device, self.measure, passes, plan.steps.len());
@@ -162,6 +181,7 @@ impl Executor {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
             label: Some(&plan.declarations.label),
         });
+        stages.resources_ms = laps.lap();
         let mut recorder = Recorder {
             device,
             queue,
@@ -181,13 +201,17 @@ impl Executor {
         let to_wait_for = queries.resolve(device, &mut encoder, results);
         queries.report.frame = self.frame;
         queries.report.probed = !queries.probed.is_empty();
-        let submission = queue.submit([encoder.finish()]);
+        let commands = encoder.finish();
+        stages.recording_ms = laps.lap();
+        let submission = queue.submit([commands]);
+        stages.submission_ms = laps.lap();
         queries.report.cpu_ms = start.map(|start| start.elapsed().as_secs_f64() * 1e3);
         if let Some(report) = self.ring.end(queries, to_wait_for) {
             self.report = Some(report);
         }
         self.keep(&plan, frame.objects);
-        Ok(Frame { number: self.frame, plan, submission })
+        stages.keeping_ms = laps.lap();
+        Ok(Frame { number: self.frame, plan, submission, stages: self.measure.cpu.then_some(stages) })
     }
 
     /// The newest report that has arrived; does not wait. In a window it is some frames old.

@@ -73,5 +73,7 @@ pub use run::error::RunError;
 pub use run::imports::Imports;
 pub use run::pool::{KEEP_RETAINED_FRAMES, KEEP_TRANSIENT_FRAMES, PoolStatistics};
 pub use run::probe::FiniteProbe;
-pub use run::report::{GpuTime, GraphReport, Invocations, Measurements, NonFinite, PassReport};
+pub use run::report::{
+    ExecutionStages, GpuTime, GraphReport, Invocations, Measurements, NonFinite, PassReport,
+};
 pub use site::Site;

@@ -177,7 +177,13 @@ fn merged_passes_draw_and_are_measured() {
         ["first", "second", "read back"]
     );
     assert!(report.passes.iter().all(|pass| pass.cpu_ms.is_some_and(|ms| ms > 0.0)), "{report:?}");
-    assert!(report.cpu_ms.is_some_and(|ms| ms > 0.0));
+    let cpu = report.cpu_ms.expect("asked for");
+    let stages = frame.stages.expect("asked for");
+    assert!(stages.recording_ms > 0.0 && stages.submission_ms > 0.0, "{stages:?}");
+    // All but the last stage lie before the end of the submission, one after the other.
+    assert!(stages.total_ms() - stages.keeping_ms <= cpu * (1.0 + 1e-9), "{stages:?} within {cpu} ms");
+    let passes: f64 = report.passes.iter().filter_map(|pass| pass.cpu_ms).sum();
+    assert!(passes <= stages.recording_ms, "{passes} ms of passes in {stages:?}");
     assert!(has.contains(TIMES), "mesa's software rasterizer has these; a device without would test less");
     assert!(report.gpu_ms.is_some_and(|ms| ms > 0.0), "{report:?}");
     assert!(matches!(report.passes[0].gpu, GpuTime::PartOfGroup { .. }), "{report:?}");

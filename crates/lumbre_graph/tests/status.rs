@@ -379,3 +379,23 @@ fn explains_as_json_and_dot() {
     assert!(dot.contains("style=dashed"), "what does not run is dashed: {dot}");
     assert_eq!(dot.matches('{').count(), dot.matches('}').count());
 }
+
+#[test]
+fn passes_belong_to_whoever_declared_them() {
+    let mut graph = Graph::new("frame");
+    let mut mixed = graph.texture("mixed", hdr());
+    graph.raster_pass("nobody's").color(&mut mixed, BLACK);
+    graph.set_owner("glow");
+    graph.raster_pass("glow").color(&mut mixed, BLACK);
+    graph.raster_pass("glow, wider").color(&mut mixed, BLACK);
+    graph.set_owner("rim");
+    graph.raster_pass("rim").color(&mut mixed, BLACK);
+    graph.export(&mixed);
+    let explanation = graph.compile().expect("valid").explain();
+    let owners: Vec<_> = explanation.passes.iter().map(|pass| pass.owner.as_deref()).collect();
+    assert_eq!(owners, [None, Some("glow"), Some("glow"), Some("rim")]);
+    // Said where the name does not.
+    let text = explanation.to_text();
+    assert_eq!(text.matches("(glow's)").count(), 1, "{text}");
+    assert!(!text.contains("(rim's)"), "{text}");
+}

@@ -12,7 +12,7 @@ use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Attenuation, Light, Material, Shading};
-use lumbre_render::{CpuStages, FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{CpuStages, FrameOptions, Gpu, Measure, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Camera, Mesh, Transform};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = Gpu::headless()?;
     let mut renderer = Renderer::new(&gpu);
     let target = Offscreen::new(&gpu, 320, 180, OffscreenFormat::Rgba8)?;
-    let options = FrameOptions { shading: Some(shading), ..FrameOptions::default() };
+    let options = FrameOptions { shading: Some(shading), measure: Measure::Time, ..FrameOptions::default() };
     let count = (all.len() as f64 * moving / 100.0) as usize;
     let mut stages: Vec<CpuStages> = Vec::new();
     for frame in 0..=frames {
@@ -71,18 +71,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         stages.push(report.statistics.cpu);
     }
-    let median = |name: &str, of: fn(&CpuStages) -> f64| {
+    let median = |name: &str, of: &dyn Fn(&CpuStages) -> f64| {
         let mut values: Vec<f64> = stages.iter().map(of).collect();
         values.sort_by(f64::total_cmp);
-        println!("{name:>10} {:8.2} ms (least {:.2})", values[values.len() / 2], values[0]);
+        println!("{name:>32} {:8.2} ms (least {:.2})", values[values.len() / 2], values[0]);
     };
-    median("transforms", |cpu| cpu.transforms_ms);
-    median("objects", |cpu| cpu.objects_ms);
-    median("lights", |cpu| cpu.lights_ms);
-    median("draws", |cpu| cpu.draws_ms);
-    median("clusters", |cpu| cpu.clusters_ms);
-    median("upload", |cpu| cpu.upload_ms);
-    median("encoding", |cpu| cpu.encoding_ms);
-    median("total", |cpu| cpu.total_ms);
+    for (index, (name, _)) in CpuStages::default().named().into_iter().enumerate() {
+        median(name, &|cpu| cpu.named()[index].1);
+    }
+    median("encoding and submission", &|cpu| cpu.encoding_ms);
+    median("of no stage", &CpuStages::remainder_ms);
+    median("total", &|cpu| cpu.total_ms);
     Ok(())
 }

@@ -1,19 +1,24 @@
 //! What a frame costs against the number of lights: 64 balls (73,728 triangles with the floor) under point lights of three metres.
 //! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong] [--reflection blinn]
-//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--png FOLDER] [LIGHTS …]`
+//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--png FOLDER] [--account] [LIGHTS …]`
 //!
-//! Wall clock from the call to the finished frame, the device waited for: the median of the frames, and the least.
+//! Wall clock from the call to the finished frame, the device waited for: of frames of a still World the median and the least; the median of frames before each of which the camera is marked as
+//! changed, so that the World is looked through, and of frames that the target holds already (`FrameOptions::keep_unchanged`); and for all three the median of the CPU's part. With `--account`
+//! what one more frame of the second kind went into, and the lights that it tested.
 
 #![allow(clippy::print_stdout, reason = "it prints its results")]
 
 use std::sync::Arc;
 use std::time::Instant;
 
+use bevy_ecs::change_detection::DetectChangesMut;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Attenuation, Light, Material, ReflectionModel, Shading, SpotCone};
-use lumbre_render::{FrameOptions, Gpu, LightLists, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{
+    FrameOptions, Gpu, LightLists, Measure, Offscreen, OffscreenFormat, RenderError, Renderer,
+};
 use lumbre_scene::{Camera, Mesh, Projection, Transform};
 
 /// Metres.
@@ -30,6 +35,7 @@ enum Kind {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut frames, mut size, mut png, mut kind) = (30, (1280, 720), None, Kind::Point);
+    let mut account = false;
     let mut options = FrameOptions {
         shading: Some(Shading::Phong),
         reflection: Some(ReflectionModel::Blinn),
@@ -40,7 +46,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or("a value is missing");
         match argument.as_str() {
-            "--frames" => frames = value()?.parse()?,
+            "--frames" => frames = value()?.parse::<usize>()?.max(1),
             "--size" => {
                 let text = value()?;
                 let (width, height) = text.split_once('x').ok_or("--size takes WIDTHxHEIGHT")?;
@@ -68,6 +74,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 }
             }
             "--png" => png = Some(value()?),
+            "--account" => account = true,
             number => numbers.push(number.parse::<u32>()?),
         }
     }
@@ -76,22 +83,48 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let gpu = Gpu::headless()?;
     eprintln!("{} ({})", gpu.adapter.get_info().name, gpu.adapter.get_info().driver_info);
-    println!("lights, median ms, least ms");
+    println!(
+        "lights, still: median ms, least ms, changed: median ms, kept: median ms, CPU of these three: median ms"
+    );
     for number in numbers {
         let mut world = balls(number, kind);
         let mut renderer = Renderer::new(&gpu);
         let target = Offscreen::new(&gpu, size.0, size.1, OffscreenFormat::Rgba8)?;
-        let mut times = Vec::new();
-        // The first frame compiles.
-        for _ in 0..=frames {
-            let start = Instant::now();
-            renderer.render(&mut world, &target.target(), &options)?;
-            renderer.wait()?;
-            times.push(start.elapsed().as_secs_f64() * 1e3);
+        let mut drawn =
+            |world: &mut World, options: &FrameOptions, changed: bool| -> Result<_, RenderError> {
+                let (mut times, mut on_cpu) = (Vec::new(), Vec::new());
+                for _ in 0..frames {
+                    if changed {
+                        let mut cameras = world.query::<&mut Camera>();
+                        cameras.iter_mut(world).for_each(|mut camera| camera.set_changed());
+                    }
+                    let start = Instant::now();
+                    let report = renderer.render(world, &target.target(), options)?;
+                    renderer.wait()?;
+                    times.push(start.elapsed().as_secs_f64() * 1e3);
+                    on_cpu.push(report.statistics.cpu.total_ms);
+                }
+                [&mut times, &mut on_cpu].into_iter().for_each(|times| times.sort_by(f64::total_cmp));
+                Ok(([times[frames / 2], times[0]], on_cpu[frames / 2], renderer.accounting().cloned()))
+            };
+        // The first frames compile.
+        drawn(&mut world, &options, true)?;
+        let kept = FrameOptions { keep_unchanged: true, ..options.clone() };
+        let ([still, least], still_cpu, _) = drawn(&mut world, &options, false)?;
+        let ([changed, _], changed_cpu, _) = drawn(&mut world, &options, true)?;
+        let ([kept, _], kept_cpu, _) = drawn(&mut world, &kept, false)?;
+        println!(
+            "{number}, {still:.1}, {least:.1}, {changed:.1}, {kept:.4}, {still_cpu:.3}, {changed_cpu:.3}, {kept_cpu:.4}"
+        );
+        if account {
+            let measured = |measure| FrameOptions { measure, ..options.clone() };
+            let (_, _, accounting) = drawn(&mut world, &measured(Measure::TimeAndInvocations), true)?;
+            let (_, _, counted) = drawn(&mut world, &measured(Measure::Lights), true)?;
+            if let (Some(mut accounting), Some(counted)) = (accounting, counted) {
+                accounting.take_lights_of(&counted);
+                println!("{}", accounting.to_text());
+            }
         }
-        times.remove(0);
-        times.sort_by(f64::total_cmp);
-        println!("{number}, {:.1}, {:.1}", times[times.len() / 2], times[0]);
         if let Some(folder) = &png {
             let path = format!("{folder}/many_lights_{number}.png");
             image::save_buffer(path, &target.read_rgba8(&gpu)?, size.0, size.1, image::ColorType::Rgba8)?;

@@ -1,5 +1,5 @@
-//! What a frame costs in which something is switched on for the first time: 64 balls under a few point lights, and then the scene's first spot light, first shadow and
-//! first texture, each while frames run.
+//! What a frame costs in which something is switched on for the first time: 64 balls under a few point lights, and then the scene's first spot light, first shadow,
+//! first texture and first blended surface, each while frames run.
 //! `cargo run --release -p lumbre_render --example switch_on -- [--frames 60] [--size 640x360] [--wait]`
 //!
 //! Wall clock from the call to the finished frame, the device waited for: the median of the frames, the longest, and the frame in which the change is seen.
@@ -13,7 +13,7 @@ use bevy_ecs::change_detection::DetectChangesMut;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec2, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Light, Material, SpotCone};
+use lumbre_optics::{AlphaMode, Light, Material, SpotCone};
 use lumbre_render::{FrameOptions, Gpu, MissingPipelines, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Camera, Image, MaterialTextures, Mesh, Sampler, TextureReference, Transform};
 
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for _ in 0..5 {
         frame(&mut world)?;
     }
-    let changes: [Change<'_>; 4] = [
+    let changes: [Change<'_>; 5] = [
         ("nothing", &|_| {}),
         ("first spot light", &|world| {
             if let Some(mut lamp) = world.get_mut::<Light>(lamp) {
@@ -70,6 +70,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }),
         ("first texture", &|world| {
             world.entity_mut(ball).insert(checks());
+        }),
+        // And with it the first display pass.
+        ("first blended surface", &|world| {
+            if let Some(mut material) = world.get_mut::<Material>(ball) {
+                (material.alpha, material.alpha_mode) = (0.5, AlphaMode::Blend);
+            }
         }),
     ];
     for (name, change) in changes {

@@ -38,12 +38,19 @@ pub(crate) struct Draws {
     pub instances: Vec<InstanceData>,
     /// Objects outside the view.
     pub outside: usize,
-    /// Objects in view that wait for a pipeline.
-    pub waiting: usize,
     /// From the nearest to the farthest point of what is in view, along the line of sight, in metres.
     pub depths: Option<[f64; 2]>,
     /// From the nearest to the farthest point of what is lit by clusters, along the line of sight, in metres.
     pub clustered_depths: Option<[f64; 2]>,
+}
+
+/// The objects in view, each with the pipeline that draws it.
+#[derive(Default)]
+pub(crate) struct VisibleObjects<'a> {
+    visible: Vec<Visible<'a>>,
+    outside: usize,
+    depths: Option<[f64; 2]>,
+    clustered_depths: Option<[f64; 2]>,
 }
 
 struct Visible<'a> {
@@ -55,30 +62,28 @@ struct Visible<'a> {
     pipeline: PipelineKey,
 }
 
-impl Draws {
-    /// The draws of what `view` sees, each with the pipeline that `choose` answers with for the one that it calls for.
+impl<'a> VisibleObjects<'a> {
+    /// What `view` sees, each with the pipeline that `choose` answers with for the one that it calls for.
     pub fn new(
-        objects: &Objects,
+        objects: &'a Objects,
         view: &CameraView,
         settings: &SceneSettings,
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
-        (lights, volumes): (&mut ObjectLightLists, &IrradianceVolumes),
         choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
     ) -> Self {
-        let mut draws = Self::default();
+        let mut seen = Self::default();
         let planes = view.frustum(objects.origin);
         let inside = |object: &Object| {
             let center = (object.center - objects.origin).extend(1.0);
             planes.iter().all(|plane| plane.dot(center) >= -object.radius)
         };
-        let mut visible: Vec<Visible> = Vec::new();
         // Most objects are as the one before.
         let mut known: Option<(ObjectTraits, Variant)> = None;
         let mut known_key: Option<(PipelineKey, Option<PipelineKey>)> = None;
         for (slot, object) in objects.iter() {
             if !inside(object) {
-                draws.outside += 1;
+                seen.outside += 1;
                 continue;
             }
             let traits = &object.traits;
@@ -102,21 +107,37 @@ impl Draws {
                 _ => choose(pipeline),
             };
             known_key = Some((pipeline, chosen));
-            let Some(pipeline) = chosen else {
-                draws.waiting += 1;
-                continue;
-            };
+            // What waits for a pipeline is not drawn yet.
+            let Some(pipeline) = chosen else { continue };
             let depth = (view.eye - object.center).dot(view.basis.z_axis);
             let widened = |depths: Option<[f64; 2]>| {
                 let [near, far] = depths.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
                 Some([near.min(depth - object.radius), far.max(depth + object.radius)])
             };
-            draws.depths = widened(draws.depths);
+            seen.depths = widened(seen.depths);
             if pipeline.variant.has(Feature::Clusters) {
-                draws.clustered_depths = widened(draws.clustered_depths);
+                seen.clustered_depths = widened(seen.clustered_depths);
             }
-            visible.push(Visible { pass, slot, order: order(object, view.eye, pass), object, pipeline });
+            seen.visible.push(Visible { pass, slot, order: order(object, view.eye, pass), object, pipeline });
         }
+        seen
+    }
+}
+
+impl Draws {
+    /// The draws of what is seen.
+    pub fn new(
+        seen: &VisibleObjects<'_>,
+        lights: &mut ObjectLightLists,
+        volumes: &IrradianceVolumes,
+    ) -> Self {
+        let VisibleObjects { visible, outside, depths, clustered_depths } = seen;
+        let mut draws = Self {
+            outside: *outside,
+            depths: *depths,
+            clustered_depths: *clustered_depths,
+            ..Self::default()
+        };
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
         // Sorted are numbers alone: what they stand for is large.
         let key = |(index, seen): (usize, &Visible)| (seen.pass, seen.order, index);
@@ -167,6 +188,15 @@ impl Draws {
                 baked_light: baked_light.cloned(),
                 instances: instance..instance + 1,
             }),
+        }
+    }
+
+    /// The batches of a pass.
+    pub fn of(&self, pass: LitPass) -> &[Batch] {
+        match pass {
+            LitPass::Lightmap => &self.lightmapped,
+            LitPass::Forward => &self.opaque,
+            LitPass::Transparent => &self.transparent,
         }
     }
 

@@ -8,7 +8,9 @@ use glam::Vec3;
 use lumbre_optics::{AlphaMode, Light, LightKind, Material, Shading, Surface};
 use lumbre_scene::{Census, EmissiveLight, MaterialTextures, SceneSettings};
 
-use crate::{Display, FrameOptions, Gpu, Offscreen, OffscreenFormat, RenderError, Renderer};
+use crate::{
+    Accounting, Display, FrameOptions, Gpu, Measure, Offscreen, OffscreenFormat, RenderError, Renderer,
+};
 
 /// An effect that a scene calls for and that a frame can do without.
 #[derive(Clone, Copy, Debug)]
@@ -186,6 +188,8 @@ pub struct FrameCost {
     pub rounds: usize,
     /// What each effect that can be left out costs.
     pub effects: Vec<EffectCost>,
+    /// What one frame with all effects went into, by stages, passes and effects, with the lights that its passes tested.
+    pub accounting: Option<Accounting>,
 }
 
 /// A frame that is drawn again and again.
@@ -205,6 +209,21 @@ impl Drawn {
         self.renderer.render(&mut self.world, &target.target(), &self.options)?;
         self.renderer.wait()?;
         Ok(begun.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// What a frame goes into; its lights are counted by another one.
+    fn accounting(&mut self, target: &Offscreen) -> Result<Option<Accounting>, RenderError> {
+        let mut measured = |measure| -> Result<Option<Accounting>, RenderError> {
+            let options = FrameOptions { measure, ..self.options.clone() };
+            self.renderer.render(&mut self.world, &target.target(), &options)?;
+            self.renderer.wait()?;
+            Ok(self.renderer.accounting().cloned())
+        };
+        let mut accounting = measured(Measure::TimeAndInvocations)?;
+        if let (Some(accounting), Some(counted)) = (&mut accounting, measured(Measure::Lights)?) {
+            accounting.take_lights_of(&counted);
+        }
+        Ok(accounting)
     }
 
     /// Red, green and blue of each pixel, as radiance.
@@ -271,6 +290,7 @@ pub fn effect_costs<E: From<RenderError>>(
         milliseconds: quartiles(rounds.iter().map(|round| round[0]).collect())[1],
         rounds: rounds.len(),
         effects: effects.iter().enumerate().map(cost).collect(),
+        accounting: frames[0].accounting(&target)?,
     })
 }
 

@@ -155,6 +155,12 @@ pub enum RenderError {
         /// What it met.
         source: EffectError,
     },
+    /// A frame that needs a display pass, by a renderer without one.
+    #[error(
+        "the frame needs a display pass (several samples per pixel, blended surfaces, a viewport, the probe, or an effect between light and display ask for one), and the renderer was \
+         built without one: leave `BuiltIn::Display` in, or add an effect at `Stage::Display`"
+    )]
+    NoDisplay,
     /// The render graph refuses.
     #[error(transparent)]
     Graph(#[from] Box<lumbre_graph::GraphError>),

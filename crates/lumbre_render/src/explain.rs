@@ -16,7 +16,7 @@ use crate::extract::LightSet;
 use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
 use crate::frame_bindings::FrameBindings;
-use crate::frame_graph::declare;
+use crate::frame_graph::{Last, declare};
 use crate::frame_plan::{Ending, FramePlan};
 use crate::shader::Feature;
 use crate::{FrameOptions, RenderError, Renderer};
@@ -48,7 +48,7 @@ pub fn explain(
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
-    explain_with(world, &mut effects::own(), options, width, height)
+    explain_with(world, &mut effects::own(&[]), options, width, height)
 }
 
 impl Renderer {
@@ -63,7 +63,8 @@ impl Renderer {
         width: u32,
         height: u32,
     ) -> Result<SceneExplanation, RenderError> {
-        explain_with(world, self.effects_mut(), options, width, height)
+        let options = self.possible(options);
+        explain_with(world, self.effects_mut(), &options, width, height)
     }
 }
 
@@ -107,7 +108,8 @@ fn explain_with(
     let target = TextureDescriptor::new_2d(width, height, target_format);
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
     let light = bindings.light_resources().map(|(name, buffer)| (name, buffer, usage));
-    let frame = declare(effects.iter(), &plan, (target, None, &mut { light }), None).compile()?.explain();
+    let frame =
+        declare(effects.iter(), &plan, (target, None, &mut { light }), Last::default()).compile()?.explain();
     let hidden_cones = match options.shading {
         // Whatever the objects ask for.
         Some(Shading::Phong) => Vec::new(),
@@ -142,7 +144,7 @@ impl SceneExplanation {
         }
         let objects: usize = self.variants.values().sum();
         let _ = writeln!(text, "\n  {} shader variants for {objects} objects", self.variants.len());
-        text
+        text + &self.account()
     }
 
     fn heading(&self) -> String {
@@ -195,6 +197,14 @@ impl SceneExplanation {
         for (variant, count) in &self.variants {
             let _ = writeln!(text, "  {count} x {variant}");
         }
-        text
+        text + &self.account()
+    }
+
+    /// What a frame went into, where it was measured.
+    fn account(&self) -> String {
+        let accounting = self.cost.as_ref().and_then(|cost| cost.accounting.as_ref());
+        accounting.map_or_else(String::new, |accounting| {
+            format!("\nThe account of a frame\n{}", accounting.to_text())
+        })
     }
 }

@@ -1,5 +1,7 @@
-//! Group 0 of the forward shader: which of a frame's buffers a variant reads, and the layout that holds these and no others. The bindings are those of shaders/frame.wesl and
-//! shaders/light_clusters.wesl. What stands in the buffers is not decided here.
+//! Group 0 of the forward shader: which of a frame's buffers a variant reads, and the layout that holds these and no others. The bindings are those of shaders/frame.wesl,
+//! shaders/light_clusters.wesl and shaders/light_counts.wesl. What stands in the buffers is not decided here.
+
+use lumbre_optics::Shading;
 
 use crate::Gpu;
 use crate::shader::{Feature, Variant};
@@ -19,6 +21,10 @@ pub(crate) enum FrameBuffer {
     UniformLights,
     /// The same lights, any number.
     InverseSquareLights,
+    /// Where fragments count lights.
+    LightCounts,
+    /// Where vertices do.
+    VertexLightCounts,
 }
 
 /// Some of the buffers of group 0.
@@ -26,7 +32,7 @@ pub(crate) enum FrameBuffer {
 pub(crate) struct FrameBindings(u16);
 
 impl FrameBuffer {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 12] = [
         Self::Frame,
         Self::Objects,
         Self::Materials,
@@ -37,6 +43,8 @@ impl FrameBuffer {
         Self::ClusterLists,
         Self::UniformLights,
         Self::InverseSquareLights,
+        Self::LightCounts,
+        Self::VertexLightCounts,
     ];
 
     pub fn binding(self) -> u32 {
@@ -47,10 +55,25 @@ impl FrameBuffer {
         matches!(self, Self::Frame | Self::ClusterGrid | Self::UniformLights)
     }
 
+    /// Whether shaders write it.
+    pub fn is_counted_in(self) -> bool {
+        matches!(self, Self::LightCounts | Self::VertexLightCounts)
+    }
+
+    /// The stages that it is bound for: what is written is for one alone, as a device may have it in fragments and not in vertices.
+    fn visibility(self) -> wgpu::ShaderStages {
+        match self {
+            Self::LightCounts => wgpu::ShaderStages::FRAGMENT,
+            Self::VertexLightCounts => wgpu::ShaderStages::VERTEX,
+            _ => wgpu::ShaderStages::VERTEX_FRAGMENT,
+        }
+    }
+
     /// The name of the graph's resource, if it holds light.
     pub fn light_resource(self) -> Option<&'static str> {
         match self {
             Self::Frame | Self::Objects | Self::Materials | Self::Instances => None,
+            Self::LightCounts | Self::VertexLightCounts => None,
             Self::Lights => Some("lights"),
             Self::LightList => Some("lights of objects"),
             Self::ClusterGrid => Some("cluster grid"),
@@ -75,6 +98,8 @@ impl FrameBindings {
             FrameBuffer::ClusterGrid | FrameBuffer::ClusterLists => has(Feature::Clusters),
             FrameBuffer::UniformLights => inverse_square && has(Feature::UniformLights),
             FrameBuffer::InverseSquareLights => inverse_square && !has(Feature::UniformLights),
+            FrameBuffer::LightCounts => has(Feature::CountLights) && variant.shading == Shading::Phong,
+            FrameBuffer::VertexLightCounts => has(Feature::CountLights) && variant.shading != Shading::Phong,
         };
         Self(FrameBuffer::ALL.into_iter().filter(reads).map(|buffer| 1 << buffer.binding()).sum())
     }
@@ -86,6 +111,11 @@ impl FrameBindings {
 
     pub fn buffers(self) -> impl Iterator<Item = FrameBuffer> {
         FrameBuffer::ALL.into_iter().filter(move |buffer| self.0 & (1 << buffer.binding()) != 0)
+    }
+
+    /// Whether a pass counts lights in one of them: each pass is bound its own counts then.
+    pub fn count_lights(self) -> bool {
+        self.buffers().any(FrameBuffer::is_counted_in)
     }
 
     /// Those that hold light, by the name of the graph's resource, each once.
@@ -100,11 +130,11 @@ impl FrameBindings {
     pub fn layout(self, gpu: &Gpu) -> wgpu::BindGroupLayout {
         let entry = |buffer: FrameBuffer| wgpu::BindGroupLayoutEntry {
             binding: buffer.binding(),
-            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+            visibility: buffer.visibility(),
             ty: wgpu::BindingType::Buffer {
                 ty: match buffer.is_uniform() {
                     true => wgpu::BufferBindingType::Uniform,
-                    false => wgpu::BufferBindingType::Storage { read_only: true },
+                    false => wgpu::BufferBindingType::Storage { read_only: !buffer.is_counted_in() },
                 },
                 has_dynamic_offset: false,
                 min_binding_size: None,
@@ -143,7 +173,12 @@ mod tests {
         ];
         for shading in Shading::ALL {
             for lit in some {
-                for other in [vec![], vec![Feature::FogLinear, Feature::Fog], vec![Feature::Matt]] {
+                for other in [
+                    vec![],
+                    vec![Feature::FogLinear, Feature::Fog],
+                    vec![Feature::Matt],
+                    vec![Feature::CountLights],
+                ] {
                     let features: Vec<_> = [Feature::Lit].iter().chain(lit).chain(&other).copied().collect();
                     let mut variant = Variant::new(*shading, ReflectionModel::Blinn);
                     features.iter().for_each(|feature| variant.set(*feature, true));
@@ -165,6 +200,6 @@ mod tests {
                 }
             }
         }
-        assert!(seen.len() >= 6, "{seen:?}");
+        assert!(seen.len() >= 12, "{seen:?}");
     }
 }

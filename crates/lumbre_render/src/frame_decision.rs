@@ -128,6 +128,11 @@ impl Decision {
 }
 
 impl Decided {
+    /// Whether any of its draws counts lights.
+    pub fn counts_lights(&self) -> bool {
+        self.draws.batches().any(|batch| batch.pipeline.variant.has(Feature::CountLights))
+    }
+
     /// What each of its lit passes draws and tests.
     pub fn lit_passes(&self) -> LitPasses {
         LitPasses {
@@ -176,8 +181,9 @@ impl Decided {
 
 impl AskedFrame {
     pub fn new(world: &World, target: &FrameTarget, options: &FrameOptions) -> Self {
-        // Whether it is measured changes nothing of it.
-        let options = FrameOptions { measure: Measure::Nothing, keep_unchanged: false, ..options.clone() };
+        // Whether it is measured changes nothing of it, unless its shaders count.
+        let measure = if options.measure == Measure::Lights { Measure::Lights } else { Measure::Nothing };
+        let options = FrameOptions { measure, keep_unchanged: false, ..options.clone() };
         Self {
             world: world.id(),
             options,

@@ -1,4 +1,4 @@
-//! The graph of a frame: the effects' passes in the order of their stages, and the overlay.
+//! The graph of a frame: the effects' passes in the order of their stages, the overlay, and the way back of what was counted.
 
 use lumbre_graph::{BufferDescriptor, BufferRead, Executor, Frame, Imports, LoadOp, TextureDescriptor};
 
@@ -11,6 +11,14 @@ use crate::{FrameTarget, Gpu, RenderError, Viewport};
 /// What draws over the finished frame.
 pub(crate) type Overlay<'a> = Box<dyn FnOnce(&mut wgpu::RenderPass<'static>) + 'a>;
 
+/// What comes after all effects.
+#[derive(Default)]
+pub(crate) struct Last<'a> {
+    pub overlay: Option<Overlay<'a>>,
+    /// Where lit passes have counted lights, and where that is copied to.
+    pub counts: Option<[wgpu::Buffer; 2]>,
+}
+
 /// A buffer that surfaces take light from, by its name in the graph.
 pub(crate) type LightBuffer = (&'static str, FrameBuffer, wgpu::BufferUsages);
 
@@ -21,7 +29,7 @@ pub(crate) fn run_graph<'a>(
     (effects, declared, plan): (&'a [Box<dyn Effect>], &[bool], &FramePlan),
     (target, light): (&FrameTarget, &[(&'static str, FrameBuffer, wgpu::Buffer)]),
     scene: &mut FrameScene<'a>,
-    overlay: Option<Overlay<'a>>,
+    last: Last<'a>,
 ) -> Result<Frame, RenderError> {
     let (width, height) = (target.texture.width(), target.texture.height());
     let described = TextureDescriptor::new_2d(width, height, target.format);
@@ -29,7 +37,7 @@ pub(crate) fn run_graph<'a>(
         || effects.iter().zip(declared).filter(|(_, declared)| **declared).map(|(effect, _)| effect);
     let buffers = light.iter().map(|(name, buffer, bound)| (*name, *buffer, bound.usage()));
     let target_usage = described.usage(target.texture.usage());
-    let graph = declare(effects(), plan, (target_usage, target.viewport, &mut { buffers }), overlay);
+    let graph = declare(effects(), plan, (target_usage, target.viewport, &mut { buffers }), last);
     let imports = Imports::new().texture("target", &target.view);
     let imports = light.iter().fold(imports, |imports, (name, _, bound)| imports.buffer(*name, bound));
     let imports = effects().fold(imports, |imports, effect| effect.imports(imports));
@@ -41,7 +49,7 @@ pub(crate) fn declare<'a>(
     effects: impl IntoIterator<Item = &'a Box<dyn Effect>>,
     plan: &FramePlan,
     (target, viewport, light): (TextureDescriptor, Option<Viewport>, &mut dyn Iterator<Item = LightBuffer>),
-    overlay: Option<Overlay<'a>>,
+    Last { overlay, counts }: Last<'a>,
 ) -> FrameGraph<'a> {
     let mut graph = FrameGraph::with_user("frame");
     let mut board = Board::new(&mut graph, plan, target, viewport);
@@ -51,8 +59,10 @@ pub(crate) fn declare<'a>(
         board.lit_by_buffer(handle, read);
     }
     for effect in effects {
+        graph.set_owner(effect.name());
         effect.declare(&mut graph, &mut board);
     }
+    graph.set_owner("overlay");
     graph
         .raster_pass("overlay")
         .calls_for(overlay.is_some(), "overlay")
@@ -63,5 +73,14 @@ pub(crate) fn declare<'a>(
             }
             Ok(())
         });
+    if let Some([counts, copy]) = counts {
+        // In the frame's own commands: another submission would wait for them.
+        graph.set_owner("light counts");
+        let pass = graph.transfer_pass("light counts").after("overlay");
+        pass.side_effect("brings counts of lights to memory").run(move |context| {
+            context.encoder.copy_buffer_to_buffer(&counts, 0, &copy, 0, counts.size());
+            Ok(())
+        });
+    }
     graph
 }

@@ -1,6 +1,8 @@
 //! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
 
 use crate::facts::SceneFacts;
+use crate::rehearsal::Rehearsals;
+use crate::statistics::Uploads;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
 
 /// How radiance reaches the target.
@@ -92,6 +94,8 @@ impl FramePlan {
             exposure,
             display_pass: self.ending == Ending::DisplayPass,
             shadow_atlas: None,
+            uploads: Uploads::default(),
+            rehearsals: None,
         }
     }
 }
@@ -120,11 +124,16 @@ pub struct FrameShape {
     pub display_pass: bool,
     /// The atlas of shadow maps, where the frame has any.
     pub(crate) shadow_atlas: Option<ShadowAtlas>,
+    /// What has been uploaded for the frame.
+    pub(crate) uploads: Uploads,
+    /// First draws where no frame waits for them, if the frame is to have any.
+    pub(crate) rehearsals: Option<Rehearsals>,
 }
 
-/// The atlas of shadow maps, and whether any of them has to be drawn.
+/// The atlas of shadow maps, whether any of them has to be drawn, and how many pipelines draw them.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShadowAtlas {
     pub view: wgpu::TextureView,
     pub stale: bool,
+    pub pipelines: usize,
 }

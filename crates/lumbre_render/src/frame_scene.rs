@@ -7,7 +7,7 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
 use lumbre_optics::FlatRule;
 
 use crate::draws::{Batch, Draws};
-use crate::extract::{CameraView, Objects};
+use crate::extract::{CameraView, LitPass, Objects};
 use crate::frame_bindings::FrameBindings;
 use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
 use crate::pipelines::Pipelines;
@@ -22,9 +22,24 @@ pub struct FrameScene<'a> {
     pub(crate) meshes: &'a MeshBuffers,
     pub(crate) flat_rule: FlatRule,
     /// Of group 0.
-    pub(crate) frame_groups: &'a HashMap<FrameBindings, wgpu::BindGroup>,
+    pub(crate) frame_groups: &'a HashMap<FrameGroup, wgpu::BindGroup>,
     pub(crate) view: CameraView,
     pub(crate) shadows: &'a ShadowMaps,
+}
+
+/// A group 0: the buffers that are bound in it, and for which pass, where lights are counted by pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FrameGroup {
+    pub bindings: FrameBindings,
+    pub counted_in: Option<LitPass>,
+}
+
+impl FrameGroup {
+    /// What a batch is drawn with in a pass.
+    pub fn of(batch: &Batch, pass: LitPass) -> Self {
+        let bindings = FrameBindings::of(&batch.pipeline.variant);
+        Self { bindings, counted_in: bindings.count_lights().then_some(pass) }
+    }
 }
 
 /// The camera of a frame.
@@ -99,9 +114,10 @@ impl<'a> FrameScene<'a> {
         }
     }
 
-    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, batches: &[Batch]) {
+    /// Draws the lit surfaces of a pass.
+    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass) {
         let mut bound = None;
-        for batch in batches {
+        for batch in self.draws.of(lit_pass) {
             let (Some(pipeline), Some(mesh)) =
                 (self.pipelines.get(&batch.pipeline), self.meshes.get(batch.mesh))
             else {
@@ -112,11 +128,11 @@ impl<'a> FrameScene<'a> {
                 continue;
             }
             pass.set_pipeline(&pipeline.pipeline);
-            let bindings = FrameBindings::of(&batch.pipeline.variant);
-            if bound != Some(bindings) {
-                let Some(group) = self.frame_groups.get(&bindings) else { continue };
+            let wanted = FrameGroup::of(batch, lit_pass);
+            if bound != Some(wanted) {
+                let Some(group) = self.frame_groups.get(&wanted) else { continue };
                 pass.set_bind_group(0, group, &[]);
-                bound = Some(bindings);
+                bound = Some(wanted);
             }
             if let Some(set) = &batch.texture_set {
                 pass.set_bind_group(1, &set.bind_group, &[]);

@@ -44,12 +44,14 @@ const LEAST_LIMITS: [LeastLimit; 4] = [
 ];
 
 impl Gpu {
-    /// Features that are used where a device has them, none of which is required: queries to measure with, and blending and multisampling of 32-bit
-    /// floats for frames of full precision.
+    /// Features that are used where a device has them, none of which is required: queries to measure with, shaders that count lights ([`Measure::Lights`](crate::Measure)), and
+    /// blending and multisampling of 32-bit floats for frames of full precision.
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
         .union(wgpu::Features::PIPELINE_STATISTICS_QUERY)
+        .union(wgpu::Features::VERTEX_WRITABLE_STORAGE)
+        .union(wgpu::Features::SHADER_EARLY_DEPTH_TEST)
         .union(wgpu::Features::FLOAT32_BLENDABLE)
         .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
 
@@ -146,9 +148,14 @@ impl Gpu {
         instance: wgpu::Instance,
         adapter: wgpu::Adapter,
     ) -> Result<Self, RenderError> {
+        let mut features = adapter.features() & Self::OPTIONAL_FEATURES;
+        if adapter.get_info().device_type == wgpu::DeviceType::Cpu {
+            // A software rasterizer draws a render pass tile by tile: a timestamp in the midst of it tells of the last tile alone.
+            features.remove(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
+        }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lumbre"),
-            required_features: adapter.features() & Self::OPTIONAL_FEATURES,
+            required_features: features,
             // The adapter's own limits: no light or object count is refused that the machine could take.
             required_limits: adapter.limits(),
             ..Default::default()

@@ -34,10 +34,12 @@
 //! # Ok::<(), lumbre_render::RenderError>(())
 //! ```
 
+mod accounting;
 mod cluster_buffers;
 mod deferred;
 mod draws;
 mod effect_costs;
+mod effect_shares;
 pub mod effects;
 mod error;
 mod explain;
@@ -54,7 +56,9 @@ mod gpu;
 mod growable_buffer;
 mod irradiance_volumes;
 mod layout;
+mod ledger;
 mod light_clusters;
+mod light_counter;
 mod light_grid;
 mod light_lists;
 mod mesh_buffers;
@@ -70,6 +74,8 @@ mod schedule;
 mod shader;
 mod shadow_light;
 mod shadows;
+mod stage_clock;
+mod statistics;
 mod target;
 mod texture_sets;
 mod textures;
@@ -79,13 +85,14 @@ mod world_watch;
 
 pub use {bevy_ecs, glam, wgpu};
 
+pub use accounting::{Accounting, EffectAccount, LightCount, PassAccount, SCENE, StageAccount};
 pub use deferred::Deferred;
 pub use effect_costs::{EffectCost, FrameCost, Removable, effect_costs, removable_effects};
 pub use error::{EffectError, RenderError};
 pub use explain::{SceneExplanation, explain};
 pub use facts::SceneFacts;
 pub use frame_plan::FrameShape;
-pub use frame_report::{CpuStages, FrameReport, LightListing, LitPasses, PassLights, Statistics, Uploads};
+pub use frame_report::FrameReport;
 pub use frame_scene::{DrawnObject, FrameScene, FrameView};
 pub use gpu::Gpu;
 pub use metering::{LightMeter, Metering, meter};
@@ -93,5 +100,6 @@ pub use offscreen::{Offscreen, OffscreenFormat, read_texture};
 pub use options::{Display, FrameOptions, LightLists, Measure, MissingPipelines};
 pub use renderer::{Renderer, RendererBuilder};
 pub use schedule::{CurrentTarget, LastFrame, RenderSet, render_frame};
+pub use statistics::{CpuStages, LightListing, LitPasses, PassLights, Statistics, Uploads};
 pub use target::{DEPTH_FORMAT, FrameTarget, Viewport};
 pub use window_surface::{Acquired, SurfaceFrame, WindowSurface};

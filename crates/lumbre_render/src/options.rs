@@ -45,6 +45,9 @@ pub enum Measure {
     Time,
     /// Times, and vertex and fragment invocations.
     TimeAndInvocations,
+    /// The same, and how many lights each pass tests and how many of these contribute ([`LightCount`](crate::LightCount)): by shader variants of their own, which count. They draw
+    /// the same picture and take longer, so that the times are not those of the frame.
+    Lights,
 }
 
 /// What becomes of a frame that calls for pipelines that are not there yet: the scene's first spot light, shadow or texture, say.

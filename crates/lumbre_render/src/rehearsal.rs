@@ -2,6 +2,7 @@
 //! half a second and more; but it keeps the code on disk (Mesa's shader cache), for every device of the machine. So what is made in the background is drawn with once on
 //! another device of the same adapter, one triangle without an area, and the first frame that draws with it finds its code. GPUs compile when a pipeline is made.
 
+use std::fmt::Display;
 use std::sync::{Arc, Mutex};
 
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, MaterialTextures};
@@ -14,7 +15,7 @@ use crate::shadows::CasterPipelines;
 use crate::target::DEPTH_FORMAT;
 use crate::texture_sets::{TextureSet, TextureSets};
 use crate::textures::Textures;
-use crate::{Gpu, RenderError};
+use crate::{EffectError, Gpu, RenderError};
 
 /// A device to rehearse on, and what draws need on it.
 #[derive(Debug)]
@@ -32,13 +33,23 @@ const SIDE: u32 = 16;
 /// What the uniform array of lights takes.
 const ZEROS: u64 = 1 << 16;
 
-/// The rehearsals of a renderer, on a device that is opened with the first of them.
+/// The rehearsals of a renderer, on a device that is opened with the first of them. Two are equal if they are the same.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rehearsals(Arc<Mutex<Option<Rehearsal>>>);
+
+impl PartialEq for Rehearsals {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
 
 impl Rehearsals {
     /// A first draw with a pipeline and the textures of a material, if the adapter compiles when it draws.
     pub fn of(&self, gpu: &Gpu, key: PipelineKey, textures: Option<&TextureSet>) -> Option<Afterwards> {
+        // What counts is for frames that nobody plays in.
+        if key.variant.has(Feature::CountLights) {
+            return None;
+        }
         let textures = textures.map(|set| set.stand_ins.clone());
         self.job(gpu, move |rehearsal| rehearsal.draw(key, textures.as_ref()))
     }
@@ -48,10 +59,20 @@ impl Rehearsals {
         self.job(gpu, Rehearsal::draw_casters)
     }
 
-    fn job(
+    /// A first draw of a pass of its own: `draw` makes what it needs on the device that it is given, and draws.
+    pub fn of_pass(
         &self,
         gpu: &Gpu,
-        draw: impl FnOnce(&mut Rehearsal) -> Result<(), RenderError> + Send + 'static,
+        format: wgpu::TextureFormat,
+        draw: impl FnOnce(&Gpu, &mut wgpu::RenderPass<'static>) -> Result<(), EffectError> + Send + 'static,
+    ) -> Option<Afterwards> {
+        self.job(gpu, move |rehearsal| rehearsal.draw_pass(format, draw).map_err(|error| error.to_string()))
+    }
+
+    fn job<E: Display>(
+        &self,
+        gpu: &Gpu,
+        draw: impl FnOnce(&mut Rehearsal) -> Result<(), E> + Send + 'static,
     ) -> Option<Afterwards> {
         if gpu.adapter.get_info().device_type != wgpu::DeviceType::Cpu {
             return None;
@@ -59,11 +80,14 @@ impl Rehearsals {
         let (place, instance, adapter) = (Arc::clone(&self.0), gpu.instance.clone(), gpu.adapter.clone());
         Some(Box::new(move || {
             let Ok(mut rehearsal) = place.lock() else { return };
-            let drawn = match &mut *rehearsal {
-                Some(rehearsal) => draw(rehearsal),
-                None => Rehearsal::new(instance, adapter).and_then(|new| draw(rehearsal.insert(new))),
-            };
-            if let Err(error) = drawn {
+            if rehearsal.is_none() {
+                match Rehearsal::new(instance, adapter) {
+                    Ok(new) => *rehearsal = Some(new),
+                    Err(error) => tracing::debug!("nothing can be rehearsed: {error}"),
+                }
+            }
+            let Some(rehearsal) = &mut *rehearsal else { return };
+            if let Err(error) = draw(rehearsal) {
                 // The frame that draws with it first takes longer; all else is as it would be.
                 tracing::debug!("a pipeline was not rehearsed: {error}");
             }
@@ -144,6 +168,27 @@ impl Rehearsal {
         self.finish(encoder)
     }
 
+    /// Draws into a texture of a format, without depth.
+    fn draw_pass(
+        &self,
+        format: wgpu::TextureFormat,
+        draw: impl FnOnce(&Gpu, &mut wgpu::RenderPass<'static>) -> Result<(), EffectError>,
+    ) -> Result<(), EffectError> {
+        let color = self.texture(format, 1);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let mut pass = encoder
+            .begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("rehearsal"),
+                color_attachments: &[Some(color_attachment(&color))],
+                ..Default::default()
+            })
+            .forget_lifetime();
+        let drawn = draw(&self.gpu, &mut pass);
+        drop(pass);
+        drawn?;
+        Ok(self.finish(encoder)?)
+    }
+
     /// Hands commands over, and waits for them.
     fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<(), RenderError> {
         self.gpu.queue.submit([encoder.finish()]);
@@ -179,15 +224,7 @@ impl Rehearsal {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("rehearsal"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &color,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+            color_attachments: &[Some(color_attachment(&color))],
             depth_stencil_attachment: Some(depth_attachment(&depth)),
             ..Default::default()
         });
@@ -233,6 +270,16 @@ impl Rehearsal {
                 wgpu::BindGroupEntry { binding: 1, resource: self.zeros.as_entire_binding() },
             ],
         })
+    }
+}
+
+fn color_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
+    let (load, store) = (wgpu::LoadOp::Clear(wgpu::Color::BLACK), wgpu::StoreOp::Store);
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations { load, store },
     }
 }
 

@@ -9,33 +9,40 @@ use bevy_ecs::prelude::*;
 use lumbre_graph::{Executor, Plan};
 use lumbre_scene::{SceneSettings, propagate_transforms};
 
+use crate::accounting::FrameShares;
 use crate::cluster_buffers::ClusterBuffers;
-use crate::draws::Draws;
-use crate::effects::{self, Effect, Stage};
-use crate::extract::{CameraView, Emitters, KnownLights, LightSet, Objects, extract_lights, find_camera};
+use crate::draws::{Draws, VisibleObjects};
+use crate::effect_shares::EffectShares;
+use crate::effects::{self, BuiltIn, Effect, Stage};
+use crate::extract::{
+    CameraView, Emitters, KnownLights, LightSet, LitPass, Objects, extract_lights, find_camera,
+};
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
-use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::frame_bindings::FrameBuffer;
 use crate::frame_decision::{AskedFrame, Decided, Decision, Decisions, LastFrame, Seen, with_camera};
-use crate::frame_graph::{Overlay, run_graph};
+use crate::frame_graph::{Last, Overlay, run_graph};
 use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
-use crate::frame_scene::FrameScene;
+use crate::frame_scene::{FrameGroup, FrameScene};
 use crate::growable_buffer::GrowableBuffer;
 use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::{FrameData, InstanceData, LightData, radiance};
+use crate::ledger::{Ledger, OpenFrame};
 use crate::light_clusters::ClusteredView;
+use crate::light_counter::{CountedStages, LightCounter};
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
 use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
 use crate::rehearsal::Rehearsals;
 use crate::shader::Variant;
-use crate::shadows::{ShadowMaps, ShadowedView};
+use crate::shadows::{CasterPipelines, ShadowMaps, ShadowedView};
+use crate::stage_clock::{StageClock, timed};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::world_watch::WorldWatch;
 use crate::{
-    CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, LitPasses, Measure,
-    RenderError, Statistics, Uploads,
+    Accounting, CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, LitPasses,
+    Measure, RenderError, Statistics, Uploads,
 };
 
 /// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
@@ -57,12 +64,18 @@ pub struct Renderer {
     pipelines: Pipelines,
     rehearsals: Rehearsals,
     effects: Vec<Box<dyn Effect>>,
+    without: Vec<BuiltIn>,
+    shares: EffectShares,
+    ledger: Ledger,
+    light_counter: LightCounter,
+    /// Pipelines of lit surfaces that there were at the end of the last frame.
+    pipelines_before: usize,
     watch: WorldWatch,
     decisions: Decisions,
     /// None after a frame that failed.
     last: Option<LastFrame>,
     frame_uniform: wgpu::Buffer,
-    frame_groups: HashMap<FrameBindings, wgpu::BindGroup>,
+    frame_groups: HashMap<FrameGroup, wgpu::BindGroup>,
     /// Of the last frame.
     left_out: Vec<String>,
     /// Of the last frame: variants with the objects that each drew, in the order of the draws.
@@ -73,6 +86,7 @@ pub struct Renderer {
 #[derive(Default)]
 pub struct RendererBuilder {
     effects: Vec<Box<dyn Effect>>,
+    without: Vec<BuiltIn>,
 }
 
 impl RendererBuilder {
@@ -83,11 +97,20 @@ impl RendererBuilder {
         self
     }
 
+    /// Leaves out an effect of the renderer's own.
+    #[must_use]
+    pub fn without(mut self, effect: BuiltIn) -> Self {
+        self.without.push(effect);
+        self
+    }
+
     /// The renderer on a device.
     #[must_use]
     pub fn build(self, gpu: &Gpu) -> Renderer {
         let mut renderer = Renderer::new(gpu);
+        renderer.effects = effects::own(&self.without);
         renderer.effects.extend(self.effects);
+        renderer.without = self.without;
         effects::in_order(&mut renderer.effects);
         renderer
     }
@@ -117,7 +140,12 @@ impl Renderer {
             sets: TextureSets::default(),
             pipelines: Pipelines::new(gpu),
             rehearsals: Rehearsals::default(),
-            effects: effects::own(),
+            effects: effects::own(&[]),
+            without: Vec::new(),
+            shares: EffectShares::default(),
+            ledger: Ledger::default(),
+            light_counter: LightCounter::default(),
+            pipelines_before: 0,
             watch: WorldWatch::default(),
             decisions: Decisions::default(),
             last: None,
@@ -165,9 +193,27 @@ impl Renderer {
     /// # Errors
     /// [`RenderError::Run`] if the device was lost.
     pub fn wait(&mut self) -> Result<Option<&lumbre_graph::GraphReport>, RenderError> {
-        let measured = self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?;
+        let since = Instant::now();
+        self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?;
         self.gpu.check()?;
-        Ok(measured)
+        self.settle(Some(since));
+        Ok(self.executor.latest_report())
+    }
+
+    /// The account of the newest measured frame of which all has arrived: after [`wait`](Self::wait) of the last one.
+    pub fn accounting(&self) -> Option<&Accounting> {
+        self.ledger.newest().map(Arc::as_ref)
+    }
+
+    /// Settles the accounts of frames whose numbers have arrived. With `waited`, since when the last frame was waited for.
+    fn settle(&mut self, waited: Option<Instant>) {
+        if let Some(report) = self.executor.latest_report() {
+            self.ledger.note_report(report);
+        }
+        for (frame, lights) in self.light_counter.arrived() {
+            self.ledger.note_lights(frame, lights);
+        }
+        self.ledger.settle(waited);
     }
 
     /// The shader variants of the last frame, by their features, with the number of objects that each drew.
@@ -177,6 +223,13 @@ impl Renderer {
             *variants.entry(variant.to_string()).or_insert(0) += count;
         }
         variants
+    }
+
+    /// The options of a frame without what this renderer was built without.
+    pub(crate) fn possible(&self, options: &FrameOptions) -> FrameOptions {
+        let mut possible = options.clone();
+        self.without.iter().for_each(|effect| effect.switch_off(&mut possible));
+        possible
     }
 
     /// Its effects, in the order of their stages.
@@ -191,7 +244,7 @@ impl Renderer {
         options: &FrameOptions,
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
-        let drawn = self.draw_frame(world, target, options, overlay);
+        let drawn = self.draw_frame(world, target, &self.possible(options), overlay);
         if drawn.is_err() {
             // What was to be drawn into the shadow maps may not have been.
             self.shadows.forget();
@@ -206,11 +259,13 @@ impl Renderer {
         options: &FrameOptions,
         overlay: Option<Overlay<'_>>,
     ) -> Result<FrameReport, RenderError> {
+        let mut clock = StageClock::start();
         self.gpu.check()?;
         target.check()?;
-        let mut clock = Clock::start();
+        self.shares.begin(&self.effects);
         let asked = AskedFrame::new(world, target, options);
         let still = self.is_still(world);
+        clock.lap(|cpu| &mut cpu.changes_ms);
         let frame = match self.last.take().filter(|last| still && last.is(&asked)) {
             Some(last) => {
                 let may_stay =
@@ -220,6 +275,9 @@ impl Renderer {
                     return Ok(self.report_unchanged(last, plan, &clock));
                 }
                 self.shadows.stale.clear();
+                if last.decided.counts_lights() {
+                    self.light_counter.begin(&self.gpu);
+                }
                 let statistics =
                     Statistics { uploads: Uploads::default(), cpu: CpuStages::default(), ..last.statistics };
                 LastFrame { statistics, ..last }
@@ -233,13 +291,13 @@ impl Renderer {
     fn is_still(&mut self, world: &mut World) -> bool {
         // Each is asked: each looks from now on.
         let still = self.watch.is_still(world);
-        self.effects.iter_mut().fold(still, |still, effect| effect.is_still(world) && still)
+        let effects = self.effects.iter_mut().zip(&mut self.shares.ms);
+        effects.fold(still, |still, (effect, ms)| timed(ms, || effect.is_still(world)) && still)
     }
 
     /// What there is to say of a frame that is not drawn, since the target holds it.
-    fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &Clock) -> FrameReport {
-        let cpu = CpuStages { total_ms: milliseconds(clock.begun), ..CpuStages::default() };
-        let statistics = Statistics { uploads: Uploads::default(), cpu, ..last.statistics };
+    fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &StageClock) -> FrameReport {
+        let statistics = Statistics { uploads: Uploads::default(), cpu: clock.stages(), ..last.statistics };
         let census = Arc::clone(&last.decided.census);
         self.last = Some(last);
         FrameReport {
@@ -248,6 +306,7 @@ impl Renderer {
             census,
             measured: self.executor.latest_report().cloned(),
             left_out: self.left_out.clone(),
+            accounting: None,
         }
     }
 
@@ -258,12 +317,11 @@ impl Renderer {
         target: &FrameTarget,
         options: &FrameOptions,
         asked: AskedFrame,
-        clock: &mut Clock,
+        clock: &mut StageClock,
     ) -> Result<LastFrame, RenderError> {
-        let mut cpu = CpuStages::default();
         // The system cannot fail: it has no parameter that may be missing.
         let _ = world.run_system_cached(propagate_transforms);
-        cpu.transforms_ms = clock.lap();
+        clock.lap(|cpu| &mut cpu.transforms_ms);
         let mut settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
         // As lights, a fog made in code whose numbers no file may have is left out.
         let fog_fault = settings.fog.and_then(|fog| fog.validate("scene").err());
@@ -286,25 +344,26 @@ impl Renderer {
             &mut left_out,
         )?;
         self.volumes.extract(world, &mut left_out);
-        cpu.objects_ms = clock.lap();
+        clock.lap(|cpu| &mut cpu.objects_ms);
         let seen = Seen { target, view, exposure };
-        let mut timed = Timed { cpu: &mut cpu, clock };
-        let mut decided = self.decide(world, &seen, (options, &settings), None, &mut left_out, &mut timed)?;
+        let mut decided = self.decide(world, &seen, (options, &settings), None, &mut left_out, clock)?;
         self.warn_once(&left_out);
         let former = self.decisions.former(world, target, options);
         // A frame cannot go on with light that has left the World.
         let former = former.filter(|former| !former.features.irradiance_volumes || self.volumes.len() > 0);
         let awaited = self.make_pipelines(&mut decided, &seen, former.is_none())?;
+        clock.lap(|cpu| &mut cpu.pipelines_ms);
         match former.filter(|_| awaited > 0) {
             Some(former) => {
                 let options = with_camera(&former.options, options.camera);
                 let (asked, mut said) = ((&options, &former.settings), Vec::new());
-                decided = self.decide(world, &seen, asked, Some(&former), &mut said, &mut timed)?;
+                decided = self.decide(world, &seen, asked, Some(&former), &mut said, clock)?;
                 self.leave_out_effects(&mut decided, &seen)?;
+                clock.lap(|cpu| &mut cpu.pipelines_ms);
             }
             None => self.decisions.keep(target, &decided.decision),
         }
-        let statistics = self.upload(&decided, &seen, timed)?;
+        let statistics = self.upload(&decided, &seen, clock)?;
         let statistics = Statistics { pipelines_awaited: awaited, ..statistics };
         Ok(LastFrame { asked, decided, statistics, view, exposure, waits: awaited > 0, drawn: None })
     }
@@ -318,7 +377,7 @@ impl Renderer {
         (options, settings): (&FrameOptions, &SceneSettings),
         former: Option<&Decision>,
         left_out: &mut Vec<String>,
-        timed: &mut Timed<'_>,
+        clock: &mut StageClock,
     ) -> Result<Decided, RenderError> {
         let known = former.map(|former| KnownLights {
             set: &former.features.lights,
@@ -336,10 +395,13 @@ impl Renderer {
             lights.set = lights.set.without_shadows();
             lights.shadows.clear();
         }
-        timed.cpu.lights_ms += timed.clock.lap();
+        clock.lap(|cpu| &mut cpu.lights_ms);
         let facts = SceneFacts::new(&self.objects.census, &lights.set, self.volumes.len(), settings, options);
+        clock.lap(|cpu| &mut cpu.census_ms);
+        let effects = self.effects.iter_mut().zip(&mut self.shares.ms);
         let called_for: Vec<bool> =
-            self.effects.iter_mut().map(|effect| effect.extract(world, &facts, options)).collect();
+            effects.map(|(effect, ms)| timed(ms, || effect.extract(world, &facts, options))).collect();
+        clock.lap(|cpu| &mut cpu.effects_ms);
         let called = || self.effects.iter().zip(&called_for).filter(|(_, called)| **called);
         let radiance = called().any(|(effect, _)| effect.stage() == Stage::Radiance);
         let draws_objects = called().any(|(effect, _)| effect.draws_objects());
@@ -348,9 +410,21 @@ impl Renderer {
                 FramePlan::for_device(&facts, options, radiance, (&self.gpu, seen.target, seen.exposure));
             let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
             let ending = (plan.ending, seen.target.format, half);
-            let features = FrameFeatures::new(options, settings, &facts, lights.set, ending);
+            let counted = match options.measure {
+                Measure::Lights => CountedStages::of(&self.gpu).0,
+                _ => CountedStages::default(),
+            };
+            let features = FrameFeatures {
+                counted,
+                ..FrameFeatures::new(options, settings, &facts, lights.set, ending)
+            };
             Decision { options: options.clone(), settings: *settings, plan, features }
         });
+        if decision.plan.ending == Ending::DisplayPass
+            && !self.effects.iter().any(|effect| effect.stage() == Stage::Display)
+        {
+            return Err(RenderError::NoDisplay);
+        }
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
@@ -362,17 +436,18 @@ impl Renderer {
             Some(_) if pipelines.get(&wanted).is_none() => pipelines.nearest(&wanted),
             _ => Some(wanted),
         };
-        let draws = Draws::new(
+        let visible = VisibleObjects::new(
             &self.objects,
             &seen.view,
             settings,
             &decision.features,
             (decision.plan.lit_format, decision.plan.samples),
-            (&mut lists, &self.volumes),
             &choose,
         );
+        clock.lap(|cpu| &mut cpu.visibility_ms);
+        let draws = Draws::new(&visible, &mut lists, &self.volumes);
         lists.check()?;
-        timed.cpu.draws_ms += timed.clock.lap();
+        clock.lap(|cpu| &mut cpu.draws_ms);
         let (lights_per_object, light_list) = (lists.mean_length(), lists.indices);
         let declared = vec![true; called_for.len()];
         Ok(Decided {
@@ -416,11 +491,12 @@ impl Renderer {
 
     /// By effect, whether it can be drawn without waiting for it.
     fn ready_effects(&mut self, decided: &Decided, seen: &Seen<'_>) -> Result<Vec<bool>, RenderError> {
-        let shape = decided.decision.shape(seen);
-        let effects = self.effects.iter_mut().zip(&decided.called_for);
-        let ready = effects.map(|(effect, called)| {
+        let mut shape = decided.decision.shape(seen);
+        shape.rehearsals = Some(self.rehearsals.clone());
+        let effects = self.effects.iter_mut().zip(&mut self.shares.ms).zip(&decided.called_for);
+        let ready = effects.map(|((effect, ms), called)| {
             let (called, name) = (*called, effect.name());
-            let ready = if called { effect.ready(&self.gpu, &shape) } else { Ok(true) };
+            let ready = if called { timed(ms, || effect.ready(&self.gpu, &shape)) } else { Ok(true) };
             ready.map_err(|source| RenderError::Effect { effect: name, source })
         });
         ready.collect()
@@ -444,9 +520,8 @@ impl Renderer {
         &mut self,
         decided: &Decided,
         seen: &Seen<'_>,
-        timed: Timed<'_>,
+        clock: &mut StageClock,
     ) -> Result<Statistics, RenderError> {
-        let Timed { cpu, clock } = timed;
         let Decided { draws, lights, light_list, .. } = decided;
         self.instances.replace(draws.instances.iter().copied());
         self.light_list.replace(light_list.iter().copied());
@@ -455,17 +530,20 @@ impl Renderer {
             let (origin, size) = (self.objects.origin, [seen.target.width, seen.target.height]);
             self.clusters.build(&ClusteredView { view: seen.view, origin, size, depths }, lights);
         }
-        cpu.clusters_ms = clock.lap();
+        clock.lap(|cpu| &mut cpu.clusters_ms);
         let shadowed = !lights.shadows.is_empty();
         if shadowed {
             let depths = draws.depths.unwrap_or([0.0, 1.0]);
             let view = ShadowedView { view: seen.view, height: seen.target.height, depths };
             self.shadows.plan(&lights.shadows, &self.objects, &view);
         }
-        cpu.shadows_ms = clock.lap();
+        clock.lap(|cpu| &mut cpu.shadows_ms);
         let settings = &decided.decision.settings;
         let mut uploads =
             self.upload_buffers(&seen.view, settings, &lights.set, seen.exposure, [clustered, shadowed])?;
+        if decided.counts_lights() {
+            self.light_counter.begin(&self.gpu);
+        }
         self.make_frame_groups(draws);
         let flat_rule = decided.decision.flat_rule();
         let mut triangles = 0;
@@ -487,8 +565,9 @@ impl Renderer {
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
-        uploads.textures = self.textures.take_uploaded() + self.volumes.take_uploaded();
-        cpu.upload_ms = clock.lap();
+        [uploads.textures, uploads.lightmaps] = self.textures.take_uploaded();
+        uploads.irradiance_volumes = self.volumes.take_uploaded();
+        clock.lap(|cpu| &mut cpu.upload_ms);
         let clusters = &self.clusters.clusters;
         let light_lists = LightListing {
             clustered,
@@ -502,7 +581,7 @@ impl Renderer {
         Ok(Statistics {
             light_lists,
             lit_passes: LitPasses::default(),
-            cpu: *cpu,
+            cpu: CpuStages::default(),
             lights: lights.set.every.all,
             static_lights: lights.set.every.all - lights.set.every.dynamic,
             lights_per_object: decided.lights_per_object,
@@ -524,25 +603,27 @@ impl Renderer {
         target: &FrameTarget,
         options: &FrameOptions,
         overlay: Option<Overlay<'_>>,
-        clock: &mut Clock,
+        clock: &mut StageClock,
     ) -> Result<FrameReport, RenderError> {
         let decided = &frame.decided;
         let mut shape = decided.decision.shape(&Seen { target, view: frame.view, exposure: frame.exposure });
         if let Some(maps) = self.shadows.device().filter(|_| !decided.lights.shadows.is_empty()) {
             let stale = !self.shadows.stale.is_empty();
-            shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale });
+            let pipelines = self.shadows.pipelines().map_or(0, CasterPipelines::count);
+            shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale, pipelines });
         }
-        for (effect, _) in self.effects.iter_mut().zip(&decided.called_for).filter(|(_, called)| **called) {
+        shape.uploads = frame.statistics.uploads;
+        let effects = self.effects.iter_mut().zip(&mut self.shares.ms).zip(&decided.called_for);
+        for ((effect, ms), _) in effects.filter(|(_, called)| **called) {
             let name = effect.name();
-            effect
-                .prepare(&self.gpu, &shape)
+            timed(ms, || effect.prepare(&self.gpu, &shape))
                 .map_err(|source| RenderError::Effect { effect: name, source })?;
         }
-        frame.statistics.cpu.upload_ms += clock.lap();
+        clock.lap(|cpu| &mut cpu.effects_ms);
         self.executor.set_measure(match options.measure {
             Measure::Nothing => lumbre_graph::Measurements::OFF,
             Measure::Time => lumbre_graph::Measurements::TIMES,
-            Measure::TimeAndInvocations => lumbre_graph::Measurements::ALL,
+            Measure::TimeAndInvocations | Measure::Lights => lumbre_graph::Measurements::ALL,
         });
         self.executor.enable_probe(options.probe);
         self.executor.begun_at(clock.begun);
@@ -558,23 +639,56 @@ impl Renderer {
         };
         let effects = (self.effects.as_slice(), decided.declared.as_slice(), &decided.decision.plan);
         let light = decided.bindings().light_resources();
-        let bound = |buffer| self.frame_buffer(buffer).map(|bound| bound.buffer.clone());
+        let bound = |buffer| self.frame_buffer(buffer, None).map(|bound| bound.buffer.clone());
         let light: Vec<_> = light.filter_map(|(name, of)| Some((name, of, bound(of)?))).collect();
-        let drawn = run_graph(&mut self.executor, &self.gpu, effects, (target, &light), &mut scene, overlay)?;
+        let counts = if decided.counts_lights() { self.light_counter.copy(&self.gpu) } else { None };
+        let last = Last { overlay, counts: counts.clone() };
+        let drawn = run_graph(&mut self.executor, &self.gpu, effects, (target, &light), &mut scene, last)?;
+        let counts_lights = counts.is_some();
+        counts.into_iter().for_each(|[_, copy]| self.light_counter.send_for(drawn.number, copy));
         self.gpu.check()?;
-        frame.statistics.cpu.encoding_ms = clock.lap();
         if options.measure != Measure::Nothing {
             frame.statistics.lit_passes = decided.lit_passes();
         }
-        frame.statistics.cpu.total_ms = milliseconds(clock.begun);
+        clock.lap(|cpu| &mut cpu.encoding_ms);
+        drawn.stages.into_iter().for_each(|stages| clock.note_execution(stages));
+        let effects = self.shares.end(&self.effects, &mut frame.statistics.uploads);
         frame.drawn = Some((Arc::clone(&drawn.plan), target.texture.clone()));
         let census = Arc::clone(&frame.decided.census);
+        frame.statistics.cpu = clock.stages();
+        match options.measure {
+            // Another frame, metered say, may come between two that are measured.
+            Measure::Nothing => self.ledger.pass_over(),
+            measure => {
+                let shares = FrameShares {
+                    stages: frame.statistics.cpu,
+                    uploads: frame.statistics.uploads,
+                    effects,
+                    pipelines_made: frame.statistics.pipelines_made.saturating_sub(self.pipelines_before),
+                };
+                let notes =
+                    if measure == Measure::Lights { CountedStages::of(&self.gpu).1 } else { Vec::new() };
+                let (begun, report, lights) = (clock.begun, None, None);
+                self.ledger.open(OpenFrame {
+                    frame: drawn.number,
+                    begun,
+                    shares,
+                    counts_lights,
+                    notes,
+                    report,
+                    lights,
+                });
+                self.settle(None);
+            }
+        }
+        self.pipelines_before = frame.statistics.pipelines_made;
         let report = FrameReport {
             statistics: frame.statistics,
             plan: drawn.plan,
             census,
             measured: self.executor.latest_report().cloned(),
             left_out: self.left_out.clone(),
+            accounting: self.ledger.newest().filter(|_| options.measure != Measure::Nothing).cloned(),
         };
         self.last = Some(frame);
         Ok(report)
@@ -644,8 +758,12 @@ impl Renderer {
         Ok(uploads)
     }
 
-    /// A buffer of group 0, once it is there.
-    fn frame_buffer(&self, buffer: FrameBuffer) -> Option<wgpu::BufferBinding<'_>> {
+    /// A buffer of group 0, once it is there; what a pass counts lights in is its own.
+    fn frame_buffer(
+        &self,
+        buffer: FrameBuffer,
+        counted_in: Option<LitPass>,
+    ) -> Option<wgpu::BufferBinding<'_>> {
         let whole = match buffer {
             FrameBuffer::Frame => Some(&self.frame_uniform),
             FrameBuffer::Objects => self.objects.transforms.buffer(),
@@ -653,6 +771,9 @@ impl Renderer {
             FrameBuffer::Instances => self.instances.buffer(),
             FrameBuffer::Lights => self.lights.buffer(),
             FrameBuffer::LightList => self.light_list.buffer(),
+            FrameBuffer::LightCounts | FrameBuffer::VertexLightCounts => {
+                return self.light_counter.binding(counted_in?);
+            }
             of_clusters => return self.clusters.buffer(of_clusters),
         };
         whole.map(|buffer| wgpu::BufferBinding { buffer, offset: 0, size: None })
@@ -660,53 +781,26 @@ impl Renderer {
 
     /// Makes the groups 0 of a frame's draws that are not there yet.
     fn make_frame_groups(&mut self, draws: &Draws) {
-        for batch in draws.batches() {
-            let bindings = FrameBindings::of(&batch.pipeline.variant);
-            if self.frame_groups.contains_key(&bindings) {
+        let groups = LitPass::ALL
+            .into_iter()
+            .flat_map(|pass| draws.of(pass).iter().map(move |batch| FrameGroup::of(batch, pass)));
+        for wanted in groups {
+            if self.frame_groups.contains_key(&wanted) {
                 continue;
             }
-            let layout = self.pipelines.frame_layout(&self.gpu, bindings).clone();
+            let layout = self.pipelines.frame_layout(&self.gpu, wanted.bindings).clone();
             let entry = |buffer: FrameBuffer| {
-                let resource = wgpu::BindingResource::Buffer(self.frame_buffer(buffer)?);
+                let bound = self.frame_buffer(buffer, wanted.counted_in)?;
+                let resource = wgpu::BindingResource::Buffer(bound);
                 Some(wgpu::BindGroupEntry { binding: buffer.binding(), resource })
             };
-            let entries: Vec<_> = bindings.buffers().filter_map(entry).collect();
+            let entries: Vec<_> = wanted.bindings.buffers().filter_map(entry).collect();
             let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("frame"),
                 layout: &layout,
                 entries: &entries,
             });
-            self.frame_groups.insert(bindings, group);
+            self.frame_groups.insert(wanted, group);
         }
     }
-}
-
-/// Times the stages of a frame.
-struct Clock {
-    begun: Instant,
-    last: Instant,
-}
-
-/// Where the times of stages are noted.
-struct Timed<'a> {
-    cpu: &'a mut CpuStages,
-    clock: &'a mut Clock,
-}
-
-impl Clock {
-    fn start() -> Self {
-        let begun = Instant::now();
-        Self { begun, last: begun }
-    }
-
-    /// Milliseconds since the last call.
-    fn lap(&mut self) -> f64 {
-        let lap = milliseconds(self.last);
-        self.last = Instant::now();
-        lap
-    }
-}
-
-fn milliseconds(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e3
 }

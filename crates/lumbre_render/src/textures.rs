@@ -28,8 +28,9 @@ pub(crate) struct Textures {
     images: HashMap<(usize, Texels), (Arc<Image>, wgpu::TextureView)>,
     lightmaps: HashMap<usize, (Arc<LightmapImage>, wgpu::TextureView)>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
-    /// Bytes uploaded since somebody last asked.
+    /// Bytes uploaded since somebody last asked: of textures, and of lightmaps.
     uploaded: u64,
+    uploaded_lightmaps: u64,
 }
 
 impl Textures {
@@ -66,7 +67,7 @@ impl Textures {
         let entry = self.lightmaps.entry(key);
         let new = || {
             let (view, bytes) = upload_lightmap(gpu, image);
-            self.uploaded += bytes;
+            self.uploaded_lightmaps += bytes;
             (Arc::clone(image), view)
         };
         Ok(entry.or_insert_with(new).1.clone())
@@ -77,9 +78,9 @@ impl Textures {
         self.samplers.entry(*sampler).or_insert_with(|| make_sampler(gpu, sampler)).clone()
     }
 
-    /// Bytes uploaded since the last call.
-    pub fn take_uploaded(&mut self) -> u64 {
-        std::mem::take(&mut self.uploaded)
+    /// Bytes of textures and of lightmaps uploaded since the last call.
+    pub fn take_uploaded(&mut self) -> [u64; 2] {
+        [std::mem::take(&mut self.uploaded), std::mem::take(&mut self.uploaded_lightmaps)]
     }
 
     /// Forgets images that nothing else holds.

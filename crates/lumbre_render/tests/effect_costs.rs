@@ -51,6 +51,11 @@ fn half_of_the_light_is_half_of_the_picture() {
     let mut again = || Ok::<_, RenderError>((scene(), FrameOptions::default()));
     let cost = effect_costs(&gpu, &mut again, &effects, [32, 32], Duration::ZERO).unwrap();
     assert!(cost.rounds >= 5 && cost.milliseconds > 0.0, "{cost:?}");
+    let accounting = cost.accounting.as_ref().unwrap();
+    let forward = accounting.passes.iter().find(|pass| pass.pass == "forward").unwrap();
+    // One light on each of the wall's pixels. It is masked, and nothing hides it.
+    assert_eq!(forward.lights.unwrap().tested, 32 * 32);
+    assert!(accounting.remainder_ms().is_some());
     for effect in &cost.effects {
         let expected = match effect.effect {
             "global ambient" | "emission" => 0.5,

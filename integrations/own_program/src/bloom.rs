@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use lumbre_graph::{LoadOp, TextureDescriptor, TextureHandle, wgpu};
-use lumbre_render::effects::{Board, Effect, FrameGraph, Stage};
+use lumbre_render::effects::{Board, Effect, EffectWork, FrameGraph, Stage};
 use lumbre_render::{EffectError, FrameOptions, FrameShape, Gpu, SceneFacts};
 
 /// Makes a camera's picture glow.
@@ -25,6 +25,8 @@ impl Default for Bloom {
 pub struct BloomEffect {
     bloom: Option<Bloom>,
     device: Option<OnDevice>,
+    /// So far.
+    work: EffectWork,
 }
 
 struct OnDevice {
@@ -63,12 +65,18 @@ impl Effect for BloomEffect {
         let format = frame.linear_format;
         if self.device.as_ref().is_none_or(|device| device.format != format) {
             self.device = Some(OnDevice::new(&gpu.device, format));
+            self.work.pipelines_made += 3;
         }
         if let (Some(device), Some(bloom)) = (&self.device, self.bloom) {
             let strength = bloom.strength.clamp(0.0, 1.0).to_le_bytes();
             gpu.queue.write_buffer(&device.strength, 0, &strength);
+            self.work.uploaded_bytes += strength.len() as u64;
         }
         Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        self.work
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {

@@ -1,11 +1,12 @@
 //! Outlines: a rim around chosen objects, seen through whatever stands before them. An effect over the finished picture.
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_graph::{LoadOp, wgpu};
-use lumbre_render::effects::{Board, Effect, FrameGraph, Stage};
+use lumbre_render::effects::{Board, Effect, EffectWork, FrameGraph, Stage};
 use lumbre_render::{EffectError, FrameOptions, FrameShape, Gpu, SceneFacts};
 
 /// Draws a rim around an object.
@@ -21,6 +22,9 @@ pub struct OutlineEffect {
     width: f32,
     outlined: HashMap<Entity, Vec3>,
     device: Option<OnDevice>,
+    pipelines_made: usize,
+    /// Bytes, so far.
+    uploaded: AtomicU64,
 }
 
 struct OnDevice {
@@ -44,7 +48,13 @@ const SHAPES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 impl OutlineEffect {
     /// Rims of this width in pixels, up to 16.
     pub fn new(width: f32) -> Self {
-        Self { width: width.clamp(1.0, 16.0), outlined: HashMap::new(), device: None }
+        Self {
+            width: width.clamp(1.0, 16.0),
+            outlined: HashMap::new(),
+            device: None,
+            pipelines_made: 0,
+            uploaded: AtomicU64::new(0),
+        }
     }
 }
 
@@ -76,11 +86,18 @@ impl Effect for OutlineEffect {
         let (count, format) = (self.outlined.len() as u64, frame.target_format);
         if self.device.as_ref().is_none_or(|device| device.format != format || device.capacity < count) {
             self.device = Some(OnDevice::new(&gpu.device, format, count.next_power_of_two()));
+            self.pipelines_made += 2;
         }
         if let Some(device) = &self.device {
-            gpu.queue.write_buffer(&device.width, 0, &self.width.to_le_bytes());
+            let width = self.width.to_le_bytes();
+            gpu.queue.write_buffer(&device.width, 0, &width);
+            *self.uploaded.get_mut() += width.len() as u64;
         }
         Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        EffectWork::new(self.uploaded.load(Ordering::Relaxed), self.pipelines_made)
     }
 
     fn draws_objects(&self) -> bool {
@@ -112,6 +129,7 @@ impl Effect for OutlineEffect {
                 }
                 // Written before any pass of this frame runs.
                 context.resources.queue.write_buffer(&device.records, 0, &records);
+                self.uploaded.fetch_add(records.len() as u64, Ordering::Relaxed);
                 Ok(())
             });
         graph

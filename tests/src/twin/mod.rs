@@ -11,7 +11,7 @@ mod volume;
 use glam::DVec3;
 use lumbre_optics::{FlatRule, ReflectionModel, Shading};
 
-pub use raster::draw;
+pub use raster::{draw, reflected_by_corner, reflected_by_pixel};
 
 /// A frame of the twin.
 pub struct TwinFrame {

@@ -17,67 +17,13 @@ use super::{TwinFrame, TwinOptions};
 /// # Panics
 /// Without a perspective camera: the tests' scenes have one.
 pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions) -> TwinFrame {
-    update_transforms(world);
-    let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-    let mut cameras = world.query::<(&Camera, &GlobalTransform)>();
-    let (camera, place) = cameras.iter(world).next().expect("the scene has a camera");
-    let Projection::Perspective { vertical_fov, near, .. } = camera.projection else {
-        panic!("the twin knows perspective cameras only")
-    };
-    let (eye, axes) = (place.translation(), place.0.matrix3);
-    let backward = axes.z_axis.normalize();
-    let right = axes.y_axis.cross(backward).normalize();
-    let basis = DMat3::from_cols(right, backward.cross(right), backward);
-    let mut lights = world.query::<(&Light, &GlobalTransform)>();
-    let lights =
-        lights.iter(world).map(|(light, at)| (light.clone(), at.translation(), at.forward())).collect();
-    let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
-    let specular_antialiasing = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
-    let objects = collect(world, &settings, &options);
-    let polygons = objects.iter().flat_map(Object::polygons).collect();
-    let volume = Volume::of(world);
-    let scene = Scene { settings, flat_rule, specular_antialiasing, lights, polygons, volume, eye, basis };
-
-    let mut frame = TwinFrame {
-        width,
-        height,
-        color: vec![settings.shown_background().as_dvec3(); width * height],
-        surface: vec![None; width * height],
-    };
-    let lens = Lens {
-        focal: 1.0 / (0.5 * vertical_fov).tan(),
-        near,
-        size: DVec2::new(width as f64, height as f64),
-        to_view: basis.transpose(),
-        eye,
-    };
-    let mut nearest = vec![f64::INFINITY; width * height];
-    for (index, object) in objects.iter().enumerate() {
-        for (number, triangle) in object.triangles.iter().enumerate() {
-            let Some(seen) = SeenTriangle::new(&lens, triangle) else { continue };
-            if !seen.front && !object.material.double_sided {
-                continue;
-            }
-            let low = seen.pixel[0].min(seen.pixel[1]).min(seen.pixel[2]).floor().max(DVec2::ZERO);
-            let high = seen.pixel[0].max(seen.pixel[1]).max(seen.pixel[2]).ceil();
-            for y in low.y as usize..(high.y as usize).min(height) {
-                for x in low.x as usize..(high.x as usize).min(width) {
-                    let Some(depth) = seen.depth_inside(center(x, y)) else { continue };
-                    let at = y * width + x;
-                    if depth < nearest[at] {
-                        nearest[at] = depth;
-                        frame.surface[at] = Some((index, number));
-                    }
-                }
-            }
-        }
-    }
-    let shade = |at: usize, surface: (usize, usize)| -> Option<DVec3> {
-        let object = &objects[surface.0];
-        let triangle = &object.triangles[surface.1];
-        let seen = SeenTriangle::new(&lens, triangle)?;
+    let view = View::new(world, width, height, options);
+    let surface = view.surfaces();
+    let shade = |at: usize, (object, triangle): (usize, usize)| -> Option<DVec3> {
+        let (object, triangle) = (&view.objects[object], &view.objects[object].triangles[triangle]);
+        let seen = SeenTriangle::new(&view.lens, triangle)?;
         let (x, y) = (at % width, at / width);
-        let shaded = ShadedTriangle::new(&scene, object, triangle, seen.front);
+        let shaded = ShadedTriangle::new(&view.scene, object, triangle, seen.front);
         // The neighbours of the two-by-two block that fine derivatives are taken in.
         let (left, top) = (x & !1, y & !1);
         let pixel = PixelWeights {
@@ -87,13 +33,119 @@ pub fn draw(world: &mut World, width: usize, height: usize, options: TwinOptions
         };
         Some(shaded.at(&pixel))
     };
-    let TwinFrame { color, surface, .. } = &mut frame;
+    let mut color = vec![view.scene.settings.shown_background().as_dvec3(); width * height];
     color.par_iter_mut().zip(surface.par_iter()).enumerate().for_each(|(at, (color, surface))| {
         if let Some(lit) = surface.and_then(|surface| shade(at, surface)) {
             *color = lit;
         }
     });
-    frame
+    TwinFrame { width, height, color, surface }
+}
+
+/// What every light that is no ambient one reflects towards the camera, by pixel of `world`'s first camera: the brightest channel of each light, nothing where no surface is seen.
+/// For surfaces without textures, under Phong shading.
+///
+/// # Panics
+/// As [`draw`].
+pub fn reflected_by_pixel(
+    world: &mut World,
+    width: usize,
+    height: usize,
+    options: TwinOptions,
+) -> Vec<Vec<f64>> {
+    let view = View::new(world, width, height, options);
+    let of_pixel = |(at, surface): (usize, &Option<(usize, usize)>)| -> Option<Vec<f64>> {
+        let (object, triangle) = (*surface)?;
+        let (object, triangle) = (&view.objects[object], &view.objects[object].triangles[triangle]);
+        let seen = SeenTriangle::new(&view.lens, triangle)?;
+        let weights = seen.weights(center(at % width, at / width));
+        Some(ShadedTriangle::new(&view.scene, object, triangle, seen.front).reflected(weights))
+    };
+    view.surfaces().iter().enumerate().map(|pixel| of_pixel(pixel).unwrap_or_default()).collect()
+}
+
+/// The same by corner of every triangle, seen or not: where flat and Gouraud shading evaluate lights. Each triangle shows its front.
+///
+/// # Panics
+/// As [`draw`].
+pub fn reflected_by_corner(world: &mut World, options: TwinOptions) -> Vec<Vec<f64>> {
+    let view = View::new(world, 1, 1, options);
+    let triangles =
+        view.objects.iter().flat_map(|object| object.triangles.iter().map(move |of| (object, of)));
+    triangles
+        .flat_map(|(object, triangle)| {
+            ShadedTriangle::new(&view.scene, object, triangle, true).reflected_at_corners()
+        })
+        .collect()
+}
+
+/// A World from its first camera.
+struct View {
+    scene: Scene,
+    objects: Vec<Object>,
+    lens: Lens,
+}
+
+impl View {
+    fn new(world: &mut World, width: usize, height: usize, options: TwinOptions) -> Self {
+        update_transforms(world);
+        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        let mut cameras = world.query::<(&Camera, &GlobalTransform)>();
+        let (camera, place) = cameras.iter(world).next().expect("the scene has a camera");
+        let Projection::Perspective { vertical_fov, near, .. } = camera.projection else {
+            panic!("the twin knows perspective cameras only")
+        };
+        let (eye, axes) = (place.translation(), place.0.matrix3);
+        let backward = axes.z_axis.normalize();
+        let right = axes.y_axis.cross(backward).normalize();
+        let basis = DMat3::from_cols(right, backward.cross(right), backward);
+        let mut lights = world.query::<(&Light, &GlobalTransform)>();
+        let lights =
+            lights.iter(world).map(|(light, at)| (light.clone(), at.translation(), at.forward())).collect();
+        let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
+        let specular_antialiasing = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
+        let objects = collect(world, &settings, &options);
+        let polygons = objects.iter().flat_map(Object::polygons).collect();
+        let volume = Volume::of(world);
+        let scene =
+            Scene { settings, flat_rule, specular_antialiasing, lights, polygons, volume, eye, basis };
+        let lens = Lens {
+            focal: 1.0 / (0.5 * vertical_fov).tan(),
+            near,
+            size: DVec2::new(width as f64, height as f64),
+            to_view: basis.transpose(),
+            eye,
+        };
+        Self { scene, objects, lens }
+    }
+
+    /// The object and triangle that each pixel shows.
+    fn surfaces(&self) -> Vec<Option<(usize, usize)>> {
+        let (width, height) = (self.lens.size.x as usize, self.lens.size.y as usize);
+        let mut surface = vec![None; width * height];
+        let mut nearest = vec![f64::INFINITY; width * height];
+        for (index, object) in self.objects.iter().enumerate() {
+            for (number, triangle) in object.triangles.iter().enumerate() {
+                let Some(seen) = SeenTriangle::new(&self.lens, triangle) else { continue };
+                if !seen.front && !object.material.double_sided {
+                    continue;
+                }
+                let low = seen.pixel[0].min(seen.pixel[1]).min(seen.pixel[2]).floor().max(DVec2::ZERO);
+                let high = seen.pixel[0].max(seen.pixel[1]).max(seen.pixel[2]).ceil();
+                for y in low.y as usize..(high.y as usize).min(height) {
+                    for x in low.x as usize..(high.x as usize).min(width) {
+                        let Some(depth) = seen.depth_inside(center(x, y)) else { continue };
+                        let at = y * width + x;
+                        if depth < nearest[at] {
+                            nearest[at] = depth;
+                            surface[at] = Some((index, number));
+                        }
+                    }
+                }
+            }
+        }
+        surface
+    }
 }
 
 fn center(x: usize, y: usize) -> DVec2 {

@@ -138,36 +138,84 @@ impl<'a> ShadedTriangle<'a> {
         }
         let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
         let mapped = self.object.lightmap.is_some();
-        let volume = scene.volume.as_ref().filter(|_| !mapped);
         let mut sum = Contribution::ZERO;
-        if let Some(volume) = volume {
+        if let Some(volume) = scene.volume.as_ref().filter(|_| !mapped) {
             sum.ambient += surface.diffuse * volume.light(point, normal);
         } else if !mapped {
             sum.ambient +=
                 surface.ambient * (scene.settings.ambient.as_dvec3() + scene.settings.sky.as_dvec3());
         }
-        for (light, position, axis) in &scene.lights {
-            let sample: LightSample = evaluate_light(light, *position, *axis, point);
-            let mut added = light_contribution(self.object.reflection, surface, &sample, normal, viewer);
-            if (mapped || volume.is_some()) && light.kind == LightKind::Ambient {
-                added = Contribution::ZERO;
-            }
-            if mapped && light.bake == lumbre_optics::BakeMode::Static {
-                added.diffuse = DVec3::ZERO;
-            }
-            sum = sum + added;
-        }
-        for polygon in scene.polygons.iter().filter(|polygon| polygon.emitter != self.object.index) {
-            let light = &polygon.light;
-            let mut added =
-                polygon_light_contribution(self.object.reflection, surface, light, point, normal, viewer);
-            if mapped && polygon.baked {
-                added.diffuse = DVec3::ZERO;
-            }
+        for (_, added) in self.contributions(surface, point, normal, viewer) {
             sum = sum + added;
         }
         let ambient = sum.ambient;
         let direct = Contribution { ambient: DVec3::ZERO, ..sum };
         Lit { ambient, direct: add_emission(direct.total(), side.emission.as_dvec3()) }
+    }
+
+    /// What each light adds at a point, and whether it is one that frames evaluate there: not an ambient one, and not one that is off.
+    fn contributions(
+        &self,
+        surface: SurfaceSample,
+        point: DVec3,
+        normal: DVec3,
+        viewer: DVec3,
+    ) -> impl Iterator<Item = (bool, Contribution)> {
+        let (scene, reflection) = (self.scene, self.object.reflection);
+        let mapped = self.object.lightmap.is_some();
+        let of_lights = scene.lights.iter().map(move |(light, position, axis)| {
+            let sample: LightSample = evaluate_light(light, *position, *axis, point);
+            let mut added = light_contribution(reflection, surface, &sample, normal, viewer);
+            if (mapped || scene.volume.is_some()) && light.kind == LightKind::Ambient {
+                added = Contribution::ZERO;
+            }
+            if mapped && light.bake == lumbre_optics::BakeMode::Static {
+                added.diffuse = DVec3::ZERO;
+            }
+            (light.enabled && light.kind != LightKind::Ambient, added)
+        });
+        let polygons = scene.polygons.iter().filter(|polygon| polygon.emitter != self.object.index);
+        let of_polygons = polygons.map(move |polygon| {
+            let light = &polygon.light;
+            let mut added = polygon_light_contribution(reflection, surface, light, point, normal, viewer);
+            if mapped && polygon.baked {
+                added.diffuse = DVec3::ZERO;
+            }
+            (true, added)
+        });
+        of_lights.chain(of_polygons)
+    }
+
+    /// The brightest channel of what each light that is evaluated adds at a pixel; for surfaces without textures, under Phong shading.
+    pub(super) fn reflected(&self, weights: [f64; 3]) -> Vec<f64> {
+        let mix = |of: &dyn Fn(&Vertex) -> DVec3| -> DVec3 {
+            (0..3).map(|i| of(&self.triangle[i]) * weights[i]).sum()
+        };
+        let normal = safe_normalize(mix(&|vertex| vertex.normal));
+        self.reflected_at(mix(&|vertex| vertex.point), normal)
+    }
+
+    /// The same at its corners, where flat and Gouraud shading evaluate it.
+    pub(super) fn reflected_at_corners(&self) -> [Vec<f64>; 3] {
+        let corners = self.triangle.each_ref().map(|vertex| vertex.point);
+        let [a, b, c] = corners;
+        match self.object.shading {
+            Shading::Flat => {
+                let normal = (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::ZERO);
+                let at = self.reflected_at((a + b + c) / 3.0, normal);
+                [at.clone(), at.clone(), at]
+            }
+            _ => self.triangle.each_ref().map(|vertex| self.reflected_at(vertex.point, vertex.normal)),
+        }
+    }
+
+    fn reflected_at(&self, point: DVec3, normal: DVec3) -> Vec<f64> {
+        let scene = self.scene;
+        let surface = SurfaceSample::new(&self.object.material, self.lit_as_front());
+        let viewer = viewer_direction(scene.settings.local_viewer, scene.eye, scene.basis.z_axis, point);
+        self.contributions(surface, point, self.facing(normal), viewer)
+            .filter(|(evaluated, _)| *evaluated)
+            .map(|(_, added)| added.total().max_element())
+            .collect()
     }
 }

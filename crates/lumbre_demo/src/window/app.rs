@@ -186,7 +186,11 @@ impl App {
             irradiance_volumes: view.lightmaps,
             multisample: view.multisample,
             missing_pipelines: MissingPipelines::Background,
-            measure: if view.overlay { Measure::Time } else { Measure::Nothing },
+            measure: match (view.overlay, view.count_lights) {
+                (false, _) => Measure::Nothing,
+                (true, false) => Measure::TimeAndInvocations,
+                (true, true) => Measure::Lights,
+            },
             ..FrameOptions::default()
         }
     }

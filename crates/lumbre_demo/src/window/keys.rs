@@ -14,6 +14,7 @@ pub fn action(key: KeyCode) -> Option<Action> {
         KeyCode::KeyR => Action::CycleReflection,
         KeyCode::KeyL => Action::ToggleLightmaps,
         KeyCode::KeyM => Action::ToggleMultisample,
+        KeyCode::KeyN => Action::ToggleLightCounts,
         KeyCode::KeyT => Action::ToggleTorch,
         KeyCode::KeyF => Action::ToggleFlight,
         KeyCode::KeyO | KeyCode::Home => Action::OrbitEverything,

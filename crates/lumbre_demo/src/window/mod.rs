@@ -4,6 +4,7 @@ mod app;
 mod keys;
 mod mouse;
 mod overlay;
+mod overlay_accounting;
 mod overlay_file;
 mod overlay_painter;
 mod stage;

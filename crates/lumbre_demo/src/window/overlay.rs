@@ -7,9 +7,9 @@ use egui::{Color32, RichText, Sense, Stroke, Ui, pos2, vec2};
 use lumbre_graph::{GpuTime, PassExplanation, PassReport};
 use lumbre_render::FrameReport;
 
-use super::overlay_file;
 pub use super::overlay_file::FileFacts;
 use super::overlay_file::{DIM, GOOD, WARM};
+use super::{overlay_accounting, overlay_file};
 use crate::ViewSettings;
 
 /// Frames in the graph: two seconds at 60 per second.
@@ -109,7 +109,10 @@ impl Overlay {
         if let Some(report) = report {
             let heading = egui::CollapsingHeader::new("what a frame does and costs");
             heading.default_open(facts.is_level).show(ui, |ui| {
-                passes(ui, report);
+                passes(ui, report, facts.view.count_lights);
+                if let Some(accounting) = &report.accounting {
+                    overlay_accounting::account(ui, accounting);
+                }
                 ui.separator();
                 counts(ui, report);
             });
@@ -139,17 +142,20 @@ fn graph(ui: &mut Ui, frame_ms: &VecDeque<f32>, mean: f32) {
 }
 
 /// Every pass of the plan: how long it took, or why it does not run.
-fn passes(ui: &mut Ui, report: &FrameReport) {
+fn passes(ui: &mut Ui, report: &FrameReport, counts_lights: bool) {
     let explanation = report.plan.explain();
     let measured = report.measured.as_ref();
-    egui::Grid::new("passes").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
-        for heading in ["pass", "CPU ms", "GPU ms", ""] {
+    let lights = if counts_lights { "lights tested (contributing)" } else { "" };
+    egui::Grid::new("passes").num_columns(5).spacing([10.0, 2.0]).show(ui, |ui| {
+        for heading in ["pass", "CPU ms", "GPU ms", lights, ""] {
             ui.label(RichText::new(heading).color(DIM).small());
         }
         ui.end_row();
         for pass in &explanation.passes {
             let times = measured.and_then(|frame| frame.passes.iter().find(|one| *one.name == *pass.name));
-            pass_row(ui, pass, times);
+            let account = report.accounting.as_ref();
+            let account = account.and_then(|account| account.passes.iter().find(|one| one.pass == pass.name));
+            pass_row(ui, pass, times, &overlay_accounting::lights(account));
         }
         if let Some(frame) = measured {
             ui.label(RichText::new("whole frame").strong());
@@ -160,16 +166,18 @@ fn passes(ui: &mut Ui, report: &FrameReport) {
     });
 }
 
-fn pass_row(ui: &mut Ui, pass: &PassExplanation, times: Option<&PassReport>) {
+fn pass_row(ui: &mut Ui, pass: &PassExplanation, times: Option<&PassReport>, lights: &str) {
     if pass.status.runs() {
         ui.label(RichText::new(&pass.name).color(GOOD));
         ui.label(milliseconds(times.and_then(|times| times.cpu_ms)));
         let shared = matches!(times.map(|times| times.gpu), Some(GpuTime::Group { .. }));
         let mark = if shared { " (with others)" } else { "" };
         ui.label(milliseconds(times.and_then(|times| times.gpu.ms())) + mark);
+        ui.label(lights);
         ui.label(RichText::new(pass.status.reason()).color(DIM).small());
     } else {
         ui.label(RichText::new(&pass.name).color(DIM));
+        ui.label("");
         ui.label("");
         ui.label("");
         let reason = format!("{}: {}", pass.status.word(), pass.status.reason());
@@ -201,9 +209,6 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
     let lines = report.census.lines();
     let called_for: Vec<_> = lines.iter().filter(|line| line.called_for).map(|line| line.effect).collect();
     ui.label(RichText::new(format!("the scene calls for {}", called_for.join(", "))).color(DIM).small());
-    for note in report.measured.iter().flat_map(|frame| &frame.notes) {
-        ui.label(RichText::new(note).color(WARM).small());
-    }
 }
 
 /// What can be changed, with its key.
@@ -231,6 +236,7 @@ fn choices(ui: &mut Ui, facts: &Facts) {
             ("M", "multisampling", switch(view.multisample)),
             ("T", "torch", switch(facts.torch)),
             ("F", "flight", if facts.is_player { switch(facts.flying) } else { "" }),
+            ("N", "counts of lights", switch(view.count_lights)),
             ("Tab, F1", "this overlay", "on"),
         ] {
             ui.label(RichText::new(key).color(WARM));

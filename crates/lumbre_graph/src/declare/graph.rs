@@ -25,6 +25,8 @@ pub struct Graph<'a, User = ()> {
     pub(crate) id: u64,
     pub(crate) declarations: Declarations,
     pub(crate) bodies: Vec<Option<Body<'a, User>>>,
+    /// Of the passes that are declared from now on.
+    owner: Option<Label>,
 }
 
 impl Graph<'_> {
@@ -48,7 +50,14 @@ impl<'a, User> Graph<'a, User> {
                 faults: Vec::new(),
             },
             bodies: Vec::new(),
+            owner: None,
         }
+    }
+
+    /// The part of the program that the passes declared from now on belong to, until another is named: reports and explanations name it, so that what passes cost can be
+    /// summed by part. Nobody's at first.
+    pub fn set_owner(&mut self, owner: impl Into<Label>) {
+        self.owner = Some(owner.into());
     }
 
     /// A texture that lives for a part of this frame only.
@@ -183,6 +192,7 @@ impl<'a, User> Graph<'a, User> {
     fn pass<K: PassType>(&mut self, name: Label, site: Site) -> PassBuilder<'_, 'a, K, User> {
         self.declarations.passes.push(PassDeclaration {
             name,
+            owner: self.owner.clone(),
             kind: K::KIND,
             accesses: Vec::new(),
             calls_for: Vec::new(),

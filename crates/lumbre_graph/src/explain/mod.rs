@@ -26,6 +26,8 @@ pub struct Explanation {
 pub struct PassExplanation {
     /// Its name.
     pub name: String,
+    /// The part of the program that declared it, if the graph was told ([`Graph::set_owner`](crate::Graph::set_owner)).
+    pub owner: Option<String>,
     /// Raster, compute or transfer.
     pub kind: PassKind,
     /// Whether it runs, and why.
@@ -110,6 +112,7 @@ impl Explanation {
             };
             PassExplanation {
                 name: declared.name.to_string(),
+                owner: declared.owner.as_ref().map(ToString::to_string),
                 kind: declared.kind,
                 status: plan.status[index].clone(),
                 calls_for: declared

@@ -38,9 +38,12 @@ pub(super) fn render(explanation: &Explanation) -> String {
 
 fn render_pass(text: &mut String, pass: &PassExplanation, width: usize) {
     let group = pass.group.map_or("-".into(), |group| group.to_string());
+    // As a rule a pass is called as its owner.
+    let owner = pass.owner.as_ref().filter(|owner| **owner != pass.name);
+    let owner = owner.map_or_else(String::new, |owner| format!(" ({owner}'s)"));
     let _ = writeln!(
         text,
-        "  {group:>3} {:width$}  {:8}  {:9}  {}",
+        "  {group:>3} {:width$}  {:8}  {:9}  {}{owner}",
         pass.name,
         pass.kind.name(),
         pass.status.word(),

@@ -375,9 +375,10 @@ impl<'r, User> Recorder<'r, '_, User> {
         span: Option<(u32, u32, Scope)>,
         count: Option<u32>,
     ) {
-        let name = self.frame.plan.pass_name(pass).clone();
+        let declared = &self.frame.plan.declarations.passes[pass];
+        let (name, owner) = (declared.name.clone(), declared.owner.clone());
         let gpu = GpuTime::NotMeasured;
-        self.queries.report.passes.push(PassReport { name, group, cpu_ms, gpu, invocations: None });
+        self.queries.report.passes.push(PassReport { name, owner, group, cpu_ms, gpu, invocations: None });
         self.queries.spans.push(span);
         self.queries.counts.push(count);
     }

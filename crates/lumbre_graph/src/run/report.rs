@@ -76,11 +76,39 @@ pub struct Invocations {
     pub compute: u64,
 }
 
+/// Milliseconds on the CPU of one execution, stage after stage: each begins where the one before ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct ExecutionStages {
+    /// Results of earlier frames that have arrived.
+    pub collecting_ms: f64,
+    /// Compiling the graph, or finding the plan of an equal one.
+    pub planning_ms: f64,
+    /// Memory of transient and retained resources, imports, queries.
+    pub resources_ms: f64,
+    /// The commands of all passes.
+    pub recording_ms: f64,
+    /// Handing them to the queue.
+    pub submission_ms: f64,
+    /// What is kept for the next frame.
+    pub keeping_ms: f64,
+}
+
+impl ExecutionStages {
+    /// All of them.
+    #[must_use]
+    pub fn total_ms(&self) -> f64 {
+        let Self { collecting_ms, planning_ms, resources_ms, recording_ms, submission_ms, keeping_ms } = self;
+        collecting_ms + planning_ms + resources_ms + recording_ms + submission_ms + keeping_ms
+    }
+}
+
 /// What was measured of one pass.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassReport {
     /// The pass.
     pub name: Label,
+    /// The part of the program that declared it, if the graph was told ([`Graph::set_owner`](crate::Graph::set_owner)).
+    pub owner: Option<Label>,
     /// The wgpu pass of the frame it was in, from 0. Passes of the same group were merged.
     pub group: usize,
     /// Milliseconds that recording it took on the CPU.
@@ -130,4 +158,54 @@ pub struct GraphReport {
     pub probed: bool,
     /// What could not be measured, and why.
     pub notes: Vec<String>,
+}
+
+impl GraphReport {
+    /// Milliseconds on the GPU of all passes, each wgpu pass counted once; `None` if none was measured. The rest of [`gpu_ms`](Self::gpu_ms) lies between them.
+    #[must_use]
+    pub fn passes_gpu_ms(&self) -> Option<f64> {
+        let mut counted = None;
+        let mut sum = None;
+        for pass in &self.passes {
+            let shared = matches!(pass.gpu, GpuTime::Group { .. });
+            // The same time stands at every pass of the group, and these follow each other.
+            if shared && counted == Some(pass.group) {
+                continue;
+            }
+            counted = Some(pass.group);
+            sum = match pass.gpu.ms() {
+                Some(ms) => Some(sum.unwrap_or(0.0) + ms),
+                None => sum,
+            };
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_of_a_group_counts_once() {
+        let pass = |group, gpu| PassReport {
+            name: "pass".into(),
+            owner: None,
+            group,
+            cpu_ms: None,
+            gpu,
+            invocations: None,
+        };
+        let of = |passes: Vec<PassReport>| GraphReport { passes, ..GraphReport::default() }.passes_gpu_ms();
+        assert_eq!(of(vec![]), None);
+        assert_eq!(of(vec![pass(0, GpuTime::NotMeasured)]), None);
+        let group = GpuTime::Group { ms: 4.0 };
+        let (alone, part) = (GpuTime::Pass { ms: 1.0 }, GpuTime::PartOfGroup { ms: 0.5 });
+        assert_eq!(of(vec![pass(0, group), pass(0, group), pass(1, alone)]), Some(5.0));
+        assert_eq!(of(vec![pass(0, group), pass(1, group)]), Some(8.0));
+        assert_eq!(
+            of(vec![pass(0, part), pass(0, part), pass(1, alone), pass(2, GpuTime::NotMeasured)]),
+            Some(2.0)
+        );
+    }
 }

@@ -9,7 +9,7 @@ use lumbre_graph::LoadOp;
 use lumbre_optics::{decode_srgb, encode_srgb, tone_curve};
 use wgpu::util::DeviceExt;
 
-use super::{Board, Effect, FrameGraph, Stage};
+use super::{Board, Effect, EffectWork, FrameGraph, Stage};
 use crate::deferred::Deferred;
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
@@ -51,6 +51,8 @@ struct OnDevice {
     uniform: wgpu::Buffer,
     /// What the uniform holds: the exposure, and the viewport's corner.
     written: [f32; 4],
+    /// Bytes written so far.
+    uploaded: u64,
 }
 
 impl Effect for DisplayPass {
@@ -72,19 +74,28 @@ impl Effect for DisplayPass {
 
     fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
         let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
-        Ok(!frame.display_pass || device.make(gpu, Key::of(frame), false)?)
+        Ok(!frame.display_pass || device.begin(gpu, frame)?)
     }
 
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.key = None;
         if frame.display_pass {
             let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
-            device.make(gpu, Key::of(frame), true)?;
+            device.make(gpu, Key::of(frame))?;
             let [x, y] = frame.viewport.map_or([0, 0], |viewport| viewport.origin);
             device.write(gpu, [frame.exposure, x as f32, y as f32, 0.0]);
             self.key = Some(Key::of(frame));
         }
         Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        let made = |device: &OnDevice| {
+            device.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
+        };
+        self.device
+            .as_ref()
+            .map_or_else(EffectWork::default, |device| EffectWork::new(device.uploaded, made(device)))
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
@@ -140,23 +151,41 @@ impl OnDevice {
             contents: bytemuck::bytes_of(&UNEXPOSED),
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         });
-        Self { layout, pipelines: HashMap::new(), uniform, written: UNEXPOSED }
+        Self { layout, pipelines: HashMap::new(), uniform, written: UNEXPOSED, uploaded: 0 }
     }
 
-    /// Makes the pipeline for a target, or begins to; whether it is there.
-    fn make(&mut self, gpu: &Gpu, key: Key, wait: bool) -> Result<bool, EffectError> {
+    /// Makes the pipeline for a target, or waits for it.
+    fn make(&mut self, gpu: &Gpu, key: Key) -> Result<(), EffectError> {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layout) = (gpu.device.clone(), self.layout.clone());
-            let make = move || Ok(make(&device, &layout, key)?);
-            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+            Deferred::make(move || Ok(make(&device, &layout, key)?))
         });
-        Ok(pipeline.is_there(wait)?)
+        pipeline.is_there(true)?;
+        Ok(())
+    }
+
+    /// Begins to make the pipeline of a frame on the device's thread; whether it is there.
+    fn begin(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
+        let key = Key::of(frame);
+        let pipeline = self.pipelines.entry(key).or_insert_with(|| {
+            let (device, layout) = (gpu.device.clone(), self.layout.clone());
+            let rehearsals = frame.rehearsals.as_ref();
+            let rehearsal = rehearsals
+                .and_then(|all| all.of_pass(gpu, key.format, move |gpu, pass| rehearse(gpu, pass, key)));
+            Deferred::begin(gpu, move || {
+                let pipeline = make(&device, &layout, key)?;
+                rehearsal.into_iter().for_each(|rehearsal| rehearsal());
+                Ok(pipeline)
+            })
+        });
+        Ok(pipeline.is_there(false)?)
     }
 
     /// Writes the exposure and the viewport's corner if they changed.
     fn write(&mut self, gpu: &Gpu, numbers: [f32; 4]) {
         if numbers != self.written {
             self.written = numbers;
+            self.uploaded += size_of_val(&numbers) as u64;
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&numbers));
         }
     }
@@ -182,6 +211,24 @@ impl OnDevice {
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..3, 0..1);
     }
+}
+
+/// A first draw with a pipeline, of a frame of one texel.
+fn rehearse(gpu: &Gpu, pass: &mut wgpu::RenderPass<'static>, key: Key) -> Result<(), EffectError> {
+    let mut device = OnDevice::new(gpu);
+    device.make(gpu, key)?;
+    let frame = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("rehearsal"),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba16Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    device.draw(&gpu.device, pass, &key, &frame.create_view(&Default::default()));
+    Ok(())
 }
 
 fn make(

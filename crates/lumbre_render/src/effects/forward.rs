@@ -5,6 +5,7 @@ use lumbre_graph::LoadOp;
 
 use super::{Board, Effect, FrameGraph, Stage};
 use crate::FrameOptions;
+use crate::extract::LitPass;
 use crate::facts::SceneFacts;
 
 #[derive(Debug, Default)]
@@ -36,7 +37,7 @@ impl Effect for Forward {
             .calls_for(self.opaque, "opaque mesh without a lightmap")
             .depth(&mut board.depth, LoadOp::Load)
             .run(|context| {
-                context.user.draw(context.pass, &context.user.draws.opaque);
+                context.user.draw(context.pass, LitPass::Forward);
                 Ok(())
             });
     }

@@ -3,14 +3,18 @@
 use bevy_ecs::world::World;
 use lumbre_graph::LoadOp;
 
-use super::{Board, Effect, FrameGraph, Stage};
-use crate::FrameOptions;
+use super::{Board, Effect, EffectWork, FrameGraph, Stage};
+use crate::error::EffectError;
+use crate::extract::LitPass;
 use crate::facts::SceneFacts;
+use crate::frame_plan::FrameShape;
+use crate::{FrameOptions, Gpu};
 
 #[derive(Debug, Default)]
 pub(super) struct Lightmap {
     lightmapped: bool,
     switched_on: bool,
+    work: EffectWork,
 }
 
 impl Effect for Lightmap {
@@ -31,6 +35,15 @@ impl Effect for Lightmap {
         true
     }
 
+    fn prepare(&mut self, _: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
+        self.work.of_renderer += frame.uploads.lightmaps;
+        Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        self.work
+    }
+
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         board
             .lit_pass(graph, self.name(), LoadOp::Load)
@@ -38,7 +51,7 @@ impl Effect for Lightmap {
             .calls_for(self.switched_on, "lightmaps switched on")
             .depth(&mut board.depth, LoadOp::Load)
             .run(|context| {
-                context.user.draw(context.pass, &context.user.draws.lightmapped);
+                context.user.draw(context.pass, LitPass::Lightmap);
                 Ok(())
             });
     }

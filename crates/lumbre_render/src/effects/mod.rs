@@ -53,6 +53,24 @@ pub enum Stage {
     Picture,
 }
 
+/// What an effect has done since it was built, beside its passes: numbers that only grow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EffectWork {
+    /// Bytes that it uploaded itself.
+    pub uploaded_bytes: u64,
+    /// Pipelines that it made.
+    pub pipelines_made: usize,
+    /// Bytes of the renderer's own uploads that are there for it alone.
+    pub(crate) of_renderer: u64,
+}
+
+impl EffectWork {
+    /// Of an effect that has uploaded this many bytes and made this many pipelines.
+    pub fn new(uploaded_bytes: u64, pipelines_made: usize) -> Self {
+        Self { uploaded_bytes, pipelines_made, of_renderer: 0 }
+    }
+}
+
 /// A part of the frame that a scene may or may not call for. [`Renderer::builder`](crate::Renderer::builder) takes those of a program.
 ///
 /// Once a frame, in this order: `extract`; `ready` and `prepare`, if it is called for; `declare`. An explanation without a device leaves out `prepare` and runs no
@@ -105,20 +123,68 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// What it has brought to the GPU and made there since it was built, for the accounts of frames ([`Accounting`](crate::Accounting)): whatever no pass shows.
+    fn work(&self) -> EffectWork {
+        EffectWork::default()
+    }
+
     /// Declares its passes, those that are not called for too, so that the plan can say why.
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board);
 }
 
-/// The effects of this crate, each in its stage.
-pub(crate) fn own() -> Vec<Box<dyn Effect>> {
-    vec![
+/// An effect of the renderer's own that it can be built without ([`RendererBuilder::without`](crate::RendererBuilder::without)). The background is none of them: it clears the
+/// colours and depths that every other pass draws over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BuiltIn {
+    /// Shadow maps: without them lights cast no shadows.
+    ShadowMaps,
+    /// Surfaces with a lightmap: without it they are lit as any others.
+    Lightmap,
+    /// Opaque surfaces: without it they are not drawn.
+    Forward,
+    /// Blended surfaces: without it they are not drawn.
+    Transparent,
+    /// The display pass: without it, or another at [`Stage::Display`], a frame that needs one is refused ([`RenderError::NoDisplay`](crate::RenderError::NoDisplay)).
+    Display,
+}
+
+impl BuiltIn {
+    /// Every one.
+    pub const ALL: [Self; 5] =
+        [Self::ShadowMaps, Self::Lightmap, Self::Forward, Self::Transparent, Self::Display];
+
+    /// Its name in plans and accounts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ShadowMaps => "shadow maps",
+            Self::Lightmap => "lightmap",
+            Self::Forward => "forward",
+            Self::Transparent => "transparent",
+            Self::Display => "display",
+        }
+    }
+
+    /// Switches off what a frame cannot have without it.
+    pub(crate) fn switch_off(self, options: &mut FrameOptions) {
+        match self {
+            Self::ShadowMaps => options.shadows = false,
+            Self::Lightmap => options.lightmaps = false,
+            Self::Forward | Self::Transparent | Self::Display => {}
+        }
+    }
+}
+
+/// The effects of this crate but for some, each in its stage.
+pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
+    let all: [Box<dyn Effect>; 6] = [
         Box::new(shadows::Shadows::default()),
         Box::new(background::Background::default()),
         Box::new(lightmap::Lightmap::default()),
         Box::new(forward::Forward::default()),
         Box::new(transparent::Transparent::default()),
         Box::new(display::DisplayPass::default()),
-    ]
+    ];
+    all.into_iter().filter(|effect| without.iter().all(|left_out| left_out.name() != effect.name())).collect()
 }
 
 /// In the order of their stages.

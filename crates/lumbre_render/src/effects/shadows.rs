@@ -3,7 +3,7 @@
 use bevy_ecs::world::World;
 use lumbre_graph::{Imports, LoadOp, TextureDescriptor};
 
-use super::{Board, Effect, FrameGraph, Stage};
+use super::{Board, Effect, EffectWork, FrameGraph, Stage};
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
 use crate::frame_plan::{FrameShape, ShadowAtlas};
@@ -15,6 +15,7 @@ pub(super) struct Shadows {
     /// Whether a light asks for one, and whether they are switched on.
     called_for: [bool; 2],
     atlas: Option<ShadowAtlas>,
+    work: EffectWork,
 }
 
 impl Effect for Shadows {
@@ -38,7 +39,13 @@ impl Effect for Shadows {
 
     fn prepare(&mut self, _: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         self.atlas.clone_from(&frame.shadow_atlas);
+        self.work.of_renderer += frame.uploads.shadows;
+        self.work.pipelines_made = self.atlas.as_ref().map_or(0, |atlas| atlas.pipelines);
         Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        self.work
     }
 
     fn imports(&self, imports: Imports) -> Imports {

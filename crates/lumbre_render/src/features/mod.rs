@@ -5,6 +5,7 @@ mod alpha;
 mod display;
 mod fog;
 mod irradiance_volume;
+mod light_counts;
 mod lightmap;
 mod lights;
 mod specular;
@@ -18,6 +19,7 @@ use lumbre_scene::{ObjectTraits, SceneSettings};
 use crate::extract::LightSet;
 use crate::facts::SceneFacts;
 use crate::frame_plan::Ending;
+use crate::light_counter::CountedStages;
 use crate::shader::{DisplayVariant, Feature, Variant};
 use crate::{Display, FrameOptions};
 
@@ -38,6 +40,8 @@ pub(crate) struct FrameFeatures {
     pub clustered: bool,
     /// Colours are made as the target holds them.
     pub display: Option<DisplayVariant>,
+    /// Where lights are counted: nowhere, unless the frame is measured so.
+    pub counted: CountedStages,
 }
 
 impl FrameFeatures {
@@ -61,6 +65,7 @@ impl FrameFeatures {
             lights,
             clustered: lights.are_clustered(options.light_lists),
             display: (ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target)),
+            counted: CountedStages::default(),
         }
     }
 }
@@ -98,6 +103,7 @@ pub(crate) fn variant(object: &ObjectTraits, settings: &SceneSettings, frame: &F
         lightmap::call,
         irradiance_volume::call,
         lights::call,
+        light_counts::call,
         specular::call,
         specular_antialiasing::call,
         fog::call,

@@ -11,8 +11,13 @@ pub(crate) fn compile(
     flags: &[(&str, bool)],
 ) -> Result<wgpu::ShaderModule, RenderError> {
     let variant = || flags.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect::<Vec<_>>().join(" ");
-    let source = to_wgsl(root, flags)
+    let mut source = to_wgsl(root, flags)
         .map_err(|error| RenderError::Shader { variant: variant(), message: error.to_string() })?;
+    let on = |name: &str| flags.contains(&(name, true));
+    let early = device.features().contains(wgpu::Features::SHADER_EARLY_DEPTH_TEST);
+    if on("COUNT_LIGHTS") && !on("ALPHA_MASK") && early {
+        source = tested_early(&source).into();
+    }
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(root),
@@ -24,23 +29,34 @@ pub(crate) fn compile(
     }
 }
 
+/// WGSL whose fragments are tested for depth before they run, as those are that write no buffer: they would run where something nearer hides them, and be counted. What discards fragments
+/// is tested afterwards, since a depth that is written before stays.
+fn tested_early(source: &str) -> String {
+    source.replace("@fragment", "@early_depth_test(force) @fragment")
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use lumbre_optics::{ReflectionModel, Shading};
 
-    use super::to_wgsl;
+    use super::{tested_early, to_wgsl};
     use crate::shader::{Feature, Variant};
 
     /// The WGSL of a variant, which naga accepts.
     fn valid(variant: &Variant) -> Arc<str> {
-        let source = to_wgsl("forward", &variant.flags()).unwrap();
+        let mut source = to_wgsl("forward", &variant.flags()).unwrap();
+        if variant.has(Feature::CountLights) {
+            source = tested_early(&source).into();
+            assert_eq!(source.matches("@early_depth_test(force) @fragment").count(), 1, "{source}");
+        }
         let module = match naga::front::wgsl::parse_str(&source) {
             Ok(module) => module,
             Err(error) => panic!("{variant}: {}", error.emit_to_string(&source)),
         };
-        let capabilities = naga::valid::Capabilities::default();
+        let mut capabilities = naga::valid::Capabilities::default();
+        capabilities.set(naga::valid::Capabilities::EARLY_DEPTH_TEST, source.contains("@early_depth_test"));
         let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
         if let Err(error) = validator.validate(&module) {
             panic!("{variant}: {}", error.emit_to_string(&source));
@@ -119,6 +135,8 @@ mod tests {
             "tone_curve",
             "probe",
             "ambient_cube",
+            "atomic",
+            "contributing",
         ] {
             assert!(!plain.contains(word), "{word} is left in:\n{plain}");
         }

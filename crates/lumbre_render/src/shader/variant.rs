@@ -136,6 +136,8 @@ features! {
     InverseSquareSpots = 53 => "INVERSE_SQUARE_SPOTS",
     /// Samples an irradiance volume.
     IrradianceVolume = 54 => "IRRADIANCE_VOLUME",
+    /// Counts the lights that it tests and those that contribute.
+    CountLights = 55 => "COUNT_LIGHTS",
 }
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
@@ -169,7 +171,8 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::Shadows as u64
     | Feature::ShadowCubes as u64
     | Feature::ShadowCascades as u64
-    | Feature::SoftShadows as u64;
+    | Feature::SoftShadows as u64
+    | Feature::CountLights as u64;
 
 /// Features that make a colour differ from place to place on a surface, or from its front to its back.
 const VARYING: u64 = Feature::Lights as u64
@@ -281,6 +284,7 @@ impl Variant {
                 | Feature::SpecularAntialiasing as u64
                 | Feature::LocalViewer as u64
                 | Feature::EnergyKeeping as u64
+                | Feature::CountLights as u64
                 | Feature::Matt as u64);
             if by_volume {
                 // It lights the normals of a map, and makes no highlight.

@@ -80,6 +80,13 @@ pub(crate) struct CasterPipelines {
     pub clear: wgpu::RenderPipeline,
 }
 
+impl CasterPipelines {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        [&self.caster, &self.clear].len()
+    }
+}
+
 /// The maps themselves, and how they are bound.
 #[derive(Debug)]
 pub(crate) struct OnDevice {

@@ -1,0 +1,10 @@
+//! Counts of lights, where a frame is measured so and the device can: in the stage that evaluates the lights.
+
+use super::Subject;
+use crate::shader::{Feature, Variant};
+
+pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
+    let counted = subject.frame.counted;
+    let counts = if subject.is_lit_per_vertex() { counted.vertices } else { counted.fragments };
+    variant.set(Feature::CountLights, counts);
+}

@@ -1,0 +1,181 @@
+//! Counts of lights that passes make while they draw, and their way back to memory: for frames that are measured so ([`Measure::Lights`](crate::Measure)), and for no others. What is counted is
+//! `shaders/light_counts.wesl`'s.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use crate::Gpu;
+use crate::accounting::LightCount;
+use crate::extract::LitPass;
+
+/// Bytes between the counts of two passes: bound with an offset, which is a multiple of this on every device.
+const STRIDE: u64 = 256;
+/// Four words for each pass: tested and contributing, 64 bits each.
+const WORDS: usize = 4;
+/// Frames whose counts may be on their way at once.
+const MOST_ON_THE_WAY: usize = 4;
+/// Storage buffers that a variant with every feature reads; one more counts.
+const OTHER_STORAGE_BUFFERS: u32 = 8;
+
+const WAITING: u8 = 0;
+const ARRIVED: u8 = 1;
+const FAILED: u8 = 2;
+
+/// The shader stages in which lights are counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct CountedStages {
+    /// Of flat and Gouraud shading.
+    pub vertices: bool,
+    /// Of Phong shading.
+    pub fragments: bool,
+}
+
+/// The counts of one frame, by pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct PassCounts([LightCount; LitPass::ALL.len()]);
+
+/// What passes count into, and copies of it that are on their way.
+#[derive(Debug, Default)]
+pub(crate) struct LightCounter {
+    counts: Option<wgpu::Buffer>,
+    free: Vec<wgpu::Buffer>,
+    on_the_way: Vec<Copied>,
+}
+
+#[derive(Debug)]
+struct Copied {
+    frame: u64,
+    buffer: wgpu::Buffer,
+    state: Arc<AtomicU8>,
+}
+
+impl CountedStages {
+    /// What a device can count in, and why not in all.
+    pub fn of(gpu: &Gpu) -> (Self, Vec<String>) {
+        let downlevel = gpu.adapter.get_downlevel_capabilities().flags;
+        let room = gpu.device.limits().max_storage_buffers_per_shader_stage > OTHER_STORAGE_BUFFERS;
+        let fragments = room && downlevel.contains(wgpu::DownlevelFlags::FRAGMENT_WRITABLE_STORAGE);
+        let vertices = room && gpu.device.features().contains(wgpu::Features::VERTEX_WRITABLE_STORAGE);
+        let early = gpu.device.features().contains(wgpu::Features::SHADER_EARLY_DEPTH_TEST);
+        let mut notes = Vec::new();
+        if !room {
+            notes.push(
+                "lights are not counted: the device allows no storage buffer more in a shader".to_owned(),
+            );
+        } else if !fragments {
+            notes.push(
+                "lights are not counted under Phong shading: the device's fragments write no storage buffers"
+                    .to_owned(),
+            );
+        } else if !early {
+            notes.push(
+                "lights of fragments that something nearer hides are counted too: the device was made without SHADER_EARLY_DEPTH_TEST"
+                    .to_owned(),
+            );
+        }
+        if room && !vertices {
+            notes.push(
+                "lights are not counted under flat and Gouraud shading: the device was made without VERTEX_WRITABLE_STORAGE"
+                    .to_owned(),
+            );
+        }
+        (Self { vertices, fragments }, notes)
+    }
+}
+
+impl PassCounts {
+    /// Those of the pass of this name, if it draws lit surfaces.
+    pub fn of(&self, pass: &str) -> Option<LightCount> {
+        LitPass::ALL.into_iter().find(|lit| lit.name() == pass).map(|lit| self.0[lit as usize])
+    }
+
+    fn read(bytes: &[u8]) -> Self {
+        let of = |pass: LitPass| {
+            let begin = pass as usize * STRIDE as usize;
+            let words: [u64; WORDS] = std::array::from_fn(|word| {
+                let at = begin + 4 * word;
+                u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
+            });
+            LightCount { tested: words[0] | words[1] << 32, contributing: words[2] | words[3] << 32 }
+        };
+        Self(LitPass::ALL.map(of))
+    }
+}
+
+impl LightCounter {
+    /// Makes the buffer, if it is not there yet, and sets all counts to 0.
+    pub fn begin(&mut self, gpu: &Gpu) {
+        let counts = self.counts.get_or_insert_with(|| {
+            let usage =
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+            buffer(gpu, "light counts", usage)
+        });
+        gpu.queue.write_buffer(counts, 0, &[0; (STRIDE as usize) * LitPass::ALL.len()]);
+    }
+
+    /// The counts of a pass, as they are bound; nothing before [`begin`](Self::begin).
+    pub fn binding(&self, pass: LitPass) -> Option<wgpu::BufferBinding<'_>> {
+        let (offset, size) = (pass as u64 * STRIDE, wgpu::BufferSize::new(4 * WORDS as u64));
+        self.counts.as_ref().map(|buffer| wgpu::BufferBinding { buffer, offset, size })
+    }
+
+    /// The counts and a buffer to copy them to, within the frame's own commands; nothing if too many are on their way.
+    pub fn copy(&mut self, gpu: &Gpu) -> Option<[wgpu::Buffer; 2]> {
+        let counts = self.counts.clone().filter(|_| self.on_the_way.len() < MOST_ON_THE_WAY)?;
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let copy = self.free.pop().unwrap_or_else(|| buffer(gpu, "light counts on their way", usage));
+        Some([counts, copy])
+    }
+
+    /// After a frame was submitted: asks for the copy of its counts.
+    pub fn send_for(&mut self, frame: u64, copy: wgpu::Buffer) {
+        let state = Arc::new(AtomicU8::new(WAITING));
+        let arrived = Arc::clone(&state);
+        copy.map_async(wgpu::MapMode::Read, .., move |result| {
+            arrived.store(if result.is_ok() { ARRIVED } else { FAILED }, Ordering::Release);
+        });
+        self.on_the_way.push(Copied { frame, buffer: copy, state });
+    }
+
+    /// The counts that have arrived, each with its frame's number. The device has to be polled before, as the graph does.
+    pub fn arrived(&mut self) -> Vec<(u64, PassCounts)> {
+        let mut arrived = Vec::new();
+        while let Some(first) = self.on_the_way.first()
+            && first.state.load(Ordering::Acquire) != WAITING
+        {
+            let copied = self.on_the_way.remove(0);
+            if copied.state.load(Ordering::Acquire) == FAILED {
+                continue;
+            }
+            if let Ok(bytes) = copied.buffer.get_mapped_range(..) {
+                arrived.push((copied.frame, PassCounts::read(&bytes)));
+            }
+            copied.buffer.unmap();
+            self.free.push(copied.buffer);
+        }
+        arrived
+    }
+}
+
+fn buffer(gpu: &Gpu, label: &str, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    let size = STRIDE * LitPass::ALL.len() as u64;
+    let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+    gpu.device.create_buffer(&descriptor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_64_bits_and_stand_by_their_pass() {
+        let mut bytes = vec![0; 3 * STRIDE as usize];
+        bytes[STRIDE as usize..][..16]
+            .copy_from_slice(&[1, 0, 0, 0, 2, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0]);
+        let counts = PassCounts::read(&bytes);
+        let forward = LightCount { tested: (2 << 32) + 1, contributing: 0xffff_ffff };
+        assert_eq!(counts.of("forward"), Some(forward));
+        assert_eq!(counts.of("lightmap"), Some(LightCount::default()));
+        assert_eq!(counts.of("display"), None);
+    }
+}

@@ -1,0 +1,87 @@
+//! Lights are counted where a device can: one that cannot says why, and draws the frame all the same.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use lumbre_mesh::shapes;
+use lumbre_optics::{Light, Material, Shading};
+use lumbre_render::{
+    Accounting, FrameOptions, Gpu, LightCount, Measure, Offscreen, OffscreenFormat, Renderer, wgpu,
+};
+use lumbre_scene::{Camera, Mesh, Transform};
+
+const SIDE: u32 = 32;
+const PIXELS: u64 = (SIDE * SIDE) as u64;
+
+/// The device of the tests' machine with these features, and so many storage buffers in a shader.
+fn device(features: wgpu::Features, storage_buffers: u32) -> Gpu {
+    let whole = Gpu::headless().unwrap();
+    let required_limits =
+        wgpu::Limits { max_storage_buffers_per_shader_stage: storage_buffers, ..wgpu::Limits::default() };
+    let descriptor =
+        wgpu::DeviceDescriptor { required_features: features, required_limits, ..Default::default() };
+    let (device, queue) = pollster::block_on(whole.adapter.request_device(&descriptor)).unwrap();
+    Gpu::from_parts(whole.instance.clone(), whole.adapter.clone(), device, queue).unwrap()
+}
+
+/// A wall that fills the view under one light, and another behind it that is hidden.
+fn account(gpu: &Gpu, shading: Shading) -> Accounting {
+    let mut world = World::new();
+    for z in [0.0, -1.0] {
+        let upright = Transform::from_xyz(0.0, 0.0, z).looking_at(DVec3::new(0.0, -1.0, z), DVec3::Z);
+        world.spawn((Mesh::from(shapes::plane(20.0, 20.0, 1, 1)), Material::matt(Vec3::ONE), upright));
+    }
+    world.spawn((Light::directional(Vec3::ONE), Transform::IDENTITY));
+    world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 5.0)));
+    let target = Offscreen::new(gpu, SIDE, SIDE, OffscreenFormat::Rgba8).unwrap();
+    let options =
+        FrameOptions { measure: Measure::Lights, shading: Some(shading), ..FrameOptions::default() };
+    let mut renderer = Renderer::new(gpu);
+    renderer.render(&mut world, &target.target(), &options).unwrap();
+    renderer.wait().unwrap();
+    gpu.check().unwrap();
+    assert!(
+        target.read_rgba8(gpu).unwrap().chunks_exact(4).all(|pixel| pixel[0] > 100),
+        "the frame is drawn"
+    );
+    renderer.accounting().unwrap().clone()
+}
+
+fn forward(accounting: &Accounting) -> Option<LightCount> {
+    accounting.passes.iter().find(|pass| pass.pass == "forward").unwrap().lights
+}
+
+fn says(accounting: &Accounting, what: &str) -> bool {
+    accounting.notes.iter().any(|note| note.contains(what))
+}
+
+#[test]
+fn without_room_for_one_more_buffer_nothing_is_counted() {
+    let gpu = device(wgpu::Features::empty(), 8);
+    for shading in [Shading::Phong, Shading::Gouraud] {
+        let accounting = account(&gpu, shading);
+        assert_eq!(forward(&accounting), None);
+        assert!(says(&accounting, "no storage buffer more"), "{:?}", accounting.notes);
+        // Nor are there timestamps: waiting stands for the passes.
+        assert!(says(&accounting, "TIMESTAMP_QUERY") && accounting.passes_ms.is_none());
+        assert!(accounting.remainder_ms().unwrap() < accounting.wall_ms.unwrap());
+    }
+}
+
+#[test]
+fn without_writes_in_vertices_fragments_count_and_without_early_tests_hidden_ones_too() {
+    let bare = device(wgpu::Features::empty(), 9);
+    let phong = account(&bare, Shading::Phong);
+    let tested = forward(&phong).unwrap().tested;
+    assert!((PIXELS..=2 * PIXELS).contains(&tested), "{tested}");
+    assert!(says(&phong, "VERTEX_WRITABLE_STORAGE") && says(&phong, "SHADER_EARLY_DEPTH_TEST"));
+    assert_eq!(forward(&account(&bare, Shading::Gouraud)), None);
+    // With both, nothing is to be said of it.
+    let features = wgpu::Features::VERTEX_WRITABLE_STORAGE | wgpu::Features::SHADER_EARLY_DEPTH_TEST;
+    let whole = device(features, 9);
+    let phong = account(&whole, Shading::Phong);
+    assert_eq!(forward(&phong).unwrap(), LightCount { tested: PIXELS, contributing: PIXELS });
+    assert!(!says(&phong, "lights") && !says(&phong, "counted"), "{:?}", phong.notes);
+    assert!(forward(&account(&whole, Shading::Gouraud)).unwrap().tested > 0);
+}
