@@ -288,10 +288,10 @@ fn light_that_changes_or_moves_is_seen() {
         assert!(pixels == draw(&mut world, SIZE as u32, SIZE as u32, &linear()).0, "change {number}");
         // All marks alike change weights, and no light.
         assert_eq!(pixels != former, number != 3, "change {number}: is it seen?");
-        assert!(report.statistics.uploads.textures > 0, "change {number}");
+        assert!(report.statistics.uploads.irradiance_volumes > 0, "change {number}");
         former = pixels;
         let (again, report) = canvas.draw(&mut world, &linear());
-        assert!(again == former && report.statistics.uploads.textures == 0);
+        assert!(again == former && report.statistics.uploads.irradiance_volumes == 0);
     }
 }
 
@@ -476,7 +476,9 @@ fn volumes_leave_what_has_lightmaps_alone() {
     place(&mut world, varied(UVec3::new(2, 2, 2), 9));
     let (with, report) = mapped(&mut world);
     assert!(with == without && report.census.lit_by_volume == 0);
-    assert_eq!(report.statistics.uploads.textures, 4 * 8, "the lightmap of four texels, and nothing else");
+    let uploads = report.statistics.uploads;
+    let pictures = (uploads.lightmaps, uploads.irradiance_volumes, uploads.textures);
+    assert_eq!(pictures, (4 * 8, 0, 0), "the lightmap of four texels, and nothing else");
     // A lightmap that is switched off is no call for the volume either.
     let off = FrameOptions { lightmaps: false, ..linear() };
     let (_, report) = draw(&mut world, SIZE as u32, SIZE as u32, &off);

@@ -33,6 +33,15 @@ impl SurfaceMaterial {
         self.textures.is_some() || !self.mesh.colors.is_empty()
     }
 
+    /// Whether nothing of it reflects light.
+    pub fn is_black(&self) -> bool {
+        let Material { front, back, unlit, .. } = &self.material;
+        let metallic = self.textures.as_ref().is_some_and(|textures| textures.metallic_roughness.is_some());
+        let black =
+            front.diffuse == Vec3::ZERO && back.as_ref().is_none_or(|back| back.diffuse == Vec3::ZERO);
+        *unlit || (black && !metallic)
+    }
+
     /// Whether its emission changes over a triangle.
     pub fn emission_varies(&self) -> bool {
         self.textures.as_ref().is_some_and(|textures| textures.emissive.is_some())

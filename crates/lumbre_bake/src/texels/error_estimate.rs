@@ -222,7 +222,8 @@ impl Checks {
 
 /// The mean difference between patches and real bounces: of a map, in terms of its light by bounces, where many checks tell it well;
 /// and beyond that around each texel. The real bounces read patches too, one bounce later: of a difference d about d ρ/(1 - ρ)
-/// stays, with the scene's mean reflectance ρ.
+/// stays, with the scene's mean reflectance ρ. Samples that read a texel, which is the mean of such samples after one bounce more, have ρ times as much
+/// of it, though nothing of the difference itself: of all checks together, a share s of which is of patches, s d is found, and (s + (1 - s) ρ) d ρ/(1 - ρ) stays.
 pub(crate) fn patch_bias(
     surroundings: &Surroundings<'_>,
     texels: &[Texel],
@@ -230,7 +231,7 @@ pub(crate) fn patch_bias(
     raw: &[Estimates],
     reflectance: f64,
 ) -> Vec<PatchBias> {
-    let later = (reflectance / (1.0 - reflectance)).powi(2);
+    let later = reflectance / (1.0 - reflectance);
     let maps = texels.iter().map(|texel| texel.object as usize + 1).max().unwrap_or(0);
     let mut of_maps = vec![Checks::default(); maps];
     let checked: Vec<Checks> =
@@ -246,7 +247,7 @@ pub(crate) fn patch_bias(
             known * mean * checks.count / checks.light.max(DVec3::splat(f64::MIN_POSITIVE))
         })
         .collect();
-    let around = |(texel, sums): (&Texel, [f32; 8])| {
+    let around = |((texel, own), sums): ((&Texel, &Gathered), [f32; 8])| {
         let checks = Checks::from_numbers(sums);
         if checks.count < 2.0 {
             return Unsmoothed::default();
@@ -259,11 +260,15 @@ pub(crate) fn patch_bias(
         // What is taken away has come by chance in part.
         let unknown = unknown + known * known * by_chance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
-        let later = later * square(correction);
+        // What reads of texels bring again of what the patches have left in them, beside what the patches leave themselves.
+        let share = own.patch_share();
+        let again = ((share + (1.0 - share) * reflectance) / share).powi(2);
+        let later = again * later.powi(2) * square(correction);
+        let unknown = unknown * if unknown > 0.0 { again } else { 1.0 };
         Unsmoothed { correction: correction.as_vec3(), unknown: unknown as f32, later: later as f32 }
     };
     let sums = surroundings.sums(|index| checked[index].numbers(), CHECK_RADIUS, 1);
-    let alone: Vec<Unsmoothed> = texels.par_iter().zip(sums).map(around).collect();
+    let alone: Vec<Unsmoothed> = texels.par_iter().zip(gathered).zip(sums).map(around).collect();
     // One neighbourhood's checks tell the square of what is unknown by a single sample, which may be as good as nothing: others' tell it too.
     // With one standard error of their mean, as what is to be known is how large it may be.
     let numbers = |index: usize| [1.0, alone[index].unknown, alone[index].unknown.powi(2)];

@@ -80,6 +80,8 @@ struct Reading {
     error: Vec2,
     /// What the errors of texels' light that was gathered before leave in the mean of many such samples, squared.
     texel_variance: f32,
+    /// Whether the light of a texel was read, and not a patch's.
+    of_texel: bool,
     /// Whether the patch that was read was checked, and by how much it is more than the real bounce.
     checked: bool,
     difference: Vec3,
@@ -93,6 +95,7 @@ impl Reading {
         weight: 0.0,
         error: Vec2::ZERO,
         texel_variance: 0.0,
+        of_texel: false,
         checked: false,
         difference: Vec3::ZERO,
         rays: 0,
@@ -134,6 +137,8 @@ pub(crate) struct Gathered {
     pub patch_errors: Vec2,
     /// Sum over all samples of the squared error that texels' light that was gathered before leaves in their mean.
     pub texel_variances: f32,
+    /// Samples that read such a texel, and no patch.
+    pub texel_reads: u32,
     /// Samples that asked a real bounce beside the patch, the sum of the differences and of their squares.
     pub checks: u32,
     pub differences: Vec3,
@@ -151,6 +156,7 @@ fields!(Gathered {
     weights: [Weights; REPLICATES],
     patch_errors: Vec2,
     texel_variances: f32,
+    texel_reads: u32,
     checks: u32,
     differences: Vec3,
     squared_differences: f32,
@@ -199,6 +205,12 @@ impl Gathered {
     /// "A Ray Tracing Solution for Diffuse Interreflection", 1988).
     pub fn inverse_distance(&self) -> f32 {
         self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
+    }
+
+    /// The share of the samples that read no texel that was gathered before, in (0, 1].
+    pub fn patch_share(&self) -> f64 {
+        let all = (self.samples * REPLICATES as u32).max(1);
+        f64::from((all - self.texel_reads.min(all)).max(1)) / f64::from(all)
     }
 
     /// The squared error that the light read adds to the mean of the replicates: the patches', and that of texels that were gathered before.
@@ -286,6 +298,7 @@ impl RadianceCache<'_> {
             gathered.rays += 1 + u64::from(reading.rays);
             gathered.patch_errors += reading.error;
             gathered.texel_variances += reading.texel_variance;
+            gathered.texel_reads += u32::from(reading.of_texel);
             gathered.checks += u32::from(reading.checked);
             gathered.differences += reading.difference;
             gathered.squared_differences += (reading.difference.element_sum() / 3.0).powi(2);
@@ -336,6 +349,7 @@ impl RadianceCache<'_> {
             let under = self.correlated / last.distance.max(f32::MIN_POSITIVE);
             let share = (cosines.max(0.0) * under * under).min(1.0);
             reading.texel_variance = share * grey * grey * variance;
+            reading.of_texel = true;
             return None;
         }
         reading.error = last.error * grey;

@@ -76,7 +76,8 @@ pub(crate) fn direct_light(
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let asked = open * options.error.powi(2);
     // A sample of sources that share them costs less than a ray of the gather, which has to make up for what is left here.
-    let goal = asked * if shared.is_some() { SHARED_SHARE } else { OWN_SHARE };
+    let gathers = scene.surfaces.iter().any(|surface| !surface.is_black());
+    let goal = asked * if shared.is_some() && gathers { SHARED_SHARE } else { OWN_SHARE };
     let own_goal = if shared.is_some() { 0.5 * goal } else { goal };
 
     let mut again = in_doubt(layout, texels, &direct);
@@ -114,7 +115,7 @@ pub(crate) fn direct_light(
 
 /// Of the squared error asked for, what direct light may have for itself.
 const OWN_SHARE: f64 = 0.35;
-/// The same where sources share samples.
+/// The same where sources share samples, and a gather follows.
 const SHARED_SHARE: f64 = 0.2;
 /// Order of the variance's fall with the samples at straight edges of shadows, as measured.
 const ORDER: f64 = 1.5;
