@@ -320,7 +320,7 @@ pub struct Render {
     /// Writes what each frame went into, by stages, passes and effects: as JSON, or for .txt as text of the last frame.
     #[arg(long, value_name = "OUT.json|OUT.txt")]
     pub timings: Option<PathBuf>,
-    /// Counts the lights that each pass tests, and those that contribute more than 1/255, by one more frame.
+    /// Counts the lights that each pass tests, and those that contribute more than 1/255; draws one more frame for it.
     #[arg(long, requires = "timings")]
     pub count_lights: bool,
 }

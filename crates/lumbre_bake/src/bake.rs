@@ -281,8 +281,9 @@ fn run(
             let gathered = rounds::gather(&cache, receivers, options, &mut watch, &mut report)?;
             report.leaked_rays = scene.leaks.count() - leaked_before;
             let variances = &gathered.variances.expected;
-            let light =
-                watch.during(1.0, || GatheredLight::new(&texels, &gathered.light, variances, &total))?;
+            let light = watch.during(1.0, || {
+                GatheredLight::new(&texels, &gathered.gathered, &gathered.light, variances, &total)
+            })?;
             let cache = RadianceCache { gathered: &light, ..cache };
             let volume =
                 probes::bake(&wanted, &scene, &sources, Some(&cache), options, &mut watch, &mut report)?;
@@ -395,7 +396,7 @@ fn note_seams(
     Ok(())
 }
 
-/// Radius, in texels, of the disc over which the errors that smoothing leaves go together: 4.1 after the first round of the demo level, 5.4 after the
+/// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round of the demo level, 5.4 after the
 /// second.
 const CORRELATED_TEXELS: f32 = 4.5;
 

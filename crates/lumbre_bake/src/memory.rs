@@ -32,7 +32,7 @@ const COVERED: u64 = (size_of::<Texel>()
 /// Of a texel of a map: its light, direct and filled, the fill's two lists with their errors, and its error; or, before that and more, the numbers
 /// that smoothing keeps in rows: estimates with their bias, those of the weighted fit, guides with the noise, products and nearness. Its place
 /// among the covered ones and its surface; its reflectance, and the light that the rounds before have gathered, with its error.
-const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1);
+const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1 + 2);
 
 /// What rows of texels have beside them, in texels.
 fn margins(layout: &LightmapLayout) -> u64 {

@@ -15,7 +15,7 @@ use crate::statistics::{CpuStages, Uploads};
 /// does between passes and before the first, and what belongs to no stage. A frame that was not waited for overlaps with its neighbours, and its parts have no sum.
 ///
 /// By effects the same is cut in another way: [`effects`](Self::effects) sum to all that was spent on the CPU, on the device, and uploaded. What all passes draw with (lists of
-/// lights, buffers, meshes, pipelines of lit surfaces) is [`SCENE`]'s. An effect that is a feature of the lit shaders (spot lights, fog, textures) has no time of its own within
+/// lights, buffers, meshes, textures, irradiance volumes, pipelines of lit surfaces) is [`SCENE`]'s. An effect that is a feature of the lit shaders (spot lights, fog, textures) has no time of its own within
 /// the pass that draws with it: [`effect_costs`](crate::effect_costs()), `lumbre explain --measure`, measures it by leaving it out.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Accounting {
@@ -31,7 +31,7 @@ pub struct Accounting {
     pub between_ms: Option<f64>,
     /// Milliseconds in which the CPU waited for the device.
     pub waiting_ms: Option<f64>,
-    /// Milliseconds of passes that the device ran while the CPU still worked, if it was waited for: at least what passes took longer than the waiting.
+    /// Milliseconds of passes that the device ran while the CPU still worked, if it was waited for: a lower bound, the passes' time less the time of waiting.
     pub overlapped_ms: Option<f64>,
     /// Milliseconds on the device from the first pass's begin to the last one's end.
     pub gpu_ms: Option<f64>,
@@ -291,7 +291,7 @@ impl Accounting {
         if let Some(overlapped) = self.overlapped_ms.filter(|ms| *ms > 0.0) {
             let _ = writeln!(
                 text,
-                "  {overlapped:.3} ms of the passes, which count once, ran while the CPU still worked: the wait was shorter than they"
+                "  {overlapped:.3} ms of the passes, which count once, ran while the CPU still worked: the wait was shorter than the passes"
             );
         }
     }

@@ -60,11 +60,11 @@ impl CountedStages {
         let mut notes = Vec::new();
         if !room {
             notes.push(
-                "lights are not counted: the device allows no storage buffer more in a shader".to_owned(),
+                "lights are not counted: counting needs one storage buffer more than the device allows in a shader stage".to_owned(),
             );
         } else if !fragments {
             notes.push(
-                "lights are not counted under Phong shading: the device's fragments write no storage buffers"
+                "lights are not counted under Phong shading: fragment shaders of this device cannot write storage buffers"
                     .to_owned(),
             );
         } else if !early {

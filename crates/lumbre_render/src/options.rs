@@ -46,7 +46,8 @@ pub enum Measure {
     /// Times, and vertex and fragment invocations.
     TimeAndInvocations,
     /// The same, and how many lights each pass tests and how many of these contribute ([`LightCount`](crate::LightCount)): by shader variants of their own, which count. They draw
-    /// the same picture and take longer, so that the times are not those of the frame.
+    /// the same picture and take longer, so that the times are not those of the frame. A plan that is made without a frame ([`Renderer::explain`](crate::Renderer::explain)) does not
+    /// name them.
     Lights,
 }
 

@@ -428,9 +428,11 @@ impl Renderer {
         let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
+        clock.lap(|cpu| &mut cpu.draws_ms);
         if decision.features.irradiance_volumes {
             self.volumes.upload(world, &self.gpu, self.pipelines.volume_layout(), self.objects.origin);
         }
+        clock.lap(|cpu| &mut cpu.upload_ms);
         let pipelines = &self.pipelines;
         let choose = |wanted: PipelineKey| match former {
             Some(_) if pipelines.get(&wanted).is_none() => pipelines.nearest(&wanted),

@@ -60,7 +60,7 @@ pub struct Uploads {
     pub textures: u64,
     /// Lightmaps.
     pub lightmaps: u64,
-    /// Irradiance volumes.
+    /// Irradiance volumes: their light.
     pub irradiance_volumes: u64,
     /// What effects brought themselves, as [`Effect::work`](crate::effects::Effect::work) counts it.
     pub effects: u64,
@@ -77,7 +77,7 @@ impl Uploads {
             + self.effects
     }
 
-    /// What follows from components of the World, meshes and pictures apart.
+    /// What follows from components of the World, meshes, pictures and volumes apart.
     pub fn components(&self) -> u64 {
         let Self { transforms, materials, instances, lights, light_lists, clusters, shadows, .. } = self;
         transforms + materials + instances + lights + light_lists + clusters + shadows
@@ -164,7 +164,7 @@ pub struct CpuStages {
     pub clusters_ms: f64,
     /// Views of shadow maps, and which of them changed.
     pub shadows_ms: f64,
-    /// Buffers, meshes and bind groups.
+    /// Buffers, meshes, textures, irradiance volumes and bind groups.
     pub upload_ms: f64,
     /// The graph, its passes' commands, and their submission.
     pub encoding_ms: f64,

@@ -62,7 +62,7 @@ fn without_room_for_one_more_buffer_nothing_is_counted() {
     for shading in [Shading::Phong, Shading::Gouraud] {
         let accounting = account(&gpu, shading);
         assert_eq!(forward(&accounting), None);
-        assert!(says(&accounting, "no storage buffer more"), "{:?}", accounting.notes);
+        assert!(says(&accounting, "one storage buffer more"), "{:?}", accounting.notes);
         // Nor are there timestamps: waiting stands for the passes.
         assert!(says(&accounting, "TIMESTAMP_QUERY") && accounting.passes_ms.is_none());
         assert!(accounting.remainder_ms().unwrap() < accounting.wall_ms.unwrap());

@@ -33,9 +33,7 @@ pub enum IrradianceVolumeError {
         resolution: UVec3,
     },
     /// The marks of the probes inside of geometry are not those of its cells.
-    #[error(
-        "it says of {found} probes whether they are inside of geometry, and has {cells}; say it of all of them, or of none"
-    )]
+    #[error("its `inside` has {found} entries for {cells} probes; give one for each of them, or none")]
     Inside {
         /// Marks there are.
         found: usize,
@@ -55,11 +53,13 @@ pub enum IrradianceVolumeError {
     NoPlace,
     /// It is rotated or sheared.
     #[error(
-        "it is rotated; volumes lie along the world's axes: take the rotation of its node, and of those above it, away"
+        "it is rotated; volumes lie along the world's axes: remove the rotation of its node and of the nodes above it"
     )]
     Rotated,
     /// Its box has no thickness.
-    #[error("its box measures {size} m, and a cell at least a nanometre: give its Transform a scale")]
+    #[error(
+        "its box measures {size} m, and every cell must be at least a nanometre thick: give its Transform a scale"
+    )]
     Flat {
         /// Sides of the box, metres.
         size: DVec3,

@@ -83,7 +83,13 @@ impl TexelSamples {
             && patch_errors.is_finite()
             && texel_variances.is_finite()
             && sums.iter().all(|sum| sum.is_finite());
-        finite && direct.variance >= 0.0 && *neglected >= 0.0 && neglected.is_finite()
+        finite
+            && direct.caution >= 0.0
+            && direct.caution <= direct.variance
+            && *texel_variances >= 0.0
+            && direct.variance >= 0.0
+            && *neglected >= 0.0
+            && neglected.is_finite()
     }
 }
 

@@ -6,7 +6,7 @@
 //!   checksum  32 bytes   BLAKE3 of all that follows
 //!   length     u64       bytes of what the rest holds, which is a Zstandard frame: two thirds of it, as most of its digits are noise
 //!   content, identity, sampling, lights (32 bytes each), sky, centre, scale, density
-//!   objects, each: hash, name, box, emission, exitance, layout, texels, each some 150 bytes
+//!   objects, each: hash, name, box, emission, exitance, layout, texels, each some 160 bytes
 //! ```
 //!
 //! Nothing is allocated by a count that the bytes do not hold, nor more than the length; a file that is cut short or damaged is named so.
@@ -27,7 +27,7 @@ use crate::transport::direct::Direct;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
 /// The version of the format: another is not read.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const CHECKSUM: usize = 32;
 /// Of Zstandard: higher ones take longer and save no more.
 const LEVEL: i32 = 1;

@@ -6,7 +6,7 @@
 //!            + smoothing:    half of the replicates smoothed against the other half raw, over the neighbourhood
 //!            + form factors: half the difference of two half solutions, gathered by the texel's own rays
 //!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
-//!            + texels read:  what is expected of the texels that later rounds read, as far as it goes together
+//!            + texels read:  what noise leaves in the texels that later rounds read, as far as it is correlated
 //!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
 //!            + solver:       residual / (1 - rho) of the light by bounces
 //!            + arithmetic:   what cracks as wide as coordinates are rounded let through of all the light
@@ -26,14 +26,14 @@ use crate::transport::direct::Direct;
 
 /// Squared errors of texels, mean of the channels.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Variances {
-    /// As they are stated of single texels.
+pub(crate) struct SquaredErrors {
+    /// An upper estimate, as it is stated of single texels.
     pub cautious: Vec<f32>,
-    /// As they are expected: for sums over many.
+    /// As they are expected: to be added up over many.
     pub expected: Vec<f32>,
 }
 
-impl Variances {
+impl SquaredErrors {
     /// Other squared errors added, of which nothing more is known.
     pub fn with(&self, more: &[f32]) -> Self {
         let sum = |own: &[f32]| own.iter().zip(more).map(|(own, more)| own + more).collect();
@@ -51,7 +51,7 @@ pub(crate) struct GatherErrors<'a> {
     pub gathered: &'a [Gathered],
     pub estimates: &'a [Estimates],
     /// Variance of the mean of each.
-    pub spread: &'a Variances,
+    pub spread: &'a SquaredErrors,
     pub smoothing_bias: &'a [f32],
     pub patch_bias: &'a [PatchBias],
     /// Relative, of the solver.
@@ -73,7 +73,7 @@ const BEYOND: f32 = 1.5;
 /// Variance of every texel's mean. Four replicates alone tell it badly: in one case of seven the mean is further than two of their standard errors
 /// from the truth (Student's t with three degrees of freedom); their neighbours' tell it too. Of a single texel the larger is stated, with so many
 /// standard errors of the neighbours' mean, since rays end where it is small by chance; over many texels the neighbours' mean is right.
-pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> Variances {
+pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -> SquaredErrors {
     let own: Vec<f32> = estimates.par_iter().map(|e| variance(e).element_sum() / 3.0).collect();
     // The replicates of a half are smoothed by the same weights: what those bring by chance, only the halves tell.
     let halves: Vec<f32> = estimates
@@ -90,7 +90,7 @@ pub(crate) fn spread(surroundings: &Surroundings<'_>, estimates: &[Estimates]) -
         (own.max(mean + BEYOND * standard_error([count, sum, squares])), mean)
     };
     let (cautious, expected) = sums.into_par_iter().zip(&own).map(both).unzip();
-    Variances { cautious, expected }
+    SquaredErrors { cautious, expected }
 }
 
 /// Of the mean of so many variances, of which these are the sum and that of the squares: at least that of as many values with three degrees of
@@ -104,7 +104,7 @@ fn standard_error([count, sum, squares]: [f32; 3]) -> f32 {
 
 impl GatherErrors<'_> {
     /// The part of each texel's variance that more rays make smaller.
-    pub fn by_rays(&self) -> Variances {
+    pub fn by_rays(&self) -> SquaredErrors {
         self.spread.with(self.smoothing_bias)
     }
 }
@@ -113,7 +113,7 @@ impl GatherErrors<'_> {
 const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
 
 /// Variance of every covered texel; `light` is the mean of all, W/m², of which cracks may let through.
-pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> Variances {
+pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> SquaredErrors {
     let least = (ARITHMETIC * light).powi(2);
     let of_texel = |(index, direct): (usize, &Direct)| {
         let systematic = gather.map_or(0.0, |gather| {
@@ -131,7 +131,7 @@ pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, li
         (cautious + rest, expected + (rest - direct.caution))
     };
     let (cautious, expected) = direct.par_iter().enumerate().map(of_texel).unzip();
-    Variances { cautious, expected }
+    SquaredErrors { cautious, expected }
 }
 
 /// Texels around one over which checks are put together.
@@ -222,8 +222,8 @@ impl Checks {
 
 /// The mean difference between patches and real bounces: of a map, in terms of its light by bounces, where many checks tell it well;
 /// and beyond that around each texel. The real bounces read patches too, one bounce later: of a difference d about d ρ/(1 - ρ)
-/// stays, with the scene's mean reflectance ρ. Samples that read a texel, which is the mean of such samples after one bounce more, have ρ times as much
-/// of it, though nothing of the difference itself: of all checks together, a share s of which is of patches, s d is found, and (s + (1 - s) ρ) d ρ/(1 - ρ) stays.
+/// stays, with the scene's mean reflectance ρ. Samples that read a texel are not checked: the texel is a mean of samples that were, and so one
+/// bounce later, without d and with ρ times what else stays. Where a share s of a texel's samples read patches, s d is taken away, and of the rest s + (1 - s) ρ stays.
 pub(crate) fn patch_bias(
     surroundings: &Surroundings<'_>,
     texels: &[Texel],
@@ -260,12 +260,14 @@ pub(crate) fn patch_bias(
         // What is taken away has come by chance in part.
         let unknown = unknown + known * known * by_chance;
         let correction = if correction.is_finite() { correction } else { DVec3::ZERO };
-        // What reads of texels bring again of what the patches have left in them, beside what the patches leave themselves.
-        let share = own.patch_share();
-        let again = ((share + (1.0 - share) * reflectance) / share).powi(2);
-        let later = again * later.powi(2) * square(correction);
-        let unknown = unknown * if unknown > 0.0 { again } else { 1.0 };
-        Unsmoothed { correction: correction.as_vec3(), unknown: unknown as f32, later: later as f32 }
+        let later = later.powi(2) * square(correction);
+        let share = 1.0 - own.texel_share();
+        let stays = (share + (1.0 - share) * reflectance).powi(2);
+        Unsmoothed {
+            correction: (share * correction).as_vec3(),
+            unknown: (stays * unknown) as f32,
+            later: (stays * later) as f32,
+        }
     };
     let sums = surroundings.sums(|index| checked[index].numbers(), CHECK_RADIUS, 1);
     let alone: Vec<Unsmoothed> = texels.par_iter().zip(gathered).zip(sums).map(around).collect();

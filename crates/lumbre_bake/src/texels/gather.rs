@@ -1,6 +1,6 @@
 //! The final gather: rays from every texel read the light that leaves what they meet. Direct light there is that of
-//! the texel hit, and so are the bounces before once a round has gathered them; in the first they are the patches', or, where the hit is near and
-//! the patches coarse against it, those of real bounces more. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
+//! the texel hit. From the second round on earlier bounces are read from that texel, too; in the first round they come from its patch, and where a
+//! patch is too coarse for so near a hit the ray goes on. Emission is not read: `direct` has counted it. Not which way rays go, nor what they meet: that is `incident`.
 
 use std::cell::RefCell;
 
@@ -15,7 +15,7 @@ use crate::sampling::Stream;
 use crate::scene::material::Side;
 use crate::transport::direct::Receiver;
 
-/// Independent replicates per texel: their spread is the texel's error.
+/// Independent replicates per texel: their spread is the texel's error, apart from that of what they all read.
 pub(crate) const REPLICATES: usize = 4;
 
 /// One in so many samples asks a real bounce beside the patch that it reads.
@@ -78,7 +78,7 @@ struct Reading {
     weight: f32,
     /// What the patches' errors leave in it.
     error: Vec2,
-    /// What the errors of texels' light that was gathered before leave in the mean of many such samples, squared.
+    /// The variance that this sample adds since the light of the texel that it read is itself uncertain.
     texel_variance: f32,
     /// Whether the light of a texel was read, and not a patch's.
     of_texel: bool,
@@ -135,7 +135,7 @@ pub(crate) struct Gathered {
     pub weights: [Weights; REPLICATES],
     /// Sum over all samples of what the patches' errors add.
     pub patch_errors: Vec2,
-    /// Sum over all samples of the squared error that texels' light that was gathered before leaves in their mean.
+    /// Sum over all samples of the variance that they add since the texels that they read are themselves uncertain.
     pub texel_variances: f32,
     /// Samples that read such a texel, and no patch.
     pub texel_reads: u32,
@@ -207,16 +207,24 @@ impl Gathered {
         self.inverse_distances / (self.samples.max(1) * REPLICATES as u32) as f32
     }
 
-    /// The share of the samples that read no texel that was gathered before, in (0, 1].
-    pub fn patch_share(&self) -> f64 {
-        let all = (self.samples * REPLICATES as u32).max(1);
-        f64::from((all - self.texel_reads.min(all)).max(1)) / f64::from(all)
+    /// The share of the samples that read a texel that was gathered before, in [0, 1].
+    pub fn texel_share(&self) -> f64 {
+        (f64::from(self.texel_reads) / self.count()).min(1.0)
     }
 
-    /// The squared error that the light read adds to the mean of the replicates: the patches', and that of texels that were gathered before.
+    /// What the patches' errors add to the mean of the replicates, each with its sign.
+    pub fn patch_error(&self) -> Vec2 {
+        self.patch_errors / self.count() as f32
+    }
+
+    /// Samples of all replicates; at least one.
+    fn count(&self) -> f64 {
+        f64::from(self.samples.max(1)) * REPLICATES as f64
+    }
+
+    /// The squared error that what was read adds to the mean of the replicates: the patches', and that of texels that were gathered before.
     pub fn squared_read_error(&self) -> f32 {
-        let count = (self.samples.max(1) * REPLICATES as u32) as f32;
-        self.patch_errors.length_squared() / (count * count) + self.texel_variances / count
+        self.patch_error().length_squared() + self.texel_variances / self.count() as f32
     }
 }
 
@@ -343,13 +351,14 @@ impl RadianceCache<'_> {
         reading.light = light + weight * last.indirect;
         let grey = weight.element_sum() / 3.0;
         if let Some(variance) = last.variance {
-            // Of cosine rays, the share that hits what goes together with what this one has hit: the form factor of that disc.
+            // Errors within a disc about the hit are correlated: the share of cosine rays that land in it is its form factor.
             let normal = self.scene.triangles[last.triangle as usize].side_normal(last.side);
             let cosines = -last.direction.dot(normal) * last.direction.dot(receiver.normal);
             let under = self.correlated / last.distance.max(f32::MIN_POSITIVE);
             let share = (cosines.max(0.0) * under * under).min(1.0);
             reading.texel_variance = share * grey * grey * variance;
-            reading.of_texel = true;
+            reading.error = last.error * grey;
+            (reading.of_texel, reading.checked) = (true, false);
             return None;
         }
         reading.error = last.error * grey;

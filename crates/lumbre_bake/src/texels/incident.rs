@@ -49,7 +49,7 @@ pub(super) struct Hit {
     /// Irradiance there: direct, and the texel's or patch's by bounces.
     pub direct: Vec3,
     pub indirect: Vec3,
-    /// The patch's errors in that.
+    /// The patches' errors in that.
     pub error: Vec2,
     /// The squared error of `indirect` where it is that of a texel that was gathered before, and not the patch's.
     pub variance: Option<f32>,
@@ -198,7 +198,10 @@ impl RadianceCache<'_> {
                 false => path.reflectance,
             };
             match self.gathered.at(path.texel) {
-                Some((irradiance, variance)) => (hit.indirect, hit.variance) = (irradiance, Some(variance)),
+                Some(texel) => {
+                    (hit.indirect, hit.error) = (texel.irradiance, texel.patch_error);
+                    hit.variance = Some(texel.variance);
+                }
                 None => {
                     hit.indirect = self.patch_indirect[hit.patch as usize];
                     hit.error = self.patch_error[hit.patch as usize];

@@ -62,8 +62,11 @@ pub(crate) fn direct_light(
     }
     let shared = match cuts.share_samples() {
         true => {
-            let surroundings = Surroundings::new(scene, layout, texels, charts, &cuts.keys());
             let wanted = |place: usize| known(place as u32).is_none();
+            // What is known has no samples that others could be compared with.
+            let keys = cuts.keys().into_iter().enumerate();
+            let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(wanted(place))).collect();
+            let surroundings = Surroundings::new(scene, layout, texels, charts, &groups);
             watch.pass(PASS);
             Some(SharedLight::new(sources, surroundings, &cuts, wanted, options, watch)?)
         }
@@ -75,7 +78,7 @@ pub(crate) fn direct_light(
     let local = LocalLight::new(sources, layout, texels, charts, local, watch)?;
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let asked = open * options.error.powi(2);
-    // A sample of sources that share them costs less than a ray of the gather, which has to make up for what is left here.
+    // Shared samples are cheaper than rays of the gather, so that direct light is held to a smaller share of the error.
     let gathers = scene.surfaces.iter().any(|surface| !surface.is_black());
     let goal = asked * if shared.is_some() && gathers { SHARED_SHARE } else { OWN_SHARE };
     let own_goal = if shared.is_some() { 0.5 * goal } else { goal };

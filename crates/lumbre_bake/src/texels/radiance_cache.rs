@@ -1,4 +1,4 @@
-//! The light that leaves surfaces, as the gather reads it: direct light by texel, bounces by patch. Not where it is asked for: that is `gather`.
+//! The light that leaves surfaces, as the gather reads it: direct light by texel, bounces by patch or, once a round has gathered them, by texel. Not where it is asked for: that is `gather`.
 
 use glam::{Vec2, Vec3};
 
@@ -31,7 +31,7 @@ pub(crate) struct RadianceCache<'a> {
     pub near: &'a [f32],
     /// What the rounds so far have found of the bounces; nothing in the first.
     pub gathered: &'a GatheredLight,
-    /// Within this distance on a surface the errors of `gathered` go together, canonical units.
+    /// Within this distance on a surface the errors of `gathered` are correlated, canonical units.
     pub correlated: f32,
     /// Per texel of all maps, mean reflectance, where it is not the same all over the triangle; NaN elsewhere, or empty.
     pub reflectance: &'a [Vec3],
@@ -42,11 +42,11 @@ pub(crate) struct RadianceCache<'a> {
 }
 
 impl RadianceCache<'_> {
-    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as the patches know it.
+    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as far as it is known.
     pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
         let texel = self.texel_at(triangle, side, at);
-        let gathered = self.gathered.at(texel).map(|(irradiance, _)| irradiance);
+        let gathered = self.gathered.at(texel).map(|texel| texel.irradiance);
         let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch as usize]);
         let direct = self.direct_of(texel);
         let direct = direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch));

@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::allocation::{Allotment, allot_within};
-use super::error_estimate::{GatherErrors, PatchBias, Variances, patch_bias, spread, variances};
+use super::error_estimate::{GatherErrors, PatchBias, SquaredErrors, patch_bias, spread, variances};
 use super::footprint::Texel;
 use super::gather::{Gathered, REPLICATES, RadianceCache};
 use super::kept::Kept;
@@ -23,7 +23,7 @@ use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 const WORTH_RAYS: f64 = 0.1;
 /// A round's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.7;
-/// Of the squared error asked for, what a round aims at: as its estimates are rough, a good deal less than what ends the rounds, as another one would
+/// Of the squared error asked for, what a round aims at: a good deal less than what ends the rounds. Its estimates are rough, and another round would
 /// smooth everything once more.
 const AIM: f64 = 0.55;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
@@ -41,7 +41,7 @@ pub(crate) struct Bounced {
     /// Irradiance by bounces.
     pub light: Vec<Vec3>,
     /// Of what the map then holds.
-    pub variances: Variances,
+    pub variances: SquaredErrors,
     pub gathered: Vec<Gathered>,
 }
 
@@ -150,7 +150,7 @@ pub(crate) fn gather(
         let rest = sum - helped;
         let asked = open * options.error.powi(2);
         let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
-        // Allotted by what is feared of each texel, down to what is expected of all.
+        // Rays are given out by the cautious figures; the goal is one of expected ones.
         let goal = goal * open_sum(texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
@@ -164,8 +164,9 @@ pub(crate) fn gather(
             break (corrected(&estimates, &patch_bias), variances);
         }
         let light = corrected(&estimates, &patch_bias);
-        known =
-            watch.during(0.0, || GatheredLight::new(texels, &light, &unsettled.expected, cache.direct))?;
+        known = watch.during(1.0, || {
+            GatheredLight::new(texels, &gathered, &light, &unsettled.expected, cache.direct)
+        })?;
     };
     report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
     // Without rays: the patches' light, for want of time.

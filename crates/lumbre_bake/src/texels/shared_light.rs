@@ -183,7 +183,7 @@ impl<'a> SharedLight<'a> {
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
             let budget = self.options.effort().budget(places.clone().count() as u64) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
-            // Allotted by what is feared of each, down to what is expected of all.
+            // Samples are given out by the cautious figures; the goal is one of expected ones.
             let feared = summed(&relative.cautious) / left;
             let goal = feared * goal.max(left / MOST_OF_A_ROUND);
             let wanted: Vec<Allotment> =

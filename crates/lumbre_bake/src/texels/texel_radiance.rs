@@ -1,9 +1,10 @@
 //! What is known of the light and the colour of whole texels, for rays that hit them. Not where rays go: that is `incident`.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::footprint::Texel;
+use super::footprint::{Footprint, FootprintPoint, Texel};
+use super::gather::Gathered;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::transport::patches::Patches;
@@ -12,59 +13,79 @@ use crate::transport::patches::Patches;
 /// need no further bounce.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct GatheredLight {
-    /// Per texel of all maps, irradiance by bounces; NaN where it is not known.
-    pub irradiance: Vec<Vec3>,
-    /// Of that, its expected squared error, mean of the channels.
-    pub variance: Vec<f32>,
+    /// Per texel of all maps; NaN irradiance where it is not known.
+    texels: Vec<TexelLight>,
+}
+
+/// Of a texel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TexelLight {
+    /// By bounces, W/m².
+    pub irradiance: Vec3,
+    /// The variance that noise and smoothing leave in that, mean of the channels.
+    pub variance: f32,
+    /// What the patches' errors add to it, each with its sign.
+    pub patch_error: Vec2,
 }
 
 impl GatheredLight {
-    /// `light` and `variances` are those of the covered texels; `direct`, per texel of all maps, is NaN where a texel has more than one light.
-    pub fn new(texels: &[Texel], light: &[Vec3], variances: &[f32], direct: &[Vec3]) -> Self {
-        let mut found = Self { irradiance: vec![Vec3::NAN; direct.len()], variance: vec![0.0; direct.len()] };
+    /// Lists are those of the covered texels; `direct`, per texel of all maps, is NaN where a texel has more than one light.
+    pub fn new(
+        texels: &[Texel],
+        gathered: &[Gathered],
+        light: &[Vec3],
+        variances: &[f32],
+        direct: &[Vec3],
+    ) -> Self {
+        let unknown = TexelLight { irradiance: Vec3::NAN, variance: 0.0, patch_error: Vec2::ZERO };
+        let mut found = vec![unknown; direct.len()];
         for (place, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
-            let index = texel.index as usize;
-            if !direct[index].is_nan() {
-                found.irradiance[index] = light[place];
-                found.variance[index] = variances[place];
+            let (irradiance, variance) = (light[place], variances[place]);
+            let patch_error = gathered[place].patch_error();
+            let finite = irradiance.is_finite() && variance.is_finite() && patch_error.is_finite();
+            if finite && !direct[texel.index as usize].is_nan() {
+                found[texel.index as usize] = TexelLight { irradiance, variance, patch_error };
             }
         }
-        found
+        Self { texels: found }
     }
 
-    /// Of a texel in the row of all maps, the irradiance and its squared error, if they are known.
+    /// That of a texel in the row of all maps, if it is known.
     #[inline]
-    pub fn at(&self, texel: usize) -> Option<(Vec3, f32)> {
-        let irradiance = *self.irradiance.get(texel)?;
-        (!irradiance.x.is_nan()).then(|| (irradiance, self.variance[texel]))
+    pub fn at(&self, texel: usize) -> Option<&TexelLight> {
+        self.texels.get(texel).filter(|texel| !texel.irradiance.x.is_nan())
     }
 }
 
-/// The points of a texel that its reflectance is the mean of, in the unit square: one in each of four columns and of four rows.
+/// The points of a whole texel that its reflectance is the mean of, in the unit square: one in each of four columns and of four rows.
 const POINTS: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
 
-/// Per texel of all maps, the mean reflectance of its front, where a texture makes it differ over the triangle; NaN elsewhere. Empty where that
-/// is nowhere.
+/// Per texel of all maps, the mean reflectance of its front, where a texture makes it differ over the triangle; NaN elsewhere, and where light
+/// passes through some of it, as rays meet the rest alone. Empty where that is nowhere.
 pub(crate) fn mean_reflectances(
     scene: &BakeScene,
     layout: &LightmapLayout,
     patches: &Patches,
     texels: &[Texel],
 ) -> Vec<Vec3> {
+    let at_point = |point: &FootprintPoint| {
+        let triangle = &scene.triangles[point.triangle as usize];
+        let surface = &scene.surfaces[triangle.surface as usize];
+        let one_for_all = patches.reflectance(point.triangle, Side::Front).is_some();
+        if scene.stop.is_set() || one_for_all || surface.is_masked() {
+            return None;
+        }
+        let (u, v) = point.at;
+        Some(surface.reflectance(Side::Front, triangle.vertices, [1.0 - u - v, u, v]))
+    };
     let of_texel = |texel: &Texel| -> Option<(u32, Vec3)> {
-        let at_point = |&[x, y]: &[f32; 2]| {
-            let point = texel.point(scene, x, y)?;
-            if scene.stop.is_set() || patches.reflectance(point.triangle, Side::Front).is_some() {
-                return None;
-            }
-            let triangle = &scene.triangles[point.triangle as usize];
-            let (u, v) = point.at;
-            let surface = &scene.surfaces[triangle.surface as usize];
-            Some(surface.reflectance(Side::Front, triangle.vertices, [1.0 - u - v, u, v]))
-        };
         // All or none: beside a surface of one colour, that of the point tells.
-        let found: Option<Vec<Vec3>> = POINTS.iter().map(at_point).collect();
-        Some((texel.index, found?.into_iter().sum::<Vec3>() / POINTS.len() as f32))
+        let found: Option<Vec<Vec3>> = match &texel.footprint {
+            Footprint::Points(points) => points.iter().map(at_point).collect(),
+            _ => POINTS.iter().map(|&[x, y]| at_point(&texel.point(scene, x, y)?)).collect(),
+        };
+        let found = found.filter(|found| !found.is_empty())?;
+        Some((texel.index, found.iter().sum::<Vec3>() / found.len() as f32))
     };
     let found: Vec<(u32, Vec3)> = texels.par_iter().filter_map(of_texel).collect();
     let mut all = if found.is_empty() { Vec::new() } else { vec![Vec3::NAN; layout.texels] };

@@ -232,7 +232,7 @@ fn choices(ui: &mut Ui, facts: &Facts) {
             ("E", "exposure", &exposure),
             ("1 2 3, G", "shading", shading),
             ("R", "reflection", reflection),
-            ("L", "lightmaps", switch(view.lightmaps)),
+            ("L", "baked light", switch(view.lightmaps)),
             ("M", "multisampling", switch(view.multisample)),
             ("T", "torch", switch(facts.torch)),
             ("F", "flight", if facts.is_player { switch(facts.flying) } else { "" }),
