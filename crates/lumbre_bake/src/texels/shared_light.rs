@@ -46,7 +46,7 @@ const MOST_OF_A_ROUND: f64 = 8.0;
 /// A round that leaves more than this of the squared error was the last, and one that leaves so many times what was asked: to smooth
 /// everything once more takes longer than what is left is worth.
 const STALLED: f64 = 0.9;
-const ENOUGH: f64 = 1.3;
+const ENOUGH: f64 = 1.15;
 /// A round's usual share of the time that this one and those after it take.
 const PASS: f32 = 0.6;
 
