@@ -140,9 +140,11 @@ pub(crate) fn gather(
         watch.note_error(report.estimated_error);
         watch.advance(1.0)?;
         let late = !in_time || watch.clock().late();
-        // Of the error, the part that more rays make smaller: what the patches leave stays.
+        // Of the error, the part that more rays make smaller. They read texels and no patches, so that what patches left falls too; what is known of it
+        // by checks stays.
         let unsettled = errors.by_rays();
-        let by_rays = unsettled.relative(local);
+        let read: Vec<f32> = gathered.par_iter().map(Gathered::squared_read_error).collect();
+        let by_rays = unsettled.with(&read).relative(local);
         let helped = open_sum(texels, &by_rays.expected);
         let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
         helped_before = helped;
