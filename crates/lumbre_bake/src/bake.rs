@@ -202,8 +202,9 @@ fn run(
     report.texels = layout.texels;
     report.coverage = texels.len() as f64 / layout.texels.max(1) as f64;
     let side = texel_side(&scene, &texels);
+    let for_patches = options.of_patches(watch.clock().is_past(SHORT));
     let resolution = watch.during(1.0, || {
-        memory::resolution(&scene, &layout, &texels, side, for_samples, options, &mut report)
+        memory::resolution(&scene, &layout, &texels, side, for_samples, &for_patches, &mut report)
     })??;
     let find = |u| Changes::find(&u, &hashes, &objects, &sources, &layout, &texels);
     let changes = watch.during(1.0, || usable.map(find))?;
@@ -218,7 +219,7 @@ fn run(
 
     let change = |changes| Change::new(&sources, &layout, changes, &texels, &charts, &direct);
     let change = watch.during(1.0, || changes.as_ref().map(change))?;
-    let exchange = Exchange::new(&scene, &sources, options, resolution, &mut watch, &mut report)?;
+    let exchange = Exchange::new(&scene, &sources, &for_patches, resolution, &mut watch, &mut report)?;
     let (exchange, changed_patches) = match exchange {
         None => (None, Vec::new()),
         Some((exchange, factors)) => {
@@ -237,7 +238,9 @@ fn run(
         Some(exchange) => {
             watch.stage(Stage::FinalGather, &mut report)?;
             let straddling = watch.during(0.0, || straddling(&layout, &texels, &crossed))?;
-            let [_, samples, _] = options.effort().direct;
+            // What one part sends out is read by many rays of many texels: its noise falls out of their means.
+            let samples =
+                if watch.clock().is_past(SHORT_OF_GATHER) { 1 } else { 2 } * options.effort().direct[0];
             let (divided, rays) = watch
                 .during(0.0, || DividedLight::new(&sources, &texels, &straddling, (samples, options.seed)))?;
             report.rays += rays;
@@ -355,6 +358,11 @@ fn run(
     apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));
     Ok((finish(report, &mut watch), samples))
 }
+
+/// Where more than this share of direct light's time is gone before any light is known, the time is short beside the scene's size.
+const SHORT: f64 = 0.3;
+/// The same of the gather's time, before any ray of it.
+const SHORT_OF_GATHER: f64 = 0.4;
 
 /// Points that the finished map is compared with; none if that is not asked for.
 fn dense_points(

@@ -219,6 +219,11 @@ impl BakeOptions {
         effort
     }
 
+    /// The options for patches and what they exchange: coarse ones where time is `short`, so that the gather gets most of it.
+    pub(crate) fn of_patches(&self, short: bool) -> Self {
+        Self { error: if short { self.error.max(COARSE) } else { self.error }, ..*self }
+    }
+
     /// Names the first option that is out of its range.
     pub(crate) fn check(&self) -> Result<(), BakeError> {
         let wrong = |option, found: String, expected| Err(BakeError::Option { option, found, expected });

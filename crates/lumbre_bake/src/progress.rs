@@ -71,10 +71,10 @@ impl Stage {
         let (name, of_time, of_limit) = match self {
             Self::Layout => ("layout", 0.03, 1.0),
             Self::Hierarchy => ("hierarchy", 0.02, 1.0),
-            Self::DirectLight => ("direct light", 0.2, 0.4),
-            Self::FormFactors => ("form factors", 0.1, 0.5),
-            Self::Radiosity => ("radiosity", 0.05, 0.5),
-            Self::FinalGather => ("final gather", 0.48, 0.85),
+            Self::DirectLight => ("direct light", 0.2, 0.25),
+            Self::FormFactors => ("form factors", 0.1, 0.45),
+            Self::Radiosity => ("radiosity", 0.05, 0.45),
+            Self::FinalGather => ("final gather", 0.48, 0.8),
             Self::Probes => ("probes", 0.05, 0.9),
             Self::Resolution => ("resolution", 0.02, 0.95),
             Self::Texels => ("texels", 0.03, 1.0),
@@ -102,6 +102,19 @@ impl Clock {
     /// The same clock with a share of the limit.
     pub fn until(&self, share: f64) -> Self {
         Self { limit: self.limit.map(|limit| limit.mul_f64(share)), ..*self }
+    }
+
+    /// How many samples of those that are `wanted` there is time for, in all, when the ones that there `are` took so many seconds. Without a limit: all.
+    pub fn affordable(&self, are: u32, wanted: u32, seconds: f64) -> u32 {
+        let Some(limit) = self.limit else { return wanted };
+        let left = (limit.as_secs_f64() - self.seconds()).max(0.0);
+        let more = f64::from(are) * left / seconds.max(1e-6);
+        wanted.min(are.saturating_add(more as u32))
+    }
+
+    /// Whether more than a share of the time is gone. Never, without a limit.
+    pub fn is_past(&self, share: f64) -> bool {
+        self.until(share).late()
     }
 
     /// Whether the time is up.

@@ -57,8 +57,11 @@ pub(crate) fn bake(
     }
     watch.stage(Stage::Probes, report)?;
     let grid = Grid::new(scene, &wanted.moving, options.probe_spacing, &mut report.warnings);
-    let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(options.quality) };
+    let clock = watch.clock();
     let seen: Vec<ProbeSample> = in_chunks_anew(grid.count(), watch, |index| {
+        // A complete volume, whatever time it takes: roughly, once the time is up.
+        let quality = if clock.late() { Quality::Draft } else { options.quality };
+        let light = light::ProbeLight { scene, emitters: &emitters, cache, effort: effort(quality) };
         light.at(grid.position(index), options.seed, index as u32)
     })?;
     report.rays += seen.iter().map(|seen| seen.rays).sum::<u64>();

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::footprint::Texel;
 use super::gather::{Gathered, REPLICATES, RadianceCache};
+use super::smooth::{mean, variance};
 use crate::scene::material::Side;
 
 /// Fewer gathered texels than this say nothing about the others.
@@ -20,12 +21,15 @@ pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered
     let grey = |light: Vec3| f64::from(light.element_sum()) / 3.0;
     let (mut apart, mut all, mut count) = (0.0, 0.0, 0u32);
     for (texel, own) in texels.iter().zip(&*gathered).filter(|(_, own)| own.samples > 0) {
-        let mean = own.estimates().iter().copied().sum::<Vec3>() / REPLICATES as f32;
-        apart += (grey(mean) - grey(of_patch(texel))).powi(2);
-        all += grey(mean).powi(2);
+        let estimates = own.estimates();
+        let mean = grey(mean(&estimates));
+        // What chance moved the mean by is no fault of the patch.
+        let by_chance = f64::from(variance(&estimates).element_sum()) / 3.0;
+        apart += (mean - grey(of_patch(texel))).powi(2) - by_chance;
+        all += mean.powi(2) - by_chance;
         count += 1;
     }
-    let off = if count >= ENOUGH && all > 0.0 { (apart / all).sqrt().min(1.0) } else { 1.0 };
+    let off = if count >= ENOUGH && all > 0.0 { (apart.max(0.0) / all).sqrt().min(1.0) } else { 1.0 };
     for (texel, own) in
         texels.iter().zip(gathered).filter(|(texel, own)| own.samples == 0 && !texel.is_hidden())
     {

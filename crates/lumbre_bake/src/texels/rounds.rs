@@ -89,16 +89,10 @@ pub(crate) fn gather(
     let (light, variances) = loop {
         watch.pass(PASS);
         let cache = RadianceCache { gathered: &known, ..*cache };
-        let found = in_chunks_in_time(wanted.len(), watch, |place| {
-            let Allotment { index, samples } = wanted[place];
-            let mut own = gathered[index as usize];
-            cache.gather(&texels[index as usize], &mut own, samples, options.seed);
-            own
-        })?;
-        let in_time = found.len() == wanted.len();
-        for (allotted, own) in wanted.iter().zip(found) {
-            gathered[allotted.index as usize] = own;
+        if round == 0 && options.time.is_some() {
+            wanted = affordable(&cache, texels, wanted, &mut gathered, options, watch)?;
         }
+        let in_time = cast(&cache, texels, &wanted, &mut gathered, options, watch)?;
         if !in_time && round == 0 {
             from_patches(&cache, texels, &mut gathered);
         }
@@ -176,6 +170,51 @@ pub(crate) fn gather(
     let cast: u64 = cast.map(|own| u64::from(own.samples) * REPLICATES as u64).sum();
     report.gather_rays = cast as f64 / open;
     Ok(Bounced { light, variances, gathered })
+}
+
+/// Casts the samples that are wanted; whether there was time for all of them.
+fn cast(
+    cache: &RadianceCache<'_>,
+    texels: &[Texel],
+    wanted: &[Allotment],
+    gathered: &mut [Gathered],
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+) -> Result<bool, BakeError> {
+    let found = in_chunks_in_time(wanted.len(), watch, |place| {
+        let Allotment { index, samples } = wanted[place];
+        let mut own = gathered[index as usize];
+        cache.gather(&texels[index as usize], &mut own, samples, options.seed);
+        own
+    })?;
+    let in_time = found.len() == wanted.len();
+    for (allotted, own) in wanted.iter().zip(found) {
+        gathered[allotted.index as usize] = own;
+    }
+    Ok(in_time)
+}
+
+/// Casts one sample everywhere, and says how many of those that are wanted there is time for: a little everywhere is worth more than much in
+/// the first maps and nothing in the last.
+fn affordable(
+    cache: &RadianceCache<'_>,
+    texels: &[Texel],
+    mut wanted: Vec<Allotment>,
+    gathered: &mut [Gathered],
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Allotment>, BakeError> {
+    let once: Vec<Allotment> = wanted.iter().map(|own| Allotment { samples: 1, ..*own }).collect();
+    let begun = watch.seconds();
+    if !cast(cache, texels, &once, gathered, options, watch)? {
+        // Where one was too much, those without any are the ones that are left.
+        wanted.retain(|own| gathered[own.index as usize].samples == 0);
+        return Ok(wanted);
+    }
+    let (clock, seconds) = (watch.clock(), watch.seconds() - begun);
+    wanted.iter_mut().for_each(|own| own.samples = clock.affordable(1, own.samples, seconds));
+    wanted.retain(|own| own.samples > 1);
+    Ok(wanted)
 }
 
 /// The estimates without what is known to be the patches' fault.

@@ -108,15 +108,27 @@ impl<'a> SharedLight<'a> {
         let texels = surroundings.texels;
         let [first, most] = options.effort().shared.map(|samples| samples.div_ceil(REPLICATES as u32));
         let mut light = Self { sources, texels, cuts, surroundings, options, first, most, found: Vec::new() };
-        // A complete map first, whatever time it takes.
-        let clock = watch.clock();
+        // A complete map first, whatever time it takes; where that is limited, roughly.
+        let begun = watch.seconds();
+        let few = if options.time.is_some() { 1 } else { first };
         light.found = in_chunks(texels.len(), watch, |place| {
             let mut own = Shared::default();
             if wanted(place) {
-                light.add(place, &mut own, if clock.late() { 1 } else { first });
+                light.add(place, &mut own, few);
             }
             own
         })?;
+        let samples = watch.clock().affordable(few, first, watch.seconds() - begun);
+        if samples > few {
+            let more = in_chunks_in_time(texels.len(), watch, |place| {
+                let mut own = light.found[place];
+                if wanted(place) {
+                    light.add(place, &mut own, samples);
+                }
+                own
+            })?;
+            light.found.splice(..more.len(), more);
+        }
         Ok(light)
     }
 
