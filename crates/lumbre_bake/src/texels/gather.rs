@@ -167,6 +167,8 @@ fields!(Gathered {
 
 /// Variance of weights below which they are all the same.
 const LEAST_SPREAD: f32 = 1e-4;
+/// Samples below which nothing can be said about how light depends on their weights: a line through three explains most of what differs by chance.
+const ENOUGH: f32 = 9.0;
 /// Share of the light's variance that goes with the weights where they are taken out.
 const EXPLAINED: f32 = 0.6;
 
@@ -195,7 +197,7 @@ impl Gathered {
             // From few samples the slope is noise itself: it has to explain most of what differs.
             let explained = grey(together).powi(2) > EXPLAINED * spread * light_spread;
             let slope = together / spread;
-            let known = spread > LEAST_SPREAD * all && explained && slope.is_finite();
+            let known = all >= ENOUGH && spread > LEAST_SPREAD * all && explained && slope.is_finite();
             let slope = if known { slope } else { Vec3::ZERO };
             self.sums[own] / count - slope * (self.weights[own].sum / count - 1.0)
         })
