@@ -1,12 +1,10 @@
 //! Baked scenes: what the baker writes is what the frame shows, in the twin too, and it looks like radiosity.
 
-use std::ops::ControlFlow;
-
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, Density, Quality};
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 use lumbre_scene::{Lightmap, LightmapImage, PackedFormat, SaveOptions, default_camera, load, save_with};
@@ -32,7 +30,7 @@ fn baked_cornell_box() -> Option<World> {
         error: 0.05,
         ..BakeOptions::default()
     };
-    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    Bake::new(&options).run(&mut world).unwrap();
     let camera = default_camera(&mut world, 1.0);
     world.spawn(camera);
     Some(world)
@@ -152,7 +150,7 @@ fn static_lights_of_a_baked_level_are_not_counted_twice() {
     let shaded = center(&mut world);
     let options =
         BakeOptions { density: Density::MapSize(64), quality: Quality::Draft, ..BakeOptions::default() };
-    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    Bake::new(&options).run(&mut world).unwrap();
     assert_eq!(world.query::<&Lightmap>().iter(&world).count(), 1);
     let baked = center(&mut world);
     // One lamp over a convex floor: no bounce, so baked and shaded light are the same but for the texels' width (1/8 m at 1.9 m under

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, UVec3, Vec3};
-use lumbre_bake::{BakeOptions, Density, Probes, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, Density, Probes, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Shading, Surface};
 use lumbre_render::{FrameOptions, explain};
@@ -408,7 +408,7 @@ fn a_ball_takes_the_colour_of_its_surroundings_against_paths() {
         probes: Probes::Automatic,
         ..BakeOptions::default()
     };
-    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    Bake::new(&options).run(&mut world).unwrap();
     let camera = world.spawn((Camera::default(), Transform::IDENTITY)).id();
     // Of the baked room's mean, as a game without a bake would have it.
     let mut errors: Vec<[f64; 2]> = Vec::new();

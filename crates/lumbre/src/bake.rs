@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 use bevy_ecs::world::World;
 use lumbre::bake::{
     BakeError, BakeOptions, BakeReport, Checkpoint, Density, FormFactorMethod, Probes, Quality, Samples,
-    SamplesError, Solver, content_hash, rebake,
+    SamplesError, Solver, content_hash,
 };
 use lumbre::demo::{ATLAS_SIDE, has_light_to_bake};
 use lumbre::scene::{LightmapEncoding, SaveOptions, SceneSettings, Supercompression, save_baked};
@@ -179,10 +179,12 @@ fn interruptible(
     interruption.say(format!("interrupted; {}", how_to_continue(&checkpoint.path)));
     let mut shown = Shown::new(asked.quiet);
     let baked = interruption.told(|is_asked| {
-        rebake(world, options, former, Some(checkpoint), &mut |progress| {
+        let progress = |progress| {
             shown.update(progress);
             if is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
+        };
+        let bake = lumbre::bake::Bake::new(options).former(former).checkpoint(checkpoint).progress(progress);
+        bake.run_keeping_samples(world)
     });
     shown.finish();
     match baked {
@@ -297,6 +299,9 @@ fn summary(report: &BakeReport) -> String {
         report.seconds,
         report.threads,
     );
+    if let Some(parts) = report.error_parts_in_words() {
+        text.push_str(&format!("  {parts}\n"));
+    }
     for place in &report.worst {
         text.push_str(&format!("  {place}\n"));
     }
@@ -318,7 +323,7 @@ fn summary(report: &BakeReport) -> String {
             100.0 * report.resolution.standard_error
         ));
     }
-    for lumbre::bake::ErrorAtTime { seconds, error } in &report.curve {
+    for lumbre::bake::ErrorAtTime { seconds, error, .. } in &report.curve {
         let line = format!("  after {seconds:8.2} s the error was {:.2} %\n", 100.0 * error);
         if !text.ends_with(&line) {
             text.push_str(&line);

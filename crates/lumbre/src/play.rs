@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use lumbre::bake::{BakeOptions, bake};
+use lumbre::bake::{Bake, BakeOptions};
 use lumbre::demo::{self, Opened};
 use lumbre::render::{FrameOptions, Gpu};
 use lumbre::scene;
@@ -104,10 +104,11 @@ fn bake_demo_level(source: &Path, baked: &Path) -> anyhow::Result<()> {
     let (file, Loaded { mut world, .. }) = load_source(source, &Reading::default())?;
     let mut shown = Shown::new(false);
     let options = BakeOptions { error: 0.02, ..BakeOptions::default() };
-    bake(&mut world, &options, &mut |progress| {
+    let progress = |progress| {
         shown.update(progress);
         ControlFlow::Continue(())
-    })?;
+    };
+    Bake::new(&options).progress(progress).run(&mut world)?;
     shown.finish();
     scene::save_baked(&mut world, &file, baked, &scene::SaveOptions::default())?;
     Ok(())

@@ -2,11 +2,10 @@
 //! With a reference it prints the error, with a folder it writes each map as a PNG to look at.
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use bevy_ecs::world::World;
-use lumbre_bake::{BakeOptions, Density, FormFactorMethod, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, Density, FormFactorMethod, Quality};
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -39,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let [input, output] = &paths[..] else { return Err("give an input and an output file".into()) };
     let mut world = held_out::input::world_of(input)?;
-    let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
+    let report = Bake::new(&options).run(&mut world)?;
     eprint!("{report}");
     if let Some(csv) = csv {
         let comparison = common::compare(&mut world, &common::read_reference(&csv));

@@ -6,11 +6,10 @@
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use bevy_ecs::world::World;
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -113,7 +112,7 @@ fn fastest(
         let mut world = World::new();
         lumbre_scene::load(&mut world, model)?;
         let before = processor_seconds();
-        let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()))?;
+        let report = Bake::new(options).run(&mut world)?;
         let times = [report.seconds, processor_seconds() - before];
         if best.as_ref().is_none_or(|(.., least)| times[1] < least[1]) {
             best = Some((report, common::compare(&mut world, points), times));

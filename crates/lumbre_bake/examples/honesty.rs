@@ -5,11 +5,10 @@
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality, TexelErrors};
 use lumbre_scene::Lightmap;
 
 #[path = "../tests/held_out/input.rs"]
@@ -211,7 +210,7 @@ type Maps = Vec<(String, Map)>;
 
 fn baked(input: &Path, options: &BakeOptions) -> Result<(BakeReport, Maps), Box<dyn Error>> {
     let mut world = input::world_of(input)?;
-    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()))?;
+    let report = Bake::new(options).run(&mut world)?;
     let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<(String, Map)> = query
         .iter(&world)

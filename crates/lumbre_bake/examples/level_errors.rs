@@ -8,13 +8,12 @@
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -125,7 +124,7 @@ fn row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
 }
 
 fn baked(world: &mut World, options: &BakeOptions) -> Result<BakeReport, Box<dyn Error>> {
-    Ok(bake(world, options, &mut |_| ControlFlow::Continue(()))?)
+    Ok(Bake::new(options).run(world)?)
 }
 
 /// Those that the tests keep or the cache, or new ones.

@@ -6,10 +6,9 @@
 
 use std::error::Error;
 use std::fmt::Write;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use lumbre_bake::{BakeOptions, BakeReport, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport};
 
 #[path = "../tests/held_out/random.rs"]
 mod random;
@@ -46,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut measured: Vec<Measured> = Vec::new();
     for name in &names {
         let (build, count) = scenes::find(name).ok_or_else(|| format!("{name} is no scene"))?;
-        let report = bake(&mut build(count, 1.0), &options, &mut |_| ControlFlow::Continue(()))?;
+        let report = Bake::new(&options).run(&mut build(count, 1.0))?;
         let kind = name.rsplit_once('_').map_or(name.as_str(), |(kind, _)| kind).to_owned();
         // What is no number of lamps is held against one lamp.
         let like = if kind == "points" { "points" } else { "lamps" };

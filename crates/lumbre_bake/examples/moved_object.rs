@@ -4,12 +4,11 @@
 #![allow(clippy::print_stdout, reason = "a program whose result is text")]
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use bevy_ecs::world::World;
 use glam::DVec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, Samples, TexelErrors, rebake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Samples, TexelErrors};
 use lumbre_scene::{Lightmap, Name, Transform};
 
 #[path = "../tests/held_out/input.rs"]
@@ -81,7 +80,7 @@ fn baked(
     former: Option<&Samples>,
     options: &BakeOptions,
 ) -> Result<(Texels, BakeReport, Option<Samples>), Box<dyn Error>> {
-    let (report, samples) = rebake(&mut world, options, former, None, &mut |_| ControlFlow::Continue(()))?;
+    let (report, samples) = Bake::new(options).former(former).run_keeping_samples(&mut world)?;
     let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
         query.iter(&world).map(|(map, error)| (map.image.clone(), error.0.clone())).collect();

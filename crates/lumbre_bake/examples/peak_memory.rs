@@ -3,12 +3,11 @@
 
 use std::error::Error;
 use std::io::Write;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::world::World;
 use glam::{Vec2, Vec3};
-use lumbre_bake::{BakeOptions, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, Density, Quality};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, StaticObject};
@@ -34,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     wall(&mut panel, 1, Vec3::new(-0.3, 0.9, -0.3), [Vec3::X * 0.6, Vec3::Z * 0.6], Vec2::ZERO, 1.0);
     world.spawn((Mesh(Arc::new(panel)), Material { front: lamp, ..Material::default() }, StaticObject));
     let before = peak()?;
-    let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
+    let report = Bake::new(&options).run(&mut world)?;
     eprint!("{report}");
     writeln!(
         std::io::stdout(),

@@ -68,7 +68,7 @@ fn chunk<T: Send>(
     compute: impl Fn(usize) -> T + Sync,
 ) -> Result<Vec<T>, BakeError> {
     let stop = watch.stop().clone();
-    let one = |index: usize| (!stop.is_set()).then(|| compute(index));
+    let one = |index: usize| (!stop.is_cancelled()).then(|| compute(index));
     let done =
         watch.during(start as f32 / count as f32, || (start..end).into_par_iter().map(one).collect())?;
     // None only if it was stopped, which has ended here already.

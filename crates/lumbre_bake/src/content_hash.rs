@@ -13,7 +13,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
 
-use crate::scene::{Object, PlacedLight, PlacedPrimitive, WantedProbes, collect, lights, sky};
+use crate::scene::{Input, Object, PlacedLight, PlacedPrimitive};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
@@ -46,7 +46,7 @@ impl fmt::Display for ContentHash {
     }
 }
 
-/// The hash of everything that [`bake`](crate::bake) reads of a world and its options, and of the baker itself: static meshes in their
+/// The hash of everything that a [`Bake`](crate::Bake) reads of a world and its options, and of the baker itself: static meshes in their
 /// places, what their materials reflect, emit and let through with the pixels of their textures, the lights that are baked and the sky, all in
 /// the order in which they are baked; and where probes are called for, the box around what moves and which faces shine in real time. A bake does not
 /// change it: the coordinates that it gives to meshes do not count.
@@ -58,10 +58,7 @@ impl fmt::Display for ContentHash {
 /// [`BakeError`] as of a bake: an option out of its range, or a mesh that cannot be read.
 pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentHash, BakeError> {
     options.check()?;
-    let objects = collect(world)?;
-    let placed = lights(world);
-    let wanted = WantedProbes::of(world, &objects);
-    Ok(hashes_of(&objects, &placed, sky(world), &wanted, options).content)
+    Ok(hashes_of(&Input::read(world)?, options).content)
 }
 
 /// The hash of everything, and those of its parts.
@@ -77,20 +74,15 @@ pub(crate) struct Hashes {
 }
 
 /// The hashes of what was collected already.
-pub(crate) fn hashes_of(
-    objects: &[Object],
-    lights: &[PlacedLight],
-    sky: Vec3,
-    wanted: &WantedProbes,
-    options: &BakeOptions,
-) -> Hashes {
+pub(crate) fn hashes_of(input: &Input, options: &BakeOptions) -> Hashes {
+    let Input { objects, lights, sky, wanted_probes: wanted } = input;
     let mut images = Images::default();
     let object_hashes: Vec<ContentHash> =
         objects.iter().map(|object| object_hash(object, &mut images)).collect();
     let light_hashes: Vec<ContentHash> = lights.iter().map(light_hash).collect();
     let mut hasher = Hasher::new("lights");
     hasher.hashes(&light_hashes);
-    hasher.color(&sky);
+    hasher.color(sky);
     let of_lights = hasher.finish();
     let mut hasher = Hasher::new("sampling");
     let of_samples = BakeOptions::default();
@@ -117,7 +109,7 @@ pub(crate) fn hashes_of(
         hasher.number(*numbers.entry(Arc::as_ptr(&part.mesh)).or_insert(next));
     }
     hasher.hashes(&light_hashes);
-    hasher.color(&sky);
+    hasher.color(sky);
     hasher.number(wanted.are(options).is_ok().into());
     if wanted.are(options).is_ok() {
         // Of what moves, the place of the probes' grid.

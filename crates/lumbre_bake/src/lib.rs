@@ -3,23 +3,26 @@
 //! No GPU, no files: `lumbre_scene` loads and saves. Light bounces between patches; texels show it.
 //!
 //! ```text
-//!   World ─► scene ──────────► transport ───────────────────────────► texels ─────────────────► World
-//!            collect objects    patches ─► form factors ─► solver       footprints ─► hidden      uv1
-//!            lay out uv1         (pooled, reciprocal)   (per channel)   direct light              Lightmap E/π
-//!            triangles, BVH     emitters, lights ─► direct light        final gather, rounds
-//!            materials                                                  smooth ─► fill
-//!                                                                      probes: grid ─► light ─► fill ──► IrradianceVolume
+//!   World ─► scene ─────────► transport ──────────────► texels ──────────────► transport ────────► texels ───────────────► World
+//!            Input             emitters, lights          covered texels          patches             radiance cache          uv1
+//!            lightmap layout   (trees, bounds)           direct light            form factors        final gather, rounds    Lightmap E/π
+//!            triangles, BVH                              local light             solver              error ledger            TexelErrors
+//!                                                                                                    smooth ─► fill ─► seams
+//!                                                                                                    probes: grid ─► light ─► fill ─► IrradianceVolume
+//!   checkpoint: what stages have computed, in chunks ─► the same bits after an interruption
 //!   Samples of a former bake ─► rebake: what changed ─► which texels keep their direct light, and their bounces ─► Samples
 //! ```
+//!
+//! [`Bake`] is the entrance; `bake.rs` tells the stages in their order, and docs/baking.md the life of one photon through these folders.
 //!
 //! Everything is computed in canonical units (relative to the scene's centre, scaled by a power of two), with one seed per
 //! texel and patch: the same bits on any number of threads and at any 2^k scale of an emissive scene.
 //!
 //! ```
-//! use std::{ops::ControlFlow, sync::Arc};
+//! use std::sync::Arc;
 //! use bevy_ecs::world::World;
 //! use glam::Vec3;
-//! use lumbre_bake::{BakeOptions, Density, Quality, bake};
+//! use lumbre_bake::{Bake, BakeOptions, Density, Quality};
 //! use lumbre_optics::{BakeMode, Light, Material};
 //! use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
 //!
@@ -29,7 +32,7 @@
 //! let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
 //! world.spawn((lamp, Transform::from_xyz(0.0, 2.0, 0.0)));
 //! let options = BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() };
-//! let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
+//! let report = Bake::new(&options).run(&mut world)?;
 //! assert!(report.mean_irradiance[0] > 0.0);
 //! assert_eq!(world.get::<Lightmap>(floor).map(|map| map.image.width), Some(32));
 //! # Ok::<(), lumbre_bake::BakeError>(())
@@ -37,9 +40,11 @@
 
 mod apply;
 mod bake;
+mod cancel_token;
 mod checkpoint;
 mod chunks;
 mod content_hash;
+mod disjoint_sets;
 mod error;
 mod memory;
 mod notes;
@@ -52,13 +57,14 @@ mod rebake;
 mod report;
 mod sampling;
 mod scene;
-mod stop;
+
 mod texels;
 mod transport;
 mod unwrapped_from;
 
 pub use apply::TexelErrors;
-pub use bake::{bake, bake_with, rebake};
+pub use bake::Bake;
+pub use cancel_token::CancelToken;
 pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};
 pub use error::{BakeError, CheckpointError};
@@ -66,8 +72,8 @@ pub use options::{BakeOptions, Density, FormFactorMethod, Probes, Quality, Solve
 pub use progress::Progress;
 pub use rebake::{Samples, SamplesError};
 pub use report::{
-    BakeReport, Ended, ErrorAtTime, ProbeReport, RebakeReport, ResolutionReport, SeamReport, StageTime,
-    WorstPlace,
+    BakeReport, Ended, ErrorAtTime, ErrorPart, ProbeReport, RebakeReport, ResolutionReport, SeamReport,
+    StageTime, WorstPlace,
 };
 pub use transport::method_study::{FormFactorErrors, form_factor_errors};
 pub use unwrapped_from::UnwrappedFrom;

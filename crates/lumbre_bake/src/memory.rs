@@ -6,6 +6,7 @@ use std::mem::size_of;
 use crate::error::mebibytes;
 use crate::rebake::TexelSamples;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
+use crate::texels::covered_texels::CoveredTexels;
 use crate::texels::footprint::{Footprint, FootprintPoint, Texel};
 use crate::texels::gather::Gathered;
 use crate::texels::lanes::BESIDE_A_ROW;
@@ -92,14 +93,13 @@ pub(crate) fn check_texels(
 /// [`BakeError::Memory`] if the coarsest does not fit.
 pub(crate) fn resolution(
     scene: &BakeScene,
-    layout: &LightmapLayout,
-    texels: &[Texel],
-    texel_side: f32,
+    texels: &CoveredTexels<'_>,
     samples: u64,
     options: &BakeOptions,
     report: &mut BakeReport,
 ) -> Result<Resolution, BakeError> {
     let effort = options.effort();
+    let CoveredTexels { layout, list: texels, side: texel_side, .. } = texels;
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let side = (effort.patch_texels * texel_side).max((2.0 * area / effort.patches as f32).sqrt());
     let mut resolution = Resolution { patch_side: side, form_factor_rays: effort.form_factor_rays };

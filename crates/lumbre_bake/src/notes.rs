@@ -1,11 +1,10 @@
 //! What a bake writes into its report on the way. Not what it computes.
 
 use crate::progress::Watch;
+use crate::texels::direct_light::DirectLight;
+use crate::texels::error_ledger::{ErrorLedger, open_sum, relative_to};
 use crate::texels::footprint::Texel;
-use crate::texels::local_light::LocalLight;
-use crate::texels::rounds::{open_sum, relative_to};
-use crate::transport::direct::Sources;
-use crate::{BakeOptions, BakeReport, ErrorAtTime, RebakeReport};
+use crate::{BakeOptions, BakeReport, ErrorAtTime};
 use glam::Vec3;
 
 /// Ends the last stage.
@@ -33,19 +32,6 @@ pub(crate) fn finish(mut report: BakeReport, watch: &mut Watch<'_>) -> BakeRepor
     report
 }
 
-/// The kinds of light that the scene has none of.
-pub(crate) fn name_what_is_missing(sources: &Sources<'_>, report: &mut BakeReport) {
-    if sources.emitters.is_empty() {
-        report.skipped.push("area light: no surface emits".into());
-    }
-    if !sources.has_sky() {
-        report.skipped.push("sky light: the scene has no sky".into());
-    }
-    if sources.lights.is_empty() {
-        report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());
-    }
-}
-
 /// The mean over the texels that are not hidden.
 pub(crate) fn note_mean(texels: &[Texel], values: &[Vec3], report: &mut BakeReport) {
     let (mut sum, mut count) = (glam::DVec3::ZERO, 0u32);
@@ -56,28 +42,18 @@ pub(crate) fn note_mean(texels: &[Texel], values: &[Vec3], report: &mut BakeRepo
     report.mean_irradiance = (sum / f64::from(count.max(1))).to_array();
 }
 
-/// The error of a map without bounces.
+/// The error of a map without bounces, whose variances are those.
 pub(crate) fn note_direct_error(
     texels: &[Texel],
+    direct: &DirectLight,
     variances: &[f32],
-    local: &LocalLight,
     options: &BakeOptions,
     report: &mut BakeReport,
 ) {
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
-    report.estimated_error = (open_sum(texels, &local.relative(variances)) / open).sqrt();
+    report.estimated_error = (open_sum(texels, &direct.local.relative(variances)) / open).sqrt();
     report.error_of_mean = relative_to(mean, open_sum(texels, variances) / open);
     report.error_reached = report.estimated_error <= options.error;
-}
-
-/// What can be used, or in the report why nothing can.
-pub(crate) fn note_whole<T>(found: Option<Result<T, String>>, report: &mut BakeReport) -> Option<T> {
-    match found? {
-        Ok(found) => Some(found),
-        Err(whole) => {
-            report.rebake = Some(RebakeReport { whole, ..RebakeReport::default() });
-            None
-        }
-    }
+    report.error_parts = ErrorLedger::of_direct_light(direct).parts(texels, &direct.local);
 }

@@ -1,50 +1,84 @@
-//! What comes before the light: where the texels are, and the scene as light meets it. Both have steps that cannot be asked to end and so run apart
-//! from the caller's thread. Not the steps themselves.
+//! What comes before the light: where the texels are, the scene as light meets it, and what shines in it. The first two have steps that cannot be
+//! asked to end and so run apart from the caller's thread. Not the steps themselves.
 
 use std::sync::Arc;
 
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, Object, lay_out_with};
-use crate::{BakeError, BakeOptions};
+use crate::scene::{BakeScene, Canonical, Input, LightmapLayout, lay_out_with};
+use crate::transport::direct::{Sources, shines_inside_only};
+use crate::transport::emitters::{Emitter, coarse_textures, emitters};
+use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Lays out every object, with so many texels per canonical unit.
 ///
 /// # Errors
 /// [`BakeError`] of the layout, or that nobody waits for it.
 pub(crate) fn layout(
-    objects: &Arc<Vec<Object>>,
+    input: &Input,
     space: Canonical,
     density: f64,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
-    warnings: &mut Vec<String>,
+    report: &mut BakeReport,
 ) -> Result<LightmapLayout, BakeError> {
-    let (objects, options, stop) = (Arc::clone(objects), *options, watch.stop().clone());
-    let (layout, more) = watch.apart(0.0, move || {
+    let (objects, options, stop) = (Arc::clone(&input.objects), *options, watch.stop().clone());
+    let (layout, warnings) = watch.apart(0.0, move || {
         let mut warnings = Vec::new();
         (lay_out_with(&objects, space, density, &options, &stop, &mut warnings), warnings)
     })?;
-    warnings.extend(more);
+    report.warnings.extend(warnings);
     layout
 }
 
-/// The scene, with its hierarchy, and the layout again.
+/// The scene, with its hierarchy, the layout again, and the triangles that shine.
 ///
 /// # Errors
 /// [`BakeError`] of the scene, or that nobody waits for it.
 pub(crate) fn scene(
-    objects: &Arc<Vec<Object>>,
+    input: &Input,
     layout: LightmapLayout,
     space: Canonical,
     watch: &mut Watch<'_>,
-    warnings: &mut Vec<String>,
-) -> Result<(BakeScene, LightmapLayout), BakeError> {
-    let (objects, stop) = (Arc::clone(objects), watch.stop().clone());
-    let (scene, layout, more) = watch.apart(0.0, move || {
+    report: &mut BakeReport,
+) -> Result<(BakeScene, LightmapLayout, Vec<Emitter>), BakeError> {
+    let (objects, stop) = (Arc::clone(&input.objects), watch.stop().clone());
+    let (scene, layout, warnings) = watch.apart(0.0, move || {
         let mut warnings = Vec::new();
         let scene = BakeScene::new(&objects, &layout, space, &stop, &mut warnings);
         (scene, layout, warnings)
     })?;
-    warnings.extend(more);
-    Ok((scene?, layout))
+    report.warnings.extend(warnings);
+    let mut scene = scene?;
+    let emitters = watch.during(0.8, || emitters(&scene))?;
+    scene.dark_outside = shines_inside_only(&scene, &emitters, &input.lights, input.sky);
+    report.triangles = scene.triangles.iter().filter(|triangle| !triangle.superseded).count();
+    Ok((scene, layout, emitters))
+}
+
+/// What shines in the scene. The report names the kinds of light that there are none of, and textures that shine in finer detail than is sampled.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn sources<'a>(
+    input: &Input,
+    scene: &'a BakeScene,
+    emitters: Vec<Emitter>,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<Sources<'a>, BakeError> {
+    let sources = watch.during(0.9, || Sources::new(scene, emitters, input.lights.clone(), input.sky))?;
+    if sources.is_empty() {
+        return Ok(sources);
+    }
+    if sources.emitters.is_empty() {
+        report.skipped.push("area light: no surface emits".into());
+    }
+    if !sources.has_sky() {
+        report.skipped.push("sky light: the scene has no sky".into());
+    }
+    if sources.lights.is_empty() {
+        report.skipped.push("punctual light: no point, spot or directional light is static or mixed".into());
+    }
+    report.warnings.extend(watch.during(1.0, || coarse_textures(scene))?);
+    Ok(sources)
 }

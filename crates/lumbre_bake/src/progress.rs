@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::cancel_token::CancelToken;
 use crate::checkpoint::tape::Place;
 use crate::checkpoint::{Record, Tape};
-use crate::stop::Stop;
 use crate::{BakeError, BakeReport, StageTime};
 
 /// How far a bake has come.
@@ -132,19 +132,24 @@ pub(crate) struct Watch<'a> {
     /// From where to where in the running stage the work that reports now leads.
     part: (f32, f32),
     error: Option<f64>,
-    stop: Stop,
+    stop: CancelToken,
     pub tape: Tape,
 }
 
 impl<'a> Watch<'a> {
     pub fn new(callback: &'a mut Callback<'a>, limit: Option<Duration>) -> Self {
         let clock = Clock { begun: Instant::now(), before: 0.0, limit };
-        let (stop, tape) = (Stop::default(), Tape::default());
+        let (stop, tape) = (CancelToken::default(), Tape::default());
         Self { callback, clock, stage: None, part: (0.0, 1.0), error: None, is_cut_short: false, stop, tape }
     }
 
+    /// Ends when this token is cancelled, too.
+    pub fn cancelled_by(self, stop: CancelToken) -> Self {
+        Self { stop, ..self }
+    }
+
     /// What loops look at while [`Watch::during`] waits for them.
-    pub fn stop(&self) -> &Stop {
+    pub fn stop(&self) -> &CancelToken {
         &self.stop
     }
 
@@ -204,7 +209,7 @@ impl<'a> Watch<'a> {
     pub fn advance(&mut self, stage_fraction: f32) -> Result<(), BakeError> {
         let progress = self.progress(stage_fraction);
         if (self.callback)(progress).is_break() {
-            self.stop.set();
+            self.stop.cancel();
         }
         self.unless_stopped()
     }
@@ -221,7 +226,7 @@ impl<'a> Watch<'a> {
             let ask = || {
                 while !done.after(TICK) {
                     if callback(progress).is_break() {
-                        stop.set();
+                        stop.cancel();
                         return;
                     }
                 }
@@ -296,7 +301,7 @@ impl<'a> Watch<'a> {
     }
 
     fn unless_stopped(&mut self) -> Result<(), BakeError> {
-        if self.stop.is_set() { self.cancelled() } else { Ok(()) }
+        if self.stop.is_cancelled() { self.cancelled() } else { Ok(()) }
     }
 
     /// The running stage; the first one before any has begun.
@@ -364,7 +369,7 @@ mod tests {
         let stop = watch.stop().clone();
         let begun = Instant::now();
         let ended = watch.during(0.25, || {
-            while !stop.is_set() && begun.elapsed() < Duration::from_secs(60) {
+            while !stop.is_cancelled() && begun.elapsed() < Duration::from_secs(60) {
                 std::thread::sleep(Duration::from_millis(1));
             }
         });

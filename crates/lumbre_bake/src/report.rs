@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The time of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StageTime {
     /// What was done, in words.
     pub stage: String,
@@ -13,6 +14,7 @@ pub struct StageTime {
 
 /// How good the lightmap was after some time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ErrorAtTime {
     /// Wall-clock seconds since the bake began, those of a bake that it continues included.
     pub seconds: f64,
@@ -20,8 +22,19 @@ pub struct ErrorAtTime {
     pub error: f64,
 }
 
+/// A part of a lightmap's error.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ErrorPart {
+    /// Where it comes from, in words.
+    pub what: String,
+    /// Estimated RMSE, relative to the light around each texel. The squares of all parts add up to that of the whole.
+    pub error: f64,
+}
+
 /// The probes of a bake; all zeros without any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ProbeReport {
     /// Probes along x, y and z.
     pub resolution: [u32; 3],
@@ -35,6 +48,7 @@ pub struct ProbeReport {
 
 /// How far a bilinear look-up in the map is from what arrives at points of the surfaces, sampling apart; zeros where it was not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ResolutionReport {
     /// Points at which it was measured, spread evenly over the surfaces.
     pub points: usize,
@@ -46,6 +60,7 @@ pub struct ResolutionReport {
 
 /// A part of the level where the estimated error is larger than that of the whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct WorstPlace {
     /// The middle of its texels, metres, in the world.
     pub center: [f64; 3],
@@ -67,6 +82,7 @@ impl std::fmt::Display for WorstPlace {
 
 /// What closing the seams did. Relative to the mean irradiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SeamReport {
     /// Pairs of edges that lie in one place, join smoothly and have lightmap coordinates of their own.
     pub edges: usize,
@@ -82,6 +98,7 @@ pub struct SeamReport {
 
 /// What a bake kept of the former one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RebakeReport {
     /// Why nothing could be kept; empty if something was.
     pub whole: String,
@@ -122,6 +139,7 @@ impl std::fmt::Display for RebakeReport {
 
 /// Why a bake took no more samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Ended {
     /// The estimated error is at most the one asked for.
     #[default]
@@ -163,6 +181,7 @@ impl std::fmt::Display for Ended {
 
 /// What a bake did, what it cost and how good it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct BakeReport {
     /// The [`content_hash`](crate::content_hash) of what was baked, in hexadecimal digits.
     pub content_hash: String,
@@ -211,6 +230,9 @@ pub struct BakeReport {
     pub estimated_error: f64,
     /// The same errors relative to the mean irradiance of the whole level.
     pub error_of_mean: f64,
+    /// What `estimated_error` is made of, the largest part first.
+    #[serde(default)]
+    pub error_parts: Vec<ErrorPart>,
     /// Where it is largest: at most three places about the size of a room (an eighth of the level's longest side), each with a hundredth of all
     /// texels or more; the worst first. Empty where no place is worse than the whole.
     pub worst: Vec<WorstPlace>,
@@ -241,6 +263,18 @@ pub struct BakeReport {
     pub skipped: Vec<String>,
 }
 
+impl BakeReport {
+    /// What the estimated error is made of, in a line; none where there is no error. Small parts are left out.
+    pub fn error_parts_in_words(&self) -> Option<String> {
+        /// Of the squared error, the share below which a part is small.
+        const SMALL: f64 = 0.05;
+        let told = |part: &&ErrorPart| part.error.powi(2) >= SMALL * self.estimated_error.powi(2);
+        let name = |part: &ErrorPart| format!("{} {:.2} %", part.what, 100.0 * part.error);
+        let parts: Vec<String> = self.error_parts.iter().filter(told).map(name).collect();
+        (!parts.is_empty()).then(|| format!("made of {} (their squares add up)", parts.join(", ")))
+    }
+}
+
 impl std::fmt::Display for BakeReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         writeln!(
@@ -260,6 +294,9 @@ impl std::fmt::Display for BakeReport {
             100.0 * self.error_of_mean,
             self.ended
         )?;
+        if let Some(parts) = self.error_parts_in_words() {
+            writeln!(f, "  {parts}")?;
+        }
         for place in &self.worst {
             writeln!(f, "  {place}")?;
         }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::world::World;
 use glam::Vec3;
-use lumbre_bake::{BakeError, BakeOptions, Density, Progress, bake};
+use lumbre_bake::{Bake, BakeError, BakeOptions, CancelToken, Density, Progress};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
@@ -50,13 +50,13 @@ fn a_cancel_is_answered_within_a_moment_at_any_time() {
     let (begun, mut last) = (Instant::now(), Instant::now());
     let mut gaps: BTreeMap<&str, Duration> = BTreeMap::new();
     let mut stage = "layout";
-    let mut watching = |progress: Progress| {
+    let watching = |progress: Progress| {
         let gap = gaps.entry(stage).or_default();
         *gap = (*gap).max(last.elapsed());
         (last, stage) = (Instant::now(), progress.stage);
         ControlFlow::Continue(())
     };
-    let report = bake(&mut room(), &options(), &mut watching).expect("the room bakes");
+    let report = Bake::new(&options()).progress(watching).run(&mut room()).expect("the room bakes");
     let whole = begun.elapsed();
     println!("{report}");
     println!("{whole:?}; longest time in which nobody was asked: {gaps:?}");
@@ -78,13 +78,15 @@ fn a_cancel_is_answered_within_a_moment_at_any_time() {
     for time in 0..TIMES {
         let (mut world, at) = (room(), whole * time / TIMES);
         let (begun, mut asked) = (Instant::now(), None);
-        let ended = bake(&mut world, &options(), &mut |_| {
-            if begun.elapsed() < at {
-                return ControlFlow::Continue(());
-            }
-            asked.get_or_insert_with(Instant::now);
-            ControlFlow::Break(())
-        });
+        let ended = Bake::new(&options())
+            .progress(|_| {
+                if begun.elapsed() < at {
+                    return ControlFlow::Continue(());
+                }
+                asked.get_or_insert_with(Instant::now);
+                ControlFlow::Break(())
+            })
+            .run(&mut world);
         let answered = asked.map(|asked| asked.elapsed()).unwrap_or_default();
         match ended {
             Err(BakeError::Cancelled { stage }) => println!("{at:?}: {stage} ended after {answered:?}"),
@@ -95,4 +97,22 @@ fn a_cancel_is_answered_within_a_moment_at_any_time() {
         assert!(answered < MOMENT, "{answered:?} at {at:?}");
         assert_eq!(world.query::<&Lightmap>().iter(&world).count(), 0);
     }
+}
+
+#[test]
+fn a_token_ends_a_bake_from_another_thread() {
+    let (mut world, token) = (room(), CancelToken::default());
+    let (begun, its) = (Instant::now(), token.clone());
+    let canceller = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(200));
+        its.cancel();
+    });
+    let ended = Bake::new(&options()).cancel(&token).run(&mut world);
+    assert!(matches!(ended, Err(BakeError::Cancelled { .. })), "{ended:?}");
+    assert!(begun.elapsed() < Duration::from_millis(200) + MOMENT, "{:?}", begun.elapsed());
+    assert_eq!(world.query::<&Lightmap>().iter(&world).count(), 0);
+    canceller.join().unwrap();
+    // Cancelled it stays.
+    let again = Bake::new(&options()).cancel(&token).run(&mut world);
+    assert_eq!(again, Err(BakeError::Cancelled { stage: "layout" }));
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors};
 use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
 
 use crate::scene_file::SceneFile;
@@ -77,16 +77,38 @@ pub fn bake_scene(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     options: &BakeOptions,
-    [before, after]: [f64; 2],
+    told: [f64; 2],
 ) -> Result<Baked, CostError> {
     let mut world = scene.open(conditions.aspect())?;
-    let report = bake(&mut world, options, &mut |progress| match conditions
-        .tell(before + f64::from(progress.fraction) * (after - before))
-    {
+    let report = Bake::new(options).progress(telling(conditions, told)).run(&mut world)?;
+    Ok(Baked { world, report })
+}
+
+/// Bakes a World, keeping of a former bake what can be kept; with the samples for the next time.
+///
+/// # Errors
+/// [`CostError::Bake`], [`CostError::Interrupted`].
+pub fn bake_world(
+    conditions: &Conditions<'_>,
+    mut world: World,
+    options: &BakeOptions,
+    former: Option<&Samples>,
+    told: [f64; 2],
+) -> Result<(Baked, Option<Samples>), CostError> {
+    let bake = Bake::new(options).former(former).progress(telling(conditions, told));
+    let (report, samples) = bake.run_keeping_samples(&mut world)?;
+    Ok((Baked { world, report }, samples))
+}
+
+/// Tells how far a study is while something bakes; `told` are its shares before and after.
+fn telling(
+    conditions: &Conditions<'_>,
+    [before, after]: [f64; 2],
+) -> impl FnMut(Progress) -> ControlFlow<()> + Send {
+    move |progress| match conditions.tell(before + f64::from(progress.fraction) * (after - before)) {
         Ok(()) => ControlFlow::Continue(()),
         Err(_) => ControlFlow::Break(()),
-    })?;
-    Ok(Baked { world, report })
+    }
 }
 
 /// Lightmaps with the standard error of every texel, by name.

@@ -6,15 +6,13 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, CancelToken, Density, Quality};
 use lumbre_optics::{BakeMode, Light, LightKind, Material};
 use lumbre_scene::{
     DynamicObject, GlobalTransform, IrradianceVolume, Lightmap, LoadError, LoadOptions, MaterialTextures,
@@ -202,7 +200,7 @@ enum Work {
 pub struct BackgroundBake {
     messages: Receiver<Message>,
     sender: Sender<Message>,
-    is_cancelled: Arc<AtomicBool>,
+    cancel: CancelToken,
     status: Option<BakeStatus>,
     work: Work,
     baked: Option<Box<Baked>>,
@@ -217,25 +215,17 @@ impl BackgroundBake {
     /// [`BakeError::Thread`].
     pub fn start(path: &Path, options: &LoadOptions, wanted: &BakeOptions) -> Result<Self, BakeError> {
         let (sender, messages) = channel();
-        let is_cancelled = Arc::new(AtomicBool::new(false));
+        let cancel = CancelToken::default();
         let job = Job {
             path: path.to_owned(),
             options: options.clone(),
             wanted: *wanted,
-            is_cancelled: Arc::clone(&is_cancelled),
+            cancel: cancel.clone(),
             begun: Instant::now(),
             sender: sender.clone(),
         };
         thread::Builder::new().name("bake".to_owned()).spawn(move || job.run())?;
-        Ok(Self {
-            messages,
-            sender,
-            is_cancelled,
-            status: None,
-            work: Work::Baking,
-            baked: None,
-            saving: None,
-        })
+        Ok(Self { messages, sender, cancel, status: None, work: Work::Baking, baked: None, saving: None })
     }
 
     /// Whether it still works at something: a bake, or the writing of the file.
@@ -260,7 +250,7 @@ impl BackgroundBake {
 
     /// Asks it to end; it says when it has.
     pub fn cancel(&self) {
-        self.is_cancelled.store(true, Ordering::Relaxed);
+        self.cancel.cancel();
     }
 
     /// Writes the baked file, in a thread of its own. Does nothing before all is baked.
@@ -340,7 +330,7 @@ struct Job {
     path: PathBuf,
     options: LoadOptions,
     wanted: BakeOptions,
-    is_cancelled: Arc<AtomicBool>,
+    cancel: CancelToken,
     begun: Instant,
     sender: Sender<Message>,
 }
@@ -373,24 +363,24 @@ impl Job {
         let area = area(&mut world);
         let first = FIRST.iter().map(|pass| (pass.name, rougher(&self.wanted, pass, area)));
         for (name, options) in first.chain([(FINAL, self.wanted)]) {
-            if self.is_cancelled.load(Ordering::Relaxed) {
+            if self.cancel.is_cancelled() {
                 return Ok(None);
             }
-            let report = bake(&mut world, &leaving_a_core(options), &mut |progress| {
-                let status = BakeStatus {
-                    pass: name,
-                    stage: progress.stage,
-                    fraction: progress.fraction,
-                    error: progress.error,
-                    elapsed: self.begun.elapsed(),
-                };
-                // The window may be gone.
-                let _ = self.sender.send(Message::Status(status));
-                match self.is_cancelled.load(Ordering::Relaxed) {
-                    true => ControlFlow::Break(()),
-                    false => ControlFlow::Continue(()),
-                }
-            })?;
+            let report = Bake::new(&leaving_a_core(options))
+                .cancel(&self.cancel)
+                .progress(|progress| {
+                    let status = BakeStatus {
+                        pass: name,
+                        stage: progress.stage,
+                        fraction: progress.fraction,
+                        error: progress.error,
+                        elapsed: self.begun.elapsed(),
+                    };
+                    // The window may be gone.
+                    let _ = self.sender.send(Message::Status(status));
+                    ControlFlow::Continue(())
+                })
+                .run(&mut world)?;
             let mut light = BakedLight::of(&mut world, &nodes, &report);
             (light.pass, light.under_a_sky, light.is_final) = (name, under_a_sky, name == FINAL);
             let _ = self.sender.send(Message::News(BakeNews::Light(light)));

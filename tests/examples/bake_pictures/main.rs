@@ -6,14 +6,13 @@
 #![allow(clippy::print_stdout, reason = "a program whose result is text, too")]
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use image::{Rgb, RgbImage};
-use lumbre_bake::{BakeOptions, BakeReport, Density, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, TexelErrors};
 use lumbre_optics::Material;
 use lumbre_render::{Display, FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Lightmap, LightmapImage, default_camera};
@@ -58,7 +57,7 @@ fn baked(model: &Path, direct: bool) -> Result<(World, BakeReport), Box<dyn Erro
         materials.iter_mut(&mut world).for_each(|(_, mut material)| material.front.diffuse = Vec3::ZERO);
     }
     let options = BakeOptions { density: Density::MapSize(256), error: 0.02, ..BakeOptions::default() };
-    let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(()))?;
+    let report = Bake::new(&options).run(&mut world)?;
     for (entity, material) in own {
         world.entity_mut(entity).insert(material);
     }

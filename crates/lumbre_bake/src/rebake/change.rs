@@ -19,6 +19,8 @@ use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texels::blocks::Blocks;
+use crate::texels::covered_texels::CoveredTexels;
+use crate::texels::direct_light::DirectLight;
 use crate::texels::footprint::{Texel, receiver};
 use crate::texels::kept::Kept;
 use crate::texels::local_light::LocalLight;
@@ -38,8 +40,27 @@ const BESIDE: f32 = 1.0 / 16.0;
 /// Relative residual of a solution that is only an estimate.
 const TOLERANCE: f64 = 1e-4;
 
+/// What is kept of the light by bounces, and about how many rays it took to tell. `exchange` is the new scene's, with its form factors.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn kept_bounces(
+    changes: &Changes<'_>,
+    sources: &Sources<'_>,
+    texels: &CoveredTexels<'_>,
+    direct: &DirectLight,
+    (exchange, factors): (&Exchange, &FormFactors),
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+) -> Result<(Kept, u64), BakeError> {
+    let change = watch.during(1.0, || Change::new(sources, changes, texels, &direct.texels))?;
+    let of_patches = change.of_patches(exchange, factors, options, watch)?;
+    let kept = change.keep(exchange, &of_patches, &texels.list, &direct.local, options, watch)?;
+    Ok((kept, change.rays(&of_patches)))
+}
+
 /// The light before and now, as far as it is needed to tell the difference.
-pub(crate) struct Change<'a> {
+struct Change<'a> {
     scene: &'a BakeScene,
     layout: &'a LightmapLayout,
     changes: &'a Changes<'a>,
@@ -67,14 +88,13 @@ struct PatchLight<'a> {
 
 impl<'a> Change<'a> {
     /// From the direct light of every covered texel as it is now.
-    pub fn new(
+    fn new(
         sources: &Sources<'a>,
-        layout: &'a LightmapLayout,
         changes: &'a Changes<'a>,
-        texels: &[Texel],
-        charts: &[u32],
+        texels: &CoveredTexels<'a>,
         direct: &[Direct],
     ) -> Self {
+        let CoveredTexels { layout, list: texels, charts, .. } = texels;
         let mut change = vec![Vec3::ZERO; layout.texels];
         for ((texel, now), known) in texels.iter().zip(direct).zip(&changes.known) {
             if let Some(known) = known {
@@ -94,17 +114,14 @@ impl<'a> Change<'a> {
     }
 
     /// About how many rays the estimate takes.
-    pub fn rays(&self, of_patches: &[Range]) -> u64 {
+    fn rays(&self, of_patches: &[Range]) -> u64 {
         let asked = if of_patches.is_empty() { 0 } else { of_patches.len() + self.blocks.members.len() };
         u64::from(RAYS) * asked as u64
     }
 
     /// The change of what each patch receives by bounces, W/m²: Δ = S + F ρ Δ, with the change S that is seen at first hand. Nothing in it is
     /// negative, so that bounds of the one are bounds of the other.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
-    pub fn of_patches(
+    fn of_patches(
         &self,
         exchange: &Exchange,
         factors: &FormFactors,
@@ -174,10 +191,7 @@ impl<'a> Change<'a> {
     }
 
     /// What is kept of the light by bounces.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
-    pub fn keep(
+    fn keep(
         &self,
         exchange: &Exchange,
         of_patches: &[Range],

@@ -7,12 +7,13 @@ use glam::Vec3;
 
 use super::relit::shadowed;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples, fingerprint, first_triangles};
-use crate::BakeOptions;
 use crate::content_hash::{ContentHash, Hashes};
 use crate::sampling::hash;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, Object, density_of};
+use crate::scene::{BakeScene, Canonical, Input, LightmapLayout, Object, density_of};
+use crate::texels::covered_texels::CoveredTexels;
 use crate::texels::footprint::Texel;
 use crate::transport::direct::{Direct, Sources};
+use crate::{BakeOptions, BakeReport, RebakeReport};
 
 /// More changed objects than this are as good as a new scene.
 const MOST_CHANGED: usize = 64;
@@ -49,11 +50,28 @@ pub(crate) struct Usable<'a> {
 }
 
 impl<'a> Usable<'a> {
+    /// What of a former bake can be used; the report says why where nothing can.
+    pub fn of(
+        samples: Option<&'a Samples>,
+        hashes: &Hashes,
+        input: &Input,
+        options: &BakeOptions,
+        report: &mut BakeReport,
+    ) -> Option<Self> {
+        match Self::new(samples?, hashes, &input.objects, input.space(), options) {
+            Ok(usable) => Some(usable),
+            Err(whole) => {
+                report.rebake = Some(RebakeReport { whole, ..RebakeReport::default() });
+                None
+            }
+        }
+    }
+
     /// In `space`, where a whole bake would work.
     ///
     /// # Errors
     /// Why they cannot be used.
-    pub fn new(
+    fn new(
         samples: &'a Samples,
         hashes: &Hashes,
         objects: &[Object],
@@ -123,6 +141,8 @@ pub(crate) struct Changes<'a> {
     pub names: Vec<String>,
     /// Per covered texel, its samples, if it shows what it showed.
     pub known: Vec<Option<&'a TexelSamples>>,
+    /// Per covered texel, the direct light that cannot have changed.
+    pub known_direct: Vec<Option<Direct>>,
     /// Per texel of all maps, the irradiance that the former bake found there, W/m²; NaN where it is not known.
     pub former_light: Vec<Vec3>,
 }
@@ -134,10 +154,10 @@ impl<'a> Changes<'a> {
         hashes: &Hashes,
         objects: &[Object],
         sources: &Sources<'_>,
-        layout: &LightmapLayout,
-        texels: &[Texel],
+        texels: &CoveredTexels<'_>,
     ) -> Self {
         let (scene, former) = (sources.scene, usable.former);
+        let CoveredTexels { layout, list: texels, charts, .. } = texels;
         let mut by_hash: HashMap<ContentHash, Vec<&'a ObjectSamples>> = HashMap::new();
         // Of several that are the same, the first is taken first.
         for object in former.objects.iter().rev() {
@@ -165,30 +185,25 @@ impl<'a> Changes<'a> {
         let now = (0..objects.len()).filter(|&object| changed[object]);
         let now = now.map(|object| ChangedBox { low: bounds[object].0, high: bounds[object].1, left: None });
         let then = gone.iter().map(|o| ChangedBox { low: o.low, high: o.high, left: Some(o.exitance) });
-        let boxes = now.chain(then).filter(|b| b.low.cmple(b.high).all()).collect();
+        let boxes: Vec<ChangedBox> = now.chain(then).filter(|b| b.low.cmple(b.high).all()).collect();
         let names = names(objects, &changed, &gone, of_lights);
         let (known, former_light) = known(scene, layout, texels, &same);
         let none = former.content == hashes.content;
-        Self { former, none, changed, boxes, lights: of_lamps || of_lights, names, known, former_light }
-    }
-}
-
-impl Changes<'_> {
-    /// The direct light that cannot have changed, per covered texel.
-    pub fn known_direct(
-        &self,
-        sources: &Sources<'_>,
-        texels: &[Texel],
-        charts: &[u32],
-    ) -> Vec<Option<Direct>> {
-        if self.lights {
-            return vec![None; texels.len()];
-        }
-        let shadowed = shadowed(sources, texels, charts, &self.boxes);
+        let lights = of_lamps || of_lights;
         let of = |(known, shadowed): (&Option<&TexelSamples>, bool)| {
             known.filter(|_| !shadowed).map(|known| known.direct)
         };
-        self.known.iter().zip(shadowed).map(of).collect()
+        let known_direct = match lights {
+            true => vec![None; texels.len()],
+            false => known.iter().zip(shadowed(sources, texels, charts, &boxes)).map(of).collect(),
+        };
+        Self { former, none, changed, boxes, lights, names, known, known_direct, former_light }
+    }
+
+    /// Covered texels whose direct light is found anew.
+    pub fn relit(&self, texels: &[Texel]) -> usize {
+        let pairs = texels.iter().zip(&self.known_direct);
+        pairs.filter(|(texel, known)| known.is_none() && !texel.is_hidden()).count()
     }
 }
 

@@ -13,7 +13,7 @@
 //! Light is linear: the change of the light by bounces obeys the radiosity equation of the new scene, with the change that is seen at first hand as
 //! its source (what the boxes hide or show, and what direct light has changed). That is solved on the patches, so that it brings no noise where nothing changes. What is neglected is added to the stated error.
 
-pub(crate) mod change;
+mod change;
 mod changes;
 mod choice;
 mod estimate;
@@ -22,6 +22,7 @@ mod report;
 mod samples;
 mod samples_file;
 
+pub(crate) use change::kept_bounces;
 pub(crate) use changes::{Changes, Usable};
 pub(crate) use report::rebake_report;
 pub use samples::Samples;

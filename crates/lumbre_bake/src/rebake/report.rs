@@ -9,7 +9,6 @@ use crate::texels::kept::Kept;
 pub(crate) fn rebake_report(
     changes: &Changes<'_>,
     texels: &[Texel],
-    relit: usize,
     kept: Option<&Kept>,
     report: &BakeReport,
 ) -> RebakeReport {
@@ -20,7 +19,7 @@ pub(crate) fn rebake_report(
         whole: String::new(),
         changed: changes.names.clone(),
         texels: open,
-        relit,
+        relit: changes.relit(texels),
         gathered: kept.map_or(0, |kept| open - kept.count()),
         neglected: if mean > 0.0 { neglected / mean } else { 0.0 },
     }

@@ -11,7 +11,7 @@ use crate::texels::footprint::{Footprint, Texel};
 use crate::texels::gather::{Gathered, Weights};
 use crate::transport::direct::{Direct, Sources};
 
-/// The samples of a finished bake, to be given to [`rebake`](crate::rebake) when the scene has changed.
+/// The samples of a finished bake, to be given to [`Bake::former`](crate::Bake::former) when the scene has changed.
 #[derive(Clone, Debug)]
 pub struct Samples(pub(crate) Content);
 

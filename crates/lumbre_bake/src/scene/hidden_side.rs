@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
+use crate::disjoint_sets::DisjointSets;
+
 /// For each triangle, its connected piece if that is closed: every directed edge has one that runs back.
 /// Vertices are the same where their coordinates are, bit by bit.
 pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
@@ -19,34 +21,25 @@ pub(crate) fn closed_pieces(triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
             })
         })
         .collect();
-    let mut parent: Vec<u32> = (0..vertices.len() as u32).collect();
+    let mut pieces = DisjointSets::new(vertices.len());
     let mut balance: HashMap<(u32, u32), i32> = HashMap::new();
     for &[a, b, c] in &corners {
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            let (x, y) = (find(&mut parent, from), find(&mut parent, to));
-            parent[x.max(y) as usize] = x.min(y);
+            pieces.join(from, to);
             *balance.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
         }
     }
     let mut closed = vec![true; vertices.len()];
     for (&(vertex, _), &sum) in &balance {
         if sum != 0 {
-            closed[find(&mut parent, vertex) as usize] = false;
+            closed[pieces.find(vertex) as usize] = false;
         }
     }
     let piece = |&[a, ..]: &[u32; 3]| {
-        let piece = find(&mut parent, a);
+        let piece = pieces.find(a);
         closed[piece as usize].then_some(piece)
     };
     corners.iter().map(piece).collect()
-}
-
-fn find(parent: &mut [u32], mut at: u32) -> u32 {
-    while parent[at as usize] != at {
-        parent[at as usize] = parent[parent[at as usize] as usize];
-        at = parent[at as usize];
-    }
-    at
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use lumbre_mesh::{Charted, TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped};
 
 use super::texture_coordinates::{free_second, sets_read};
 use super::{Canonical, Object, SceneTriangle};
-use crate::stop::Stop;
+use crate::cancel_token::CancelToken;
 use crate::{BakeError, BakeOptions, Density};
 
 /// The texels of one object.
@@ -76,7 +76,7 @@ pub(crate) fn lay_out(
     warnings: &mut Vec<String>,
 ) -> Result<LightmapLayout, BakeError> {
     let density = density_of(objects, space, options);
-    lay_out_with(objects, space, density, options, &Stop::default(), warnings)
+    lay_out_with(objects, space, density, options, &CancelToken::default(), warnings)
 }
 
 /// Lays out every object, with so many texels per canonical unit.
@@ -85,7 +85,7 @@ pub(crate) fn lay_out_with(
     space: Canonical,
     density: f64,
     options: &BakeOptions,
-    stop: &Stop,
+    stop: &CancelToken,
     warnings: &mut Vec<String>,
 ) -> Result<LightmapLayout, BakeError> {
     let mut layout = LightmapLayout { density, ..LightmapLayout::default() };
@@ -190,7 +190,7 @@ fn lay_out_object(
     space: Canonical,
     density: f64,
     options: &BakeOptions,
-    stop: &Stop,
+    stop: &CancelToken,
     warnings: &mut Vec<String>,
 ) -> Result<Made, BakeError> {
     let placed = Placed::new(object, space);
@@ -229,7 +229,7 @@ fn lay_out_object(
             object.name
         ));
     }
-    let go_on = || !stop.is_set();
+    let go_on = || !stop.is_cancelled();
     let charted =
         Charted::new(&placed.mesh, &placed.mesh.positions, UnwrapOptions::default().chart_angle, &go_on)
             .map_err(|source| BakeError::Unwrap { object: object.name.clone(), source })?;

@@ -5,6 +5,7 @@ mod collect;
 pub(crate) mod crossings;
 mod duplicates;
 mod hidden_side;
+mod input;
 mod leaks;
 mod lightmap_layout;
 pub(crate) mod material;
@@ -18,6 +19,7 @@ mod wanted_probes;
 pub(crate) use collect::{
     Object, PlacedLight, PlacedPrimitive, collect, lights, sky, under_a_dynamic_object,
 };
+pub(crate) use input::Input;
 pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, lay_out_with, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;

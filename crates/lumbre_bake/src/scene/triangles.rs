@@ -12,7 +12,7 @@ use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
 use super::{LightmapLayout, Object, SurfaceMaterial};
 use crate::BakeError;
-use crate::stop::Stop;
+use crate::cancel_token::CancelToken;
 
 /// The space in which everything is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +134,7 @@ pub(crate) struct BakeScene {
     /// Rays that ended where none should.
     pub leaks: Leaks,
     /// Whether nobody waits for what is computed of it any more.
-    pub stop: Stop,
+    pub stop: CancelToken,
     /// The closed pieces that look inward.
     pub rooms: Vec<Room>,
     /// All that shines is inside of rooms: nothing leaves them.
@@ -150,7 +150,7 @@ impl BakeScene {
         objects: &[Object],
         layout: &LightmapLayout,
         space: Canonical,
-        stop: &Stop,
+        stop: &CancelToken,
         warnings: &mut Vec<String>,
     ) -> Result<Self, BakeError> {
         let count = objects.iter().flat_map(|o| &o.primitives).map(|part| part.mesh.triangle_count()).sum();

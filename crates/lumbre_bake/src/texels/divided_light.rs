@@ -56,7 +56,7 @@ impl DividedLight {
         let divided: Vec<(u32, Divided, u64)> = straddling
             .par_iter()
             .filter_map(|straddling| {
-                if sources.scene.stop.is_set() {
+                if sources.scene.stop.is_cancelled() {
                     return None;
                 }
                 let texel = &texels[straddling.texel as usize];

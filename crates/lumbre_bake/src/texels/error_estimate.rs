@@ -1,64 +1,14 @@
-//! What may be wrong with a texel, from what the stages know of themselves. Not a comparison with a better bake: that is a test's.
-//!
-//! ```text
-//!   variance = direct light: spread of interleaved groups of shadow samples
-//!            + final gather: spread of four replicates, after smoothing
-//!            + smoothing:    half of the replicates smoothed against the other half raw, over the neighbourhood
-//!            + form factors: half the difference of two half solutions, gathered by the texel's own rays
-//!            + patches' size: the difference to the solution with patches twice as large, gathered likewise
-//!            + texels read:  what noise leaves in the texels that later rounds read, as far as it is correlated
-//!            + patches:      patch against real bounce, checked at some of the hits, over the neighbourhood
-//!            + solver:       residual / (1 - rho) of the light by bounces
-//!            + arithmetic:   what cracks as wide as coordinates are rounded let through of all the light
-//! ```
-//!
-//! Not in it: the map's own resolution, and what a penumbra hides that all samples of a texel and of its neighbours missed.
+//! The terms of a map's error that the final gather tells of itself: the spread of its replicates, and what patches have brought it. Not their sum:
+//! that is `error_ledger`; and not a comparison with a better bake: that is a test's.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::error_ledger::SquaredErrors;
 use super::footprint::Texel;
 use super::gather::Gathered;
-use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, variance};
 use super::surroundings::Surroundings;
-use crate::transport::direct::Direct;
-
-/// Squared errors of texels, mean of the channels.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct SquaredErrors {
-    /// An upper estimate, as it is stated of single texels.
-    pub cautious: Vec<f32>,
-    /// As they are expected: to be added up over many.
-    pub expected: Vec<f32>,
-}
-
-impl SquaredErrors {
-    /// Other squared errors added, of which nothing more is known.
-    pub fn with(&self, more: &[f32]) -> Self {
-        let sum = |own: &[f32]| own.iter().zip(more).map(|(own, more)| own + more).collect();
-        Self { cautious: sum(&self.cautious), expected: sum(&self.expected) }
-    }
-
-    /// In shares of the squared light around the texels.
-    pub fn relative(&self, local: &LocalLight) -> Self {
-        Self { cautious: local.relative(&self.cautious), expected: local.relative(&self.expected) }
-    }
-}
-
-/// What the gather leaves of each kind, squared, mean of the channels, per covered texel.
-pub(crate) struct GatherErrors<'a> {
-    pub gathered: &'a [Gathered],
-    pub estimates: &'a [Estimates],
-    /// Variance of the mean of each.
-    pub spread: &'a SquaredErrors,
-    pub smoothing_bias: &'a [f32],
-    pub patch_bias: &'a [PatchBias],
-    /// Relative, of the solver.
-    pub residual_bound: f64,
-    /// By how much the light may have changed since it was gathered; empty where none is kept.
-    pub neglected: &'a [f32],
-}
 
 /// Steps each way, and texels of a step, over which the spread of the replicates is put together.
 const SPREAD_STEPS: usize = 2;
@@ -100,38 +50,6 @@ fn standard_error([count, sum, squares]: [f32; 3]) -> f32 {
     let mean = sum / count;
     let scatter = (squares / count - mean * mean).max(ALONE * mean * mean);
     (scatter / count).sqrt()
-}
-
-impl GatherErrors<'_> {
-    /// The part of each texel's variance that more rays make smaller.
-    pub fn by_rays(&self) -> SquaredErrors {
-        self.spread.with(self.smoothing_bias)
-    }
-}
-
-/// Share of the mean light that is within the rounding of coordinates: sixteen of it, as where segments end.
-const ARITHMETIC: f32 = 16.0 / (1 << 24) as f32;
-
-/// Variance of every covered texel; `light` is the mean of all, W/m², of which cracks may let through.
-pub(crate) fn variances(direct: &[Direct], gather: Option<&GatherErrors<'_>>, light: f32) -> SquaredErrors {
-    let least = (ARITHMETIC * light).powi(2);
-    let of_texel = |(index, direct): (usize, &Direct)| {
-        let systematic = gather.map_or(0.0, |gather| {
-            let estimates = &gather.estimates[index];
-            let unsolved = gather.residual_bound as f32 * mean(estimates).element_sum() / 3.0;
-            gather.smoothing_bias[index]
-                + gather.gathered[index].squared_read_error()
-                + unsolved * unsolved
-                + gather.patch_bias[index].rest
-                + gather.neglected.get(index).map_or(0.0, |neglected| neglected * neglected)
-        });
-        let [cautious, expected] =
-            gather.map_or([0.0; 2], |gather| [gather.spread.cautious[index], gather.spread.expected[index]]);
-        let rest = direct.variance + systematic + least;
-        (cautious + rest, expected + (rest - direct.caution))
-    };
-    let (cautious, expected) = direct.par_iter().enumerate().map(of_texel).unzip();
-    SquaredErrors { cautious, expected }
 }
 
 /// Texels around one over which checks are put together.

@@ -5,9 +5,10 @@
 use glam::{DMat2, DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::covered_texels::CoveredTexels;
 use super::footprint::{Footprint, Texel};
+use crate::cancel_token::CancelToken;
 use crate::scene::LightmapLayout;
-use crate::stop::Stop;
 
 /// Square texels of spread below which a slope counts as unknown.
 const RIDGE: f64 = 0.002;
@@ -33,13 +34,13 @@ fn fill_map(
     known: &[Option<Known>],
     hidden: &[Hidden],
     rings: u32,
-    stop: &Stop,
+    stop: &CancelToken,
 ) -> Vec<Option<Known>> {
     // The charts' own texels first, moved to their centres.
     let mut current: Vec<Option<Known>> = (0..known.len())
         .into_par_iter()
         .map(|index| {
-            let own = known[index].filter(|_| !stop.is_set())?;
+            let own = known[index].filter(|_| !stop.is_cancelled())?;
             let offset = Vec2::splat(0.5) - own.middle;
             // A tenth of a texel is below what a slope can be told from.
             if offset.abs().max_element() < 0.1 {
@@ -60,7 +61,7 @@ fn fill_map(
                     Hidden::ReadFromTheOpen => true,
                     Hidden::Deep => false,
                 };
-                if current[index].is_some() || !wanted || stop.is_set() {
+                if current[index].is_some() || !wanted || stop.is_cancelled() {
                     return current[index];
                 }
                 let (x, y) = (index as u32 % width, index as u32 / width);
@@ -180,13 +181,12 @@ fn around(width: u32, height: u32, x: u32, y: u32, radius: u32) -> impl Iterator
 
 /// Fills all maps from values and squared errors per covered texel; NaN where nothing is known, and errors also where no surface is shown.
 pub(crate) fn fill(
-    layout: &LightmapLayout,
-    texels: &[Texel],
-    charts: &[u32],
+    texels: &CoveredTexels<'_>,
     (values, variances): (&[Vec3], &[f32]),
     rings: u32,
-    stop: &Stop,
+    stop: &CancelToken,
 ) -> (Vec<Vec3>, Vec<f32>) {
+    let CoveredTexels { layout, list: texels, charts, .. } = texels;
     let mut known: Vec<Option<Known>> = vec![None; layout.texels];
     for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
         if !texel.is_hidden() {
@@ -253,7 +253,7 @@ mod tests {
                 known[(y * 8 + x) as usize] = Some(Known { value, variance: 0.01, middle, chart: 0 });
             }
         }
-        let filled = fill_map((8, 8), &known, &[Hidden::No; 64], 1, &Stop::default());
+        let filled = fill_map((8, 8), &known, &[Hidden::No; 64], 1, &CancelToken::default());
         for y in 2..6u32 {
             for x in 1..7u32 {
                 let Known { value: found, variance, .. } = filled[(y * 8 + x) as usize].unwrap();
@@ -283,7 +283,7 @@ mod tests {
                 Some(Known { value: Vec3::splat(value), variance: 0.0, middle: Vec2::splat(0.5), chart })
             })
             .collect();
-        let filled = fill_map((4, 4), &known, &[Hidden::No; 16], 2, &Stop::default());
+        let filled = fill_map((4, 4), &known, &[Hidden::No; 16], 2, &CancelToken::default());
         for row in filled.chunks(4) {
             assert_eq!(row.iter().map(|v| v.unwrap().value.x).collect::<Vec<_>>(), [1.0, 1.0, 9.0, 9.0]);
         }

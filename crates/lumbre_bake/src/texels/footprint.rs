@@ -60,7 +60,7 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
             let map = &layout.maps[object];
             let mut covers: Vec<(u32, u32)> = Vec::new();
             for &index in triangles {
-                if scene.stop.is_set() {
+                if scene.stop.is_cancelled() {
                     return Vec::new();
                 }
                 covered_texels(&scene.triangles[index as usize], map.width, map.height, |x, y| {
@@ -71,7 +71,7 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
             covers
                 .par_chunk_by(|a, b| a.0 == b.0)
                 .filter_map(|chunk| {
-                    if scene.stop.is_set() {
+                    if scene.stop.is_cancelled() {
                         return None;
                     }
                     let cell = chunk[0].0;

@@ -226,7 +226,12 @@ impl Gathered {
 
     /// The squared error that what was read adds to the mean of the replicates: the patches', and that of texels that were gathered before.
     pub fn squared_read_error(&self) -> f32 {
-        self.patch_error().length_squared() + self.texel_variances / self.count() as f32
+        self.patch_error().length_squared() + self.texel_variance()
+    }
+
+    /// The variance that the texels that were read add to the mean of the replicates.
+    pub fn texel_variance(&self) -> f32 {
+        self.texel_variances / self.count() as f32
     }
 }
 

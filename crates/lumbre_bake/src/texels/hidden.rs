@@ -120,7 +120,7 @@ fn suspect(scene: &BakeScene, texels: &[Texel], tiles: &Tiles) -> Vec<bool> {
         .members
         .par_iter()
         .map(|members| {
-            if scene.stop.is_set() {
+            if scene.stop.is_cancelled() {
                 return false;
             }
             let members: Vec<&Texel> = members.iter().map(|&place| &texels[place as usize]).collect();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::neighbours::Block;
 use super::surroundings::{NONE, Surface};
-use crate::stop::Stop;
+use crate::cancel_token::CancelToken;
 
 /// Texels side by side.
 pub(crate) const LANES: usize = 8;
@@ -32,7 +32,7 @@ pub(crate) struct Grid {
     /// The instructions that this machine has; every level computes the same bits.
     pub level: Level,
     /// Whether nobody waits for what is computed any more.
-    pub stop: Stop,
+    pub stop: CancelToken,
 }
 
 /// A row of a map.
@@ -84,7 +84,7 @@ impl Grid {
         }
         let count = cells.len();
         cells.resize(count + MARGIN, NONE);
-        let (level, stop) = (Level::new(), Stop::default());
+        let (level, stop) = (Level::new(), CancelToken::default());
         Self { rows, blocks, ground: cells, surfaces, cells: count, level, stop }
     }
 
@@ -166,7 +166,7 @@ impl Grid {
             rows.push(own);
             rest = after;
         }
-        let rows = rows.into_par_iter().enumerate().filter(|_| !self.stop.is_set());
+        let rows = rows.into_par_iter().enumerate().filter(|_| !self.stop.is_cancelled());
         rows.for_each(|(index, row)| write(index, row));
     }
 

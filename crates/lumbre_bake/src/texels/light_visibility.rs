@@ -19,7 +19,7 @@ pub(super) fn visibilities(
     tree: &BoxTree,
 ) -> Vec<(u32, LightVisibility)> {
     let of_light = |&index: &u32| {
-        if sources.scene.stop.is_set() {
+        if sources.scene.stop.is_cancelled() {
             return None;
         }
         let placed = &sources.lights[index as usize];

@@ -4,8 +4,11 @@
 pub(crate) mod allocation;
 pub(crate) mod blocks;
 pub(crate) mod charts;
+pub(crate) mod covered_texels;
+pub(crate) mod direct_light;
 pub(crate) mod divided_light;
 pub(crate) mod error_estimate;
+pub(crate) mod error_ledger;
 pub(crate) mod fill;
 pub(crate) mod filter_features;
 pub(crate) mod footprint;
@@ -17,7 +20,7 @@ pub(crate) mod lanes;
 pub(crate) mod late;
 mod light_cuts;
 mod light_visibility;
-pub(crate) mod lighting;
+
 pub(crate) mod local_light;
 pub(crate) mod neighbours;
 pub(crate) mod plane;

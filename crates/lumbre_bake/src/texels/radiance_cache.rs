@@ -2,23 +2,29 @@
 
 use glam::{Vec2, Vec3};
 
+use super::covered_texels::CoveredTexels;
+use super::direct_light::DirectLight;
 use super::divided_light::DividedLight;
-use super::texel_radiance::GatheredLight;
+use super::gather::REPLICATES;
+use super::texel_radiance::{GatheredLight, mean_reflectances};
+use crate::progress::Watch;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
+use crate::transport::direct::Sources;
+use crate::transport::exchange::Exchange;
 use crate::transport::patches::Patches;
 use crate::transport::sampling_guide::SamplingGuide;
+use crate::{BakeError, BakeOptions, BakeReport};
 
 /// The light that leaves surfaces, as the gather reads it.
-#[derive(Clone, Copy)]
 pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
     /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, or more than one.
-    pub direct: &'a [Vec3],
+    pub direct: Vec<Vec3>,
     /// Of the texels that have more than one.
-    pub divided: &'a DividedLight,
+    pub divided: DividedLight,
     /// Irradiance that a surface gets of an unhidden sky.
     pub sky: Vec3,
     /// Per patch, direct irradiance.
@@ -30,15 +36,67 @@ pub(crate) struct RadianceCache<'a> {
     /// Per patch, what is nearer to it than this gets a real bounce more, canonical units.
     pub near: &'a [f32],
     /// What the rounds so far have found of the bounces; nothing in the first.
-    pub gathered: &'a GatheredLight,
+    pub gathered: GatheredLight,
     /// Within this distance on a surface the errors of `gathered` are correlated, canonical units.
     pub correlated: f32,
     /// Per texel of all maps, mean reflectance, where it is not the same all over the triangle; NaN elsewhere, or empty.
-    pub reflectance: &'a [Vec3],
+    pub reflectance: Vec<Vec3>,
     /// Where each patch's light comes from.
     pub guide: &'a SamplingGuide,
     /// Samples of each replicate in the first round.
     pub run: u32,
+}
+
+/// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round of the demo level, 5.4 after the
+/// second.
+const CORRELATED_TEXELS: f32 = 4.5;
+/// Where more than this share of the final gather's time is gone before its first ray, what walls divide gets fewer samples.
+const SHORT: f64 = 0.4;
+
+impl<'a> RadianceCache<'a> {
+    /// As it is before the first round: direct light of texels, bounces of patches.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
+    pub fn new(
+        sources: &'a Sources<'a>,
+        texels: &CoveredTexels<'a>,
+        direct: &DirectLight,
+        exchange: &'a Exchange,
+        options: &BakeOptions,
+        watch: &mut Watch<'_>,
+        report: &mut BakeReport,
+    ) -> Result<Self, BakeError> {
+        let (scene, effort) = (sources.scene, options.effort());
+        // What one part sends out is read by many rays of many texels: its noise falls out of their means.
+        let samples = if watch.clock().is_past(SHORT) { 1 } else { 2 } * effort.direct[0];
+        let (divided, rays) = watch.during(0.0, || {
+            DividedLight::new(sources, &texels.list, &texels.straddling, (samples, options.seed))
+        })?;
+        report.rays += rays;
+        report.warnings.extend(divided.warning());
+        let mut direct = direct.by_place(texels);
+        divided.places().for_each(|index| direct[index] = Vec3::NAN);
+        let reflectance =
+            watch.during(0.0, || mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list))?;
+        Ok(Self {
+            gathered: GatheredLight::default(),
+            correlated: CORRELATED_TEXELS * texels.side,
+            reflectance,
+            scene,
+            layout: texels.layout,
+            patches: &exchange.patches,
+            direct,
+            divided,
+            sky: sources.sky,
+            patch_direct: &exchange.direct,
+            patch_indirect: &exchange.indirect,
+            patch_error: &exchange.indirect_error,
+            near: &exchange.near,
+            guide: &exchange.guide,
+            run: effort.gather[0] / REPLICATES as u32,
+        })
+    }
 }
 
 impl RadianceCache<'_> {

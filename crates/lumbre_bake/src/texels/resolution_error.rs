@@ -1,7 +1,7 @@
 //! The error of the map's own resolution: what a bilinear look-up shows at points of the surfaces against what arrives there. Points spread
 //! evenly over all lit area are baked on their own, by the same direct light and the same gather as texels. Two independent halves of their
 //! samples make the square of the difference free of their noise (the product of both differences); what sampling has left in the map
-//! itself, by its own estimate, is taken away. Not the sampling error: that is `error_estimate`.
+//! itself, by its own estimate, is taken away. Not the sampling error: that is `error_ledger`.
 
 use glam::{Vec2, Vec3};
 
@@ -9,12 +9,12 @@ use super::footprint::{Footprint, FootprintPoint, Texel, receiver};
 use super::gather::{Gathered, REPLICATES, RadianceCache};
 use crate::checkpoint::record::fields;
 use crate::chunks::in_chunks;
-use crate::progress::Watch;
+use crate::progress::{Stage, Watch};
 use crate::report::ResolutionReport;
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::transport::direct::{Receiver, Sources};
-use crate::{BakeError, BakeOptions};
+use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Of the rays of a bake, one part in so many; and what takes no time that anyone would notice.
 const SHARE: u64 = 20;
@@ -54,20 +54,40 @@ fields!(DensePoint {
     rays: u64,
 });
 
+/// Points that the finished map is compared with; none if that is not asked for, or the time is up. `cache` is `None` where nothing bounces.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn dense_points(
+    sources: &Sources<'_>,
+    cache: Option<&RadianceCache<'_>>,
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<Vec<DensePoint>, BakeError> {
+    if !options.resolution_error || watch.clock().late() {
+        let why = if options.resolution_error { "the time is up" } else { "switched off" };
+        report.skipped.push(format!("resolution error: {why}"));
+        return Ok(Vec::new());
+    }
+    watch.stage(Stage::Resolution, report)?;
+    let light = Light { scene: sources.scene, sources, cache };
+    let points = light.at_points(report.rays, options, watch)?;
+    report.rays += points.iter().map(|point| point.rays).sum::<u64>();
+    Ok(points)
+}
+
 /// What light is asked for at points.
-pub(crate) struct Light<'a> {
-    pub scene: &'a BakeScene,
-    pub sources: &'a Sources<'a>,
+struct Light<'a> {
+    scene: &'a BakeScene,
+    sources: &'a Sources<'a>,
     /// None where nothing bounces.
-    pub cache: Option<&'a RadianceCache<'a>>,
+    cache: Option<&'a RadianceCache<'a>>,
 }
 
 impl Light<'_> {
     /// Points in proportion to area, as many as a twentieth of `rays` pays for.
-    ///
-    /// # Errors
-    /// [`BakeError::Cancelled`].
-    pub fn at_points(
+    fn at_points(
         &self,
         rays: u64,
         options: &BakeOptions,

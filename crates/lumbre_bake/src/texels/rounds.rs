@@ -5,7 +5,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::allocation::{Allotment, allot_within};
-use super::error_estimate::{GatherErrors, PatchBias, SquaredErrors, patch_bias, spread, variances};
+use super::covered_texels::CoveredTexels;
+use super::direct_light::DirectLight;
+use super::error_estimate::{PatchBias, patch_bias, spread};
+use super::error_ledger::{ErrorLedger, GatherErrors, SquaredErrors, open_sum, relative_to};
 use super::footprint::Texel;
 use super::gather::{Gathered, REPLICATES, RadianceCache};
 use super::kept::Kept;
@@ -45,131 +48,223 @@ pub(crate) struct Bounced {
     pub gathered: Vec<Gathered>,
 }
 
-/// The covered texels, as the gather needs them.
-#[derive(Clone, Copy)]
-pub(crate) struct Receivers<'a> {
-    pub texels: &'a [Texel],
-    pub charts: &'a [u32],
-    pub direct: &'a [Direct],
-    /// The light around them, beside which their errors count.
-    pub local: &'a LocalLight,
-    /// Of a former bake.
-    pub kept: Option<&'a Kept>,
+impl Bounced {
+    /// Of a scene where nothing bounces.
+    pub fn none(direct: &DirectLight) -> Self {
+        Self { variances: ErrorLedger::of_direct_light(direct).total(), ..Self::default() }
+    }
+
+    /// The light of every covered texel, direct light included, W/m².
+    pub fn with(&self, direct: &DirectLight) -> Vec<Vec3> {
+        let bounced = self.light.iter().copied().chain(std::iter::repeat(Vec3::ZERO));
+        direct.texels.iter().zip(bounced).map(|(direct, bounced)| direct.baked + bounced).collect()
+    }
 }
 
-/// Gathers the light by bounces, beginning with what is kept of a former bake.
+/// Gathers the light by bounces, beginning with what is `kept` of a former bake. The cache then holds what was gathered, too.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
 pub(crate) fn gather(
-    cache: &RadianceCache<'_>,
-    receivers: Receivers<'_>,
+    cache: &mut RadianceCache<'_>,
+    texels: &CoveredTexels<'_>,
+    direct: &DirectLight,
+    kept: Option<&Kept>,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
 ) -> Result<Bounced, BakeError> {
-    let Receivers { texels, charts, direct, local, kept } = receivers;
-    let effort = options.effort();
-    let [first, most] = effort.gather.map(|samples| samples / REPLICATES as u32);
-    let nothing = || vec![Gathered::default(); texels.len()];
-    let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
-    let open_texels = (0..texels.len() as u32).filter(|&index| !texels[index as usize].is_hidden());
-    let open = open_texels.clone().count().max(1) as f64;
-    let channel_mean = |v: Vec3| f64::from(v.element_sum()) / 3.0;
-    let mean_direct = direct.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>() / open;
+    let list = &texels.list;
+    let leaked_before = cache.scene.leaks.count();
     let surroundings =
-        watch.during(0.0, || Surroundings::new(cache.scene, cache.layout, texels, charts, &[]))?;
-    let mut wanted: Vec<Allotment> = open_texels
-        .clone()
-        .filter(|&index| gathered[index as usize].samples == 0)
-        .map(|index| Allotment { index, samples: first })
-        .collect();
+        watch.during(0.0, || Surroundings::new(cache.scene, texels.layout, list, &texels.charts, &[]))?;
+    let judge = Judge::new(&surroundings, texels, direct, kept, options);
+    let nothing = || vec![Gathered::default(); list.len()];
+    let mut gathered = kept.map_or_else(nothing, |kept| kept.gathered.clone());
+    let mut wanted = judge.first_samples(&gathered);
     // With everything kept there is nothing that the former bake did not know when it ended.
     let settled = kept.is_some() && wanted.is_empty();
-    let mut helped_before = f64::INFINITY;
-    let mut round = 0;
-    let mut known = GatheredLight::default();
-    let (light, variances) = loop {
+    let (mut helped_before, mut is_first) = (f64::INFINITY, true);
+    let found = loop {
         watch.pass(PASS);
-        let cache = RadianceCache { gathered: &known, ..*cache };
-        if round == 0 && options.time.is_some() {
-            wanted = affordable(&cache, texels, wanted, &mut gathered, options, watch)?;
+        if is_first && options.time.is_some() {
+            wanted = affordable(cache, list, wanted, &mut gathered, options, watch)?;
         }
-        let in_time = cast(&cache, texels, &wanted, &mut gathered, options, watch)?;
-        if !in_time && round == 0 {
-            from_patches(&cache, texels, &mut gathered);
+        let in_time = cast(cache, list, &wanted, &mut gathered, options, watch)?;
+        if is_first && !in_time {
+            from_patches(cache, list, &mut gathered);
         }
-        round += 1;
-        let raw: Vec<Estimates> = gathered.par_iter().map(Gathered::estimates).collect();
-        let (estimates, smoothing_bias) = watch.during(1.0, || match options.denoise {
-            true => {
-                let near: Vec<f32> = gathered.par_iter().map(Gathered::inverse_distance).collect();
-                smooth(&surroundings, &raw, &near)
-            }
-            false => (raw.clone(), vec![0.0; texels.len()]),
-        })?;
-        let patch_bias = watch.during(1.0, || {
-            patch_bias(&surroundings, texels, &gathered, &raw, cache.patches.mean_reflectance())
-        })?;
-        let spread = watch.during(1.0, || spread(&surroundings, &estimates))?;
-        let errors = GatherErrors {
-            gathered: &gathered,
-            estimates: &estimates,
-            spread: &spread,
-            smoothing_bias: &smoothing_bias,
-            patch_bias: &patch_bias,
-            residual_bound: report.residual_bound,
-            neglected: kept.map_or(&[], |kept| &kept.neglected),
-        };
-        let total = mean_direct + estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>() / open;
-        let variances = variances(direct, Some(&errors), total as f32);
-        let of_patches = |part: fn(&PatchBias) -> f32| -> f64 {
-            let parts: Vec<f32> = patch_bias.iter().map(part).collect();
-            open_sum(texels, &local.relative(&parts))
-        };
-        // What chance leaves in single texels falls out of their mean.
-        let by_chance = of_patches(|bias| bias.rest) - of_patches(|bias| bias.expected).max(0.0);
-        let sum = open_sum(texels, &local.relative(&variances.expected)) - by_chance;
-        report.estimated_error = (sum / open).max(0.0).sqrt();
-        report.error_of_mean = relative_to(total, open_sum(texels, &variances.expected) / open);
-        report.error_reached = report.estimated_error <= options.error;
-        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
-        watch.note_error(report.estimated_error);
-        watch.advance(1.0)?;
+        is_first = false;
+        let found = judge.found(&gathered, cache.patches.mean_reflectance(), watch, report)?;
         let late = !in_time || watch.clock().late();
-        // Of the error, the part that more rays make smaller. They read texels and no patches, so that what patches left falls too; what is known of it
-        // by checks stays.
-        let unsettled = errors.by_rays();
-        let read: Vec<f32> = gathered.par_iter().map(Gathered::squared_read_error).collect();
-        let by_rays = unsettled.with(&read).relative(local);
-        let helped = open_sum(texels, &by_rays.expected);
-        let helpless = helped <= WORTH_RAYS * sum || helped > STALLED * helped_before;
-        helped_before = helped;
-        // The part that rays may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
-        let rest = sum - helped;
-        let asked = open * options.error.powi(2);
-        let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
-        // Rays are given out by the cautious figures; the goal is one of expected ones.
-        let goal = goal * open_sum(texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
-        let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
-        let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-        let budget = (effort.budget(open as u64) / REPLICATES as u64).saturating_sub(cast);
-        // What little is left of it is not worth another smoothing.
-        let spent = (budget as f64) < LEAST_ROUND * cast as f64;
-        wanted = allot_within(budget, open_texels.clone(), &by_rays.cautious, &samples, most, ORDER, goal);
-        report.ended =
-            Ended::after(report.error_reached, late || watch.is_late(), spent || wanted.is_empty());
-        if report.error_reached || late || helpless || spent || settled || wanted.is_empty() {
-            break (corrected(&estimates, &patch_bias), variances);
+        let next = judge.next(&gathered, &found);
+        let helpless = next.helped <= WORTH_RAYS * found.sum || next.helped > STALLED * helped_before;
+        helped_before = next.helped;
+        report.ended = Ended::after(report.error_reached, late || watch.is_late(), next.is_last);
+        if report.error_reached || late || helpless || settled || next.is_last {
+            break found;
         }
-        let light = corrected(&estimates, &patch_bias);
-        known = watch.during(1.0, || {
-            GatheredLight::new(texels, &gathered, &light, &unsettled.expected, cache.direct)
-        })?;
+        wanted = next.wanted;
+        let variances = &found.unsettled.expected;
+        cache.gathered = watch
+            .during(1.0, || GatheredLight::new(list, &gathered, &found.light, variances, &cache.direct))?;
     };
+    let Found { light, variances, .. } = found;
+    cache.gathered = watch
+        .during(1.0, || GatheredLight::new(list, &gathered, &light, &variances.expected, &cache.direct))?;
+    report.leaked_rays = cache.scene.leaks.count() - leaked_before;
     report.rays += gathered.iter().map(|own| own.rays).sum::<u64>();
     // Without rays: the patches' light, for want of time.
     let cast = gathered.iter().filter(|own| own.rays > 0);
     let cast: u64 = cast.map(|own| u64::from(own.samples) * REPLICATES as u64).sum();
-    report.gather_rays = cast as f64 / open;
+    report.gather_rays = cast as f64 / judge.open.len().max(1) as f64;
     Ok(Bounced { light, variances, gathered })
+}
+
+/// Judges what a round has gathered, and says where the next one casts its rays.
+struct Judge<'a> {
+    surroundings: &'a Surroundings<'a>,
+    texels: &'a [Texel],
+    direct: &'a [Direct],
+    local: &'a LocalLight,
+    /// Of the covered texels, those that are not hidden.
+    open: Vec<u32>,
+    /// Mean direct light of those, W/m², mean of the channels.
+    mean_direct: f64,
+    /// By how much light that is kept may have changed.
+    neglected: &'a [f32],
+    options: &'a BakeOptions,
+}
+
+/// What a round has found.
+struct Found {
+    /// Irradiance by bounces, per covered texel.
+    light: Vec<Vec3>,
+    /// Of what the map then holds.
+    variances: SquaredErrors,
+    /// Of that, what more rays make smaller.
+    unsettled: SquaredErrors,
+    /// Over the open texels, the sum of their squared errors relative to the light around them.
+    sum: f64,
+}
+
+/// What the next round is to do.
+struct Next {
+    wanted: Vec<Allotment>,
+    /// Of the sum of squared errors, the part that rays make smaller.
+    helped: f64,
+    /// What is left of the quality's rays, or of the error, is not worth another round.
+    is_last: bool,
+}
+
+impl<'a> Judge<'a> {
+    fn new(
+        surroundings: &'a Surroundings<'a>,
+        texels: &'a CoveredTexels<'a>,
+        direct: &'a DirectLight,
+        kept: Option<&'a Kept>,
+        options: &'a BakeOptions,
+    ) -> Self {
+        let list = &texels.list;
+        let open: Vec<u32> =
+            (0..list.len() as u32).filter(|&index| !list[index as usize].is_hidden()).collect();
+        let sum = direct.texels.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>();
+        Self {
+            surroundings,
+            texels: list,
+            direct: &direct.texels,
+            local: &direct.local,
+            mean_direct: sum / open.len().max(1) as f64,
+            open,
+            neglected: kept.map_or(&[], |kept| &kept.neglected),
+            options,
+        }
+    }
+
+    /// How many texels are judged; at least one, to be divided by.
+    fn count(&self) -> f64 {
+        self.open.len().max(1) as f64
+    }
+
+    /// The first round's, wherever nothing is kept.
+    fn first_samples(&self, gathered: &[Gathered]) -> Vec<Allotment> {
+        let samples = self.options.effort().gather[0] / REPLICATES as u32;
+        let new = self.open.iter().copied().filter(|&index| gathered[index as usize].samples == 0);
+        new.map(|index| Allotment { index, samples }).collect()
+    }
+
+    /// The light that the samples tell, smoothed, with its errors; the report states them.
+    fn found(
+        &self,
+        gathered: &[Gathered],
+        reflectance: f64,
+        watch: &mut Watch<'_>,
+        report: &mut BakeReport,
+    ) -> Result<Found, BakeError> {
+        let (surroundings, texels, local) = (self.surroundings, self.texels, self.local);
+        let raw: Vec<Estimates> = gathered.par_iter().map(Gathered::estimates).collect();
+        let (estimates, smoothing) = watch.during(1.0, || match self.options.denoise {
+            true => {
+                let near: Vec<f32> = gathered.par_iter().map(Gathered::inverse_distance).collect();
+                smooth(surroundings, &raw, &near)
+            }
+            false => (raw.clone(), vec![0.0; texels.len()]),
+        })?;
+        let patches = watch.during(1.0, || patch_bias(surroundings, texels, gathered, &raw, reflectance))?;
+        let noise = watch.during(1.0, || spread(surroundings, &estimates))?;
+        let bounced = estimates.iter().map(|e| channel_mean(mean(e))).sum::<f64>();
+        let total = self.mean_direct + bounced / self.count();
+        let gather = GatherErrors {
+            gathered,
+            estimates: &estimates,
+            noise: &noise,
+            smoothing: &smoothing,
+            patches: &patches,
+            residual_bound: report.residual_bound,
+            kept: self.neglected,
+        };
+        let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
+        let variances = ledger.total();
+        let sum = open_sum(texels, &local.relative(&variances.expected)) - ledger.by_chance(texels, local);
+        report.estimated_error = (sum / self.count()).max(0.0).sqrt();
+        report.error_of_mean = relative_to(total, open_sum(texels, &variances.expected) / self.count());
+        report.error_reached = report.estimated_error <= self.options.error;
+        report.error_parts = watch.during(1.0, || ledger.parts(texels, local))?;
+        report.curve.push(ErrorAtTime { seconds: watch.seconds(), error: report.estimated_error });
+        watch.note_error(report.estimated_error);
+        watch.advance(1.0)?;
+        let light = corrected(&estimates, &patches);
+        Ok(Found { light, unsettled: ledger.by_rays(), variances, sum })
+    }
+
+    /// Rays for the part of the error that they make smaller.
+    fn next(&self, gathered: &[Gathered], found: &Found) -> Next {
+        let [_, most] = self.options.effort().gather.map(|samples| samples / REPLICATES as u32);
+        // They read texels and no patches, so that what patches left falls too; what is known of it by checks stays.
+        let read: Vec<f32> = gathered.par_iter().map(Gathered::squared_read_error).collect();
+        let by_rays = found.unsettled.with(&read).relative(self.local);
+        let helped = open_sum(self.texels, &by_rays.expected);
+        // What they may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
+        let rest = found.sum - helped;
+        let asked = self.count() * self.options.error.powi(2);
+        let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
+        // Rays are given out by the cautious figures; the goal is one of expected ones.
+        let goal = goal * open_sum(self.texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
+        let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
+        let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
+        let most_of_all = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
+        let budget = most_of_all.saturating_sub(cast);
+        // What little is left of it is not worth another smoothing.
+        let spent = (budget as f64) < LEAST_ROUND * cast as f64;
+        let open = self.open.iter().copied();
+        let wanted = allot_within(budget, open, &by_rays.cautious, &samples, most, ORDER, goal);
+        Next { helped, is_last: spent || wanted.is_empty(), wanted }
+    }
+}
+
+/// Mean of the channels.
+fn channel_mean(light: Vec3) -> f64 {
+    f64::from(light.element_sum()) / 3.0
 }
 
 /// Casts the samples that are wanted; whether there was time for all of them.
@@ -221,15 +316,4 @@ fn affordable(
 fn corrected(estimates: &[Estimates], bias: &[PatchBias]) -> Vec<Vec3> {
     let corrected = estimates.iter().zip(bias).map(|(e, bias)| (mean(e) - bias.correction).max(Vec3::ZERO));
     corrected.collect()
-}
-
-/// The sum over texels that show a surface.
-pub(crate) fn open_sum(texels: &[Texel], numbers: &[f32]) -> f64 {
-    let open = texels.iter().zip(numbers).filter(|(texel, _)| !texel.is_hidden());
-    open.map(|(_, number)| f64::from(*number)).sum()
-}
-
-/// The root of a squared error, relative to a mean; 0 where there is no light.
-pub(crate) fn relative_to(mean: f64, squared: f64) -> f64 {
-    if mean > 0.0 { squared.max(0.0).sqrt() / mean } else { 0.0 }
 }

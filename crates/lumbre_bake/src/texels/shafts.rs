@@ -62,7 +62,7 @@ impl<'a> Shafts<'a> {
         shafts.tiles = members
             .par_iter()
             .map(|members| {
-                if scene.stop.is_set() || !members.iter().any(|&place| wanted(place)) {
+                if scene.stop.is_cancelled() || !members.iter().any(|&place| wanted(place)) {
                     return OfTile::default();
                 }
                 let cut = cuts.of(members[0] as usize);
@@ -97,7 +97,7 @@ impl<'a> Shafts<'a> {
             }
             let mut found = Vec::new();
             for &emitter in emitters {
-                if self.scene.stop.is_set() {
+                if self.scene.stop.is_cancelled() {
                     return None;
                 }
                 if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {

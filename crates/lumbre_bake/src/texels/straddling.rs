@@ -28,7 +28,7 @@ pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(usize,
         .flat_map_iter(|index| divisions(scene, layout, &tree, index))
         .collect();
     // Millions, where a mesh is as fine as its texels.
-    if scene.stop.is_set() {
+    if scene.stop.is_cancelled() {
         return Vec::new();
     }
     lines.par_sort_by_key(|(place, _)| *place);
@@ -69,7 +69,7 @@ fn divisions(
     let map = &layout.maps[triangle.object as usize];
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
     let texels = (b - a).perp_dot(c - a).abs();
-    if triangle.superseded || scene.stop.is_set() || !(texels.is_finite() && texels > 2.0) {
+    if triangle.superseded || scene.stop.is_cancelled() || !(texels.is_finite() && texels > 2.0) {
         return Vec::new();
     }
     let side = (2.0 * f64::from(triangle.area) / texels).sqrt();

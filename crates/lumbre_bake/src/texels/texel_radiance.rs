@@ -72,7 +72,7 @@ pub(crate) fn mean_reflectances(
         let triangle = &scene.triangles[point.triangle as usize];
         let surface = &scene.surfaces[triangle.surface as usize];
         let one_for_all = patches.reflectance(point.triangle, Side::Front).is_some();
-        if scene.stop.is_set() || one_for_all || surface.is_masked() {
+        if scene.stop.is_cancelled() || one_for_all || surface.is_masked() {
             return None;
         }
         let (u, v) = point.at;

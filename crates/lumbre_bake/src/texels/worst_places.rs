@@ -1,4 +1,4 @@
-//! Where in a level the stated error is largest, so that an artist finds the room and the objects. Not the error: that is `error_estimate`.
+//! Where in a level the stated error is largest, so that an artist finds the room and the objects. Not the error: that is `error_ledger`.
 
 use std::collections::BTreeMap;
 

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
+use crate::cancel_token::CancelToken;
 use crate::scene::SceneTriangle;
-use crate::stop::Stop;
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
@@ -25,7 +25,7 @@ pub(crate) struct BoxTree {
 
 impl BoxTree {
     /// Of the triangles that light meets.
-    pub fn new(triangles: &[SceneTriangle], stop: &Stop) -> Self {
+    pub fn new(triangles: &[SceneTriangle], stop: &CancelToken) -> Self {
         let mut items: Vec<u32> =
             (0..triangles.len() as u32).filter(|&index| !triangles[index as usize].superseded).collect();
         let mut nodes = Vec::with_capacity(2 * items.len() / LEAF + 1);
@@ -70,7 +70,7 @@ impl BoxTree {
 
 /// Halves by the median along the longest axis.
 fn build(
-    (triangles, stop): (&[SceneTriangle], &Stop),
+    (triangles, stop): (&[SceneTriangle], &CancelToken),
     items: &mut [u32],
     first: usize,
     end: usize,
@@ -81,7 +81,7 @@ fn build(
         (low, high) = (low.min(corner), high.max(corner));
     }
     let (index, count) = (nodes.len(), end - first);
-    let is_leaf = count <= LEAF || stop.is_set();
+    let is_leaf = count <= LEAF || stop.is_cancelled();
     nodes.push(Node { low, high, first: first as u32, count: if is_leaf { count as u32 } else { 0 } });
     if is_leaf {
         return;

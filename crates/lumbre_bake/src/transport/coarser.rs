@@ -27,7 +27,7 @@ pub(super) fn size_error(
     (solver, tolerance): (Solver, f64),
 ) -> Vec<f32> {
     let larger = Patches::outlines(scene, COARSER * side);
-    if scene.stop.is_set() {
+    if scene.stop.is_cancelled() {
         return vec![0.0; patches.list.len()];
     }
     let count = larger.list.len();
@@ -73,7 +73,7 @@ fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors
         .map_init(
             || vec![0.0f64; areas.len()],
             |exchange, members| {
-                if factors.stop.is_set() {
+                if factors.stop.is_cancelled() {
                     return Vec::new();
                 }
                 let mut touched = Vec::new();

@@ -15,7 +15,7 @@ pub(crate) fn components(factors: &FormFactors) -> (Vec<u32>, usize) {
         }
         part[start] = count;
         open.push(start);
-        while let Some(patch) = open.pop().filter(|_| !factors.stop.is_set()) {
+        while let Some(patch) = open.pop().filter(|_| !factors.stop.is_cancelled()) {
             for (other, g) in factors.row(patch) {
                 if g > 0.0 && part[other] == NONE {
                     part[other] = count;
@@ -32,7 +32,7 @@ pub(crate) fn components(factors: &FormFactors) -> (Vec<u32>, usize) {
 /// parts have some.
 pub(crate) fn levels(factors: &FormFactors, emission: &[f64]) -> (Vec<f64>, usize) {
     let (part, count) = components(factors);
-    if factors.stop.is_set() {
+    if factors.stop.is_cancelled() {
         return (vec![1.0; emission.len()], 1);
     }
     let mut squares = vec![0.0f64; count];

@@ -8,7 +8,7 @@ use lumbre_optics::LightKind;
 
 use super::cut_out::Pieces;
 use super::emitter_tree::{EXACT_EMITTERS, EmitterTree, TERM_ERROR};
-use super::emitters::{Emitter, emitters, lamps};
+use super::emitters::{Emitter, lamps};
 use super::light_cut::{FEW_LIGHTS, LightCut};
 use super::light_tree::{LightTree, has_place};
 use super::receiver_quadrature::ReceiverQuadrature;
@@ -123,10 +123,27 @@ pub(super) fn variance_of_mean(groups: [f32; GROUPS]) -> f32 {
     FEW_GROUPS * squares / (GROUPS * (GROUPS - 1)) as f32
 }
 
+/// Whether all that shines is inside of rooms: outside of them it is dark. `sky` is its radiance.
+pub(crate) fn shines_inside_only(
+    scene: &BakeScene,
+    emitters: &[Emitter],
+    lights: &[PlacedLight],
+    sky: Vec3,
+) -> bool {
+    let inside =
+        |points: &[Vec3]| scene.rooms.iter().any(|room| points.iter().all(|&point| room.surely_holds(point)));
+    let light = |placed: &PlacedLight| {
+        placed.light.kind != LightKind::Directional && inside(&[scene.space.position(placed.position)])
+    };
+    !scene.masked
+        && sky == Vec3::ZERO
+        && lights.iter().all(light)
+        && emitters.iter().all(|emitter| inside(&emitter.corners))
+}
+
 impl<'a> Sources<'a> {
-    /// Of a scene, its punctual lights and its sky's radiance.
-    pub fn new(scene: &'a BakeScene, lights: Vec<PlacedLight>, sky: Vec3) -> Self {
-        let emitters = emitters(scene);
+    /// Of a scene, its emissive triangles, its punctual lights and its sky's radiance.
+    pub fn new(scene: &'a BakeScene, emitters: Vec<Emitter>, lights: Vec<PlacedLight>, sky: Vec3) -> Self {
         let emitter_tree = EmitterTree::new(&emitters, &lamps(scene, &emitters));
         let few = lights.len() <= FEW_LIGHTS;
         let shares_samples = |index: &u32| !few && has_place(&lights[*index as usize]);
@@ -153,21 +170,6 @@ impl<'a> Sources<'a> {
     /// Whether nothing shines.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty() && self.lights.is_empty() && !self.has_sky()
-    }
-
-    /// Whether all that shines is inside of rooms: outside of them it is dark.
-    pub fn are_inside(&self) -> bool {
-        let scene = self.scene;
-        let inside = |points: &[Vec3]| {
-            scene.rooms.iter().any(|room| points.iter().all(|&point| room.surely_holds(point)))
-        };
-        let light = |placed: &PlacedLight| {
-            placed.light.kind != LightKind::Directional && inside(&[scene.space.position(placed.position)])
-        };
-        !scene.masked
-            && !self.has_sky()
-            && self.lights.iter().all(light)
-            && self.emitters.iter().all(|emitter| inside(&emitter.corners))
     }
 
     /// Whether the sky shines.

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::{DVec3, Vec3};
 
 use super::mean_of_points::{mean_of_points, pieces};
+use crate::disjoint_sets::DisjointSets;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, SceneTriangle, SurfaceMaterial};
 
@@ -37,35 +38,21 @@ impl Emitter {
 /// For each emitter the number of its lamp: triangles that share a corner, bit by bit, hang together.
 pub(crate) fn lamps(scene: &BakeScene, emitters: &[Emitter]) -> Vec<u32> {
     let mut corners: HashMap<[u32; 3], u32> = HashMap::new();
-    let mut parent: Vec<u32> = Vec::new();
+    let mut lamps = DisjointSets::default();
     let mut of_triangle: HashMap<u32, u32> = HashMap::new();
     for emitter in emitters {
         of_triangle.entry(emitter.triangle).or_insert_with(|| {
             let own = scene.triangles[emitter.triangle as usize].corners.map(|corner| {
                 // -0 and 0 are one place.
                 let key = (corner + Vec3::ZERO).to_array().map(f32::to_bits);
-                *corners.entry(key).or_insert_with(|| {
-                    parent.push(parent.len() as u32);
-                    parent.len() as u32 - 1
-                })
+                *corners.entry(key).or_insert_with(|| lamps.push())
             });
-            let roots = own.map(|corner| find(&mut parent, corner));
-            let least = roots[0].min(roots[1]).min(roots[2]);
-            for root in roots {
-                parent[root as usize] = least;
-            }
-            least
+            let [a, b, c] = own;
+            let both = lamps.join(a, b);
+            lamps.join(both, c)
         });
     }
-    emitters.iter().map(|emitter| find(&mut parent, of_triangle[&emitter.triangle])).collect()
-}
-
-fn find(parent: &mut [u32], mut at: u32) -> u32 {
-    while parent[at as usize] != at {
-        parent[at as usize] = parent[parent[at as usize] as usize];
-        at = parent[at as usize];
-    }
-    at
+    emitters.iter().map(|emitter| lamps.find(of_triangle[&emitter.triangle])).collect()
 }
 
 /// Texels of a texture along an edge of a piece, if that is not more than so many pieces along the edge of a triangle: what is finer
@@ -112,7 +99,8 @@ impl Coarser {
     fn of(scene: &BakeScene) -> Self {
         let asked = Self { pieces: 1.0, points: 1.0 };
         let sum = |coarser: Self, of: fn(Reading) -> f64| -> f64 {
-            let lit = scene.triangles.iter().filter(|triangle| !triangle.superseded && !scene.stop.is_set());
+            let lit =
+                scene.triangles.iter().filter(|triangle| !triangle.superseded && !scene.stop.is_cancelled());
             let of_triangle = |triangle: &SceneTriangle| {
                 let surface = &scene.surfaces[triangle.surface as usize];
                 match surface.material.front.emission == Vec3::ZERO && surface.material.back.is_none() {
@@ -171,7 +159,7 @@ pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
     for (index, triangle) in scene.triangles.iter().enumerate().filter(|(_, t)| !t.superseded) {
         let surface = &scene.surfaces[triangle.surface as usize];
         for side in [Side::Front, Side::Back] {
-            if scene.stop.is_set() {
+            if scene.stop.is_cancelled() {
                 return found;
             }
             if side == Side::Back && !triangle.two_sided {
@@ -179,7 +167,7 @@ pub(crate) fn emitters(scene: &BakeScene) -> Vec<Emitter> {
             }
             let Reading { pieces: count, points, .. } = Reading::new(surface, triangle.vertices, coarser);
             pieces(count, |[p, q, r]| {
-                if scene.stop.is_set() {
+                if scene.stop.is_cancelled() {
                     return;
                 }
                 let radiance = mean_of_points(points, |(a, b)| {

@@ -7,12 +7,13 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 
 use super::direct::Sources;
+use super::emitters::emitters;
 use super::exchange::{Exchange, Resolution};
 use super::method_study::form_factor_errors;
+use crate::cancel_token::CancelToken;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
-use crate::stop::Stop;
 use crate::{BakeOptions, BakeReport, Density, Quality};
 
 const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
@@ -42,8 +43,8 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
         objects.iter().flat_map(|o| &o.primitives).flat_map(|part| world_points(&part.transform, &part.mesh));
     let space = Canonical::of(points);
     let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
-    let scene = BakeScene::new(&objects, &layout, space, &Stop::default(), &mut Vec::new()).unwrap();
-    let sources = Sources::new(&scene, lights(world), sky(world));
+    let scene = BakeScene::new(&objects, &layout, space, &CancelToken::default(), &mut Vec::new()).unwrap();
+    let sources = Sources::new(&scene, emitters(&scene), lights(world), sky(world));
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut watch = Watch::new(&mut carry_on, None);
     let mut report = BakeReport::default();

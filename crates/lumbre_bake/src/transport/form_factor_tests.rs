@@ -10,10 +10,10 @@ use lumbre_optics::Material;
 
 use super::form_factors::FormFactors;
 use super::patches::Patches;
+use crate::cancel_token::CancelToken;
 use crate::options::FormFactorMethod;
 use crate::progress::{Progress, Watch};
 use crate::scene::{BakeScene, Canonical, Object, PlacedPrimitive, lay_out};
-use crate::stop::Stop;
 use crate::{BakeOptions, Density};
 
 fn carry_on(_: Progress) -> ControlFlow<()> {
@@ -51,7 +51,7 @@ pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
     let space = Canonical::of(points);
     let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
     let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
-    BakeScene::new(&objects, &layout, space, &Stop::default(), &mut Vec::new()).unwrap()
+    BakeScene::new(&objects, &layout, space, &CancelToken::default(), &mut Vec::new()).unwrap()
 }
 
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];

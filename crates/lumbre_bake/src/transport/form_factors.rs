@@ -9,11 +9,11 @@ use super::near_pairs::{NearPairs, near_pairs};
 use super::patches::Patches;
 use super::{cosine_rays, global_lines};
 use crate::BakeError;
+use crate::cancel_token::CancelToken;
 use crate::checkpoint::record::fields;
 use crate::options::FormFactorMethod;
 use crate::progress::Watch;
 use crate::scene::BakeScene;
-use crate::stop::Stop;
 
 /// The symmetric matrix of exchange areas, row by row, sparse.
 #[derive(Clone, Debug, Default)]
@@ -36,7 +36,7 @@ pub(crate) struct FormFactors {
     /// Share of all exchange that was cut so that no row exceeds 1.
     pub energy_lost: f64,
     /// Whether nobody waits for what is solved with it any more.
-    pub stop: Stop,
+    pub stop: CancelToken,
 }
 
 impl FormFactors {
@@ -90,7 +90,7 @@ impl FormFactors {
     }
 
     /// The matrix of some of the rays.
-    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs, stop: &Stop) -> Self {
+    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs, stop: &CancelToken) -> Self {
         let (mut factors, exact) = pool(counts, near, areas, stop);
         factors.open = counts.iter().map(Counts::open).collect();
         let sky = |own: &Counts| own.missed as f32 / (own.count - own.inside).max(1) as f32;
@@ -136,7 +136,7 @@ impl FormFactors {
         let exact_sums = self.sums(|k| exact[k]);
         let mut scale = vec![1.0f64; self.len()];
         for _ in 0..ROUNDS {
-            if self.stop.is_set() {
+            if self.stop.is_cancelled() {
                 break;
             }
             let next: Vec<f64> = (0..self.len())
@@ -185,7 +185,7 @@ impl FormFactors {
 
     /// By a factor of an entry's place, row and column.
     fn multiply(&mut self, factor: impl Fn(usize, usize, usize) -> f64) {
-        for i in (0..self.areas.len()).take_while(|_| !self.stop.is_set()) {
+        for i in (0..self.areas.len()).take_while(|_| !self.stop.is_cancelled()) {
             for k in self.starts[i]..self.starts[i + 1] {
                 self.exchange[k] =
                     (f64::from(self.exchange[k]) * factor(k, i, self.columns[k] as usize)) as f32;
@@ -285,12 +285,17 @@ pub(super) fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
 /// Both directions of a pair count the same flux: N_ij has mean R_i G/A_i, N_ji has mean R_j G/A_j. The best estimate of
 /// G from two Poisson counts is their sum over the sum of their rates. (A line counts in both directions, which weighs the same.) Pairs whose
 /// exchange is known have that instead; with the entries comes which of them do.
-fn pool(counts: &[Counts], near: &NearPairs, areas: Vec<f32>, stop: &Stop) -> (FormFactors, Vec<bool>) {
+fn pool(
+    counts: &[Counts],
+    near: &NearPairs,
+    areas: Vec<f32>,
+    stop: &CancelToken,
+) -> (FormFactors, Vec<bool>) {
     let incoming = Incoming::new(counts, stop);
     let rates: Vec<f64> =
         counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
     let row = |i: usize| -> Vec<(u32, f32, bool)> {
-        if stop.is_set() {
+        if stop.is_cancelled() {
             return Vec::new();
         }
         let (out, into, known) = (&counts[i].met[..], incoming.row(i), near.row(i));
@@ -345,7 +350,7 @@ struct Incoming {
 }
 
 impl Incoming {
-    fn new(counts: &[Counts], stop: &Stop) -> Self {
+    fn new(counts: &[Counts], stop: &CancelToken) -> Self {
         let mut starts = vec![0usize; counts.len() + 1];
         for &(met, _) in counts.iter().flat_map(|own| &own.met) {
             starts[met as usize + 1] += 1;
@@ -355,7 +360,7 @@ impl Incoming {
         }
         let mut next = starts.clone();
         let mut list = vec![(0, 0); starts.last().copied().unwrap_or(0)];
-        for (i, own) in counts.iter().enumerate().take_while(|_| !stop.is_set()) {
+        for (i, own) in counts.iter().enumerate().take_while(|_| !stop.is_cancelled()) {
             for &(met, n) in &own.met {
                 list[next[met as usize]] = (i as u32, n);
                 next[met as usize] += 1;

@@ -7,15 +7,16 @@ use bevy_ecs::world::World;
 use glam::Vec3;
 
 use super::direct::Sources;
+use super::emitters::emitters;
 use super::exchange::patch_direct;
 use super::form_factors::FormFactors;
 use super::patches::Patches;
 use super::solver::gather;
+use crate::cancel_token::CancelToken;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream};
 use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
-use crate::stop::Stop;
 use crate::{BakeError, BakeOptions};
 
 /// The two methods.
@@ -54,8 +55,8 @@ pub fn form_factor_errors(
     let space = Canonical::of(points);
     let mut warnings = Vec::new();
     let layout = lay_out(&objects, space, options, &mut warnings)?;
-    let scene = BakeScene::new(&objects, &layout, space, &Stop::default(), &mut warnings)?;
-    let sources = Sources::new(&scene, lights(world), sky(world));
+    let scene = BakeScene::new(&objects, &layout, space, &CancelToken::default(), &mut warnings)?;
+    let sources = Sources::new(&scene, emitters(&scene), lights(world), sky(world));
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
     let mut carry_on = |_| ControlFlow::Continue(());

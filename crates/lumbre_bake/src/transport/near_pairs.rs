@@ -81,7 +81,7 @@ pub(crate) fn near_pairs(
     let exact: Vec<(u32, u32, f32)> = candidates
         .into_par_iter()
         .filter_map(|(_, i, j, found)| {
-            if scene.stop.is_set() {
+            if scene.stop.is_cancelled() {
                 return None;
             }
             let (one, two) = (&shapes[i as usize], &shapes[j as usize]);

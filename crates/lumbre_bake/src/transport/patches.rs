@@ -80,7 +80,7 @@ impl Patches {
     pub fn count(scene: &BakeScene, side: f32) -> u64 {
         let (tree, mut lines) = (BoxTree::new(&scene.triangles, &scene.stop), Cuts::default());
         let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.superseded);
-        let met = met.take_while(|_| !scene.stop.is_set());
+        let met = met.take_while(|_| !scene.stop.is_cancelled());
         met.map(|(index, triangle)| {
             let divisions = divisions(triangle, side);
             let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
@@ -94,7 +94,7 @@ impl Patches {
     pub fn new(scene: &BakeScene, side: f32) -> Self {
         let mut patches = Self::outlines(scene, side);
         let of_patch = |patch: &Patch| {
-            if scene.stop.is_set() {
+            if scene.stop.is_cancelled() {
                 return (Vec3::ZERO, 0.0);
             }
             let corners = CORNERS.map(|at| patches.point(patch, at));
@@ -132,7 +132,7 @@ impl Patches {
         let mut roots = Vec::new();
         let mut full: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, triangle) in scene.triangles.iter().enumerate() {
-            if triangle.superseded || scene.stop.is_set() {
+            if triangle.superseded || scene.stop.is_cancelled() {
                 cuts.push(Cut {
                     divisions: 0,
                     front: 0,

@@ -35,7 +35,7 @@ impl SamplingGuide {
         sky: &[Vec3],
     ) -> Self {
         let regions = Patches::outlines(scene, REGION * side);
-        if scene.stop.is_set() {
+        if scene.stop.is_cancelled() {
             return Self { regions, rows: Rows::new(0) };
         }
         let region_of: Vec<u32> = patches
@@ -56,7 +56,7 @@ impl SamplingGuide {
         let mut rows = Rows::new(regions.list.len());
         let mut exchange = vec![0.0f64; regions.list.len()];
         for members in members {
-            if scene.stop.is_set() {
+            if scene.stop.is_cancelled() {
                 break;
             }
             let mut touched: Vec<u32> = Vec::new();

@@ -91,7 +91,7 @@ fn stationary(
     sweep: fn(&FormFactors, &[f64], &[f64], &mut [f64]),
 ) -> Solution {
     let mut solution = Solution { radiosity: emission.to_vec(), iterations: 0, residual: f64::INFINITY };
-    while solution.iterations < MOST_ITERATIONS && !factors.stop.is_set() {
+    while solution.iterations < MOST_ITERATIONS && !factors.stop.is_cancelled() {
         let before = solution.radiosity.clone();
         sweep(factors, reflectance, emission, &mut solution.radiosity);
         solution.iterations += 1;
@@ -154,7 +154,7 @@ fn conjugate_gradients(
     let mut rz = dot(&residual, &z);
     let mut iterations = 0;
     let mut relative = norm(factors, &z) / size;
-    while relative > tolerance && rz > 0.0 && iterations < MOST_ITERATIONS && !factors.stop.is_set() {
+    while relative > tolerance && rz > 0.0 && iterations < MOST_ITERATIONS && !factors.stop.is_cancelled() {
         let applied = apply(&direction);
         let curvature = dot(&direction, &applied);
         if curvature <= 0.0 {

@@ -1,13 +1,12 @@
 //! Maps that share atlases show what maps of their own show.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeError, BakeOptions, BakeReport, Density, Quality, TexelErrors};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -48,7 +47,7 @@ fn run(world: &mut World, atlas_size: Option<u32>) -> Result<BakeReport, BakeErr
         atlas_size,
         ..BakeOptions::default()
     };
-    bake(world, &options, &mut |_| ControlFlow::Continue(()))
+    Bake::new(&options).run(world)
 }
 
 /// By object: what is read, bilinearly, at points of each triangle, corners and edges among them; the map and its errors.

@@ -8,9 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use bevy_ecs::world::World;
-use lumbre_bake::{
-    BakeError, BakeOptions, BakeReport, Checkpoint, CheckpointError, Density, Quality, bake, bake_with,
-};
+use lumbre_bake::{Bake, BakeError, BakeOptions, BakeReport, Checkpoint, CheckpointError, Density, Quality};
 
 use crate::common::bits;
 use crate::corner::corner;
@@ -40,15 +38,18 @@ fn interrupted(
     fraction: f32,
 ) -> (World, Result<BakeReport, BakeError>) {
     let mut world = corner();
-    let result = bake_with(&mut world, options, Some(kept), &mut |progress| {
-        if progress.fraction >= fraction { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    let result = Bake::new(options)
+        .checkpoint(kept)
+        .progress(|progress| {
+            if progress.fraction >= fraction { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .run(&mut world);
     (world, result)
 }
 
 fn whole(options: &BakeOptions) -> (Vec<u32>, BakeReport) {
     let mut world = corner();
-    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let report = Bake::new(options).run(&mut world).unwrap();
     (bits(&mut world), report)
 }
 
@@ -88,11 +89,13 @@ fn resumed_after_any_interruption_it_ends_with_the_same_bits() {
 fn every_stage_may_be_interrupted_in_its_midst() {
     // Where the callback is asked, by stage: the n-th time is one chance to end it.
     let mut asked = Vec::new();
-    bake(&mut corner(), &options(), &mut |progress| {
-        asked.push(progress.stage);
-        ControlFlow::Continue(())
-    })
-    .unwrap();
+    Bake::new(&options())
+        .progress(|progress| {
+            asked.push(progress.stage);
+            ControlFlow::Continue(())
+        })
+        .run(&mut corner())
+        .unwrap();
     let times = |stage: &str| asked.iter().filter(|own| **own == stage).count();
     // The beginning of a stage asks, and every chunk: of a scene as small as this one there may be a single one, except where a stage
     // has several parts.
@@ -109,10 +112,12 @@ fn every_stage_may_be_interrupted_in_its_midst() {
     for stage in ["final gather", "texels", "seams"] {
         for wanted in 0..times(stage) {
             let (mut world, mut seen) = (corner(), 0);
-            let result = bake(&mut world, &options(), &mut |progress| {
-                seen += usize::from(progress.stage == stage);
-                if seen > wanted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
+            let result = Bake::new(&options())
+                .progress(|progress| {
+                    seen += usize::from(progress.stage == stage);
+                    if seen > wanted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                })
+                .run(&mut world);
             // How many chunks there are depends on the machine: the last of them may be missing.
             match result {
                 Err(BakeError::Cancelled { stage: found }) => assert_eq!(found, stage),

@@ -2,14 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_ecs::prelude::*;
 use glam::{Vec2, Vec3};
 use lumbre_bake::{
-    BakeOptions, ContentHash, Density, FormFactorMethod, Probes, Quality, Solver, bake, content_hash,
+    Bake, BakeOptions, ContentHash, Density, FormFactorMethod, Probes, Quality, Solver, content_hash,
 };
 use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{
@@ -318,6 +317,6 @@ fn the_report_names_the_hash() {
         BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() };
     let mut world = corner();
     let expected = content_hash(&mut world, &options).unwrap().to_string();
-    let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let report = Bake::new(&options).run(&mut world).unwrap();
     assert_eq!(report.content_hash, expected);
 }

@@ -2,14 +2,13 @@
 //! form or a sum of its own.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
 use crate::scene_parts::grey;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{
@@ -19,7 +18,7 @@ use lumbre_scene::{
 fn run(world: &mut World, side: u32) -> BakeReport {
     let options =
         BakeOptions { density: Density::MapSize(side), quality: Quality::Final, ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(&options).run(world).expect("the scene bakes")
 }
 
 /// A horizontal square of a side about a place, looking up or down.

@@ -1,19 +1,26 @@
-//! The error against time that a bake reports. Not whether the error is honest.
+//! The error against time that a bake reports, and what it says that the error is made of. Not whether the error is honest.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
-use std::ops::ControlFlow;
-
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, Density, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density};
 use lumbre_optics::{Light, Material};
 
 use crate::corner::corner;
 
 fn baked(world: &mut World, error: f64) -> BakeReport {
     let options = BakeOptions { density: Density::MapSize(24), error, ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+    Bake::new(&options).run(world).unwrap()
+}
+
+/// The squares of the parts add up to that of the whole.
+fn is_the_sum_of_its_parts(report: &BakeReport) {
+    let sum: f64 = report.error_parts.iter().map(|part| part.error.powi(2)).sum();
+    let (found, expected) = (sum.sqrt(), report.estimated_error);
+    assert!((found - expected).abs() <= 1e-4 * expected, "{found} {expected}: {:?}", report.error_parts);
+    assert!(report.error_parts.is_sorted_by(|a, b| a.error >= b.error), "{:?}", report.error_parts);
+    assert!(report.to_string().contains(&format!("made of {}", report.error_parts[0].what)), "{report}");
 }
 
 fn is_a_curve(report: &BakeReport) {
@@ -34,6 +41,9 @@ fn it_goes_forward_and_ends_at_what_is_reported() {
     let (fine, coarse) = (baked(&mut corner(), 0.003), baked(&mut corner(), 0.5));
     is_a_curve(&fine);
     is_a_curve(&coarse);
+    is_the_sum_of_its_parts(&fine);
+    is_the_sum_of_its_parts(&coarse);
+    assert!(fine.error_parts.iter().any(|part| part.what == "noise of the final gather"), "{fine}");
     assert!(fine.curve.len() >= 3 && coarse.curve.len() == 2, "{:?} {:?}", fine.curve, coarse.curve);
     assert!(fine.curve[0].error > fine.estimated_error);
 }
@@ -46,6 +56,8 @@ fn without_bounces_it_holds_direct_light() {
     let report = baked(&mut world, 0.01);
     is_a_curve(&report);
     assert_eq!(report.curve.len(), 2);
+    is_the_sum_of_its_parts(&report);
+    assert!(report.error_parts.iter().all(|part| !part.what.contains("gather")), "{report}");
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Input that breaks bakers: degenerate and duplicate triangles, reflectance above 1, sheets, mirror images, instances.
 
 use std::f32::consts::{FRAC_1_PI, PI};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
@@ -9,7 +8,7 @@ use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{AlphaMode, BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -17,7 +16,7 @@ use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 fn run(world: &mut World) -> BakeReport {
     let options =
         BakeOptions { density: Density::MapSize(24), quality: Quality::Draft, ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(&options).run(world).expect("the scene bakes")
 }
 
 fn spawn(world: &mut World, mesh: TriangleMesh, material: Material, place: Transform) -> Entity {

@@ -2,7 +2,6 @@
 //! texel, charts below a texel, coordinates out of range. What each must give is a closed form.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
@@ -10,7 +9,7 @@ use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::Material;
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -21,7 +20,7 @@ fn run(world: &mut World, side: u32) -> BakeReport {
 
 fn run_with(world: &mut World, side: u32, quality: Quality) -> BakeReport {
     let options = BakeOptions { density: Density::MapSize(side), quality, ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(&options).run(world).expect("the scene bakes")
 }
 
 /// A box seen from inside.
@@ -184,7 +183,7 @@ fn charts_below_a_texel_have_light() {
         quality: Quality::Draft,
         ..BakeOptions::default()
     };
-    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    Bake::new(&options).run(&mut world).expect("the scene bakes");
     let surfaces = common::lightmapped(&mut world);
     for [a, b, c] in crumbs.triangles().map(|t| t.map(|v| crumbs.positions[v as usize].as_dvec3())) {
         let normal = (b - a).cross(c - a).normalize();

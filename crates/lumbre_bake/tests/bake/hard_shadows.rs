@@ -2,13 +2,12 @@
 //! The texels that a shadow's edge crosses have their part, and so the sum is as exact as they are.
 
 use std::f64::consts::FRAC_1_PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeOptions, Density, bake};
+use lumbre_bake::{Bake, BakeOptions, Density};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
@@ -45,7 +44,7 @@ fn mean(world: &mut World, floor: Entity) -> f64 {
 /// Of so many texels along a side.
 fn mean_of(world: &mut World, floor: Entity, side: u32) -> f64 {
     let options = BakeOptions { density: Density::MapSize(side), ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    Bake::new(&options).run(world).expect("the scene bakes");
     let map = &world.get::<Lightmap>(floor).expect("it was baked").image;
     let texels = map.texels.iter().map(|texel| f64::from(texel.y));
     texels.sum::<f64>() / (f64::from(map.width) * f64::from(map.height)) / FRAC_1_PI

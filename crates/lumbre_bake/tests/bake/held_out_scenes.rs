@@ -4,12 +4,11 @@
 
 #![allow(clippy::print_stdout, reason = "the figures are what one wants to see of it")]
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use bevy_ecs::world::World;
 use glam::DVec3;
-use lumbre_bake::{BakeOptions, Density, bake};
+use lumbre_bake::{Bake, BakeOptions, Density};
 
 use crate::held_out::judgement::{Judgement, judge};
 use crate::held_out::reference_points::read;
@@ -19,7 +18,7 @@ fn baked(scene: fn(u64, f64) -> World, name: &str, density: f64) -> Judgement {
     let mut world = scene(0, 1.0);
     let options =
         BakeOptions { density: Density::TexelsPerMeter(density), error: 0.02, ..BakeOptions::default() };
-    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    Bake::new(&options).run(&mut world).expect("the scene bakes");
     let points = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(format!("{name}.csv"));
     let found = judge(&mut world, &read(&points));
     println!("{name}: {found}");

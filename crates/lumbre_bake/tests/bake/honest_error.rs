@@ -3,14 +3,13 @@
 
 #![allow(clippy::print_stdout, reason = "the shares are what one wants to see of it")]
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::scene_parts::matt;
 use crate::{common, held_out};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality, TexelErrors};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
@@ -61,7 +60,7 @@ struct Texels {
 }
 
 fn baked(mut world: World, options: &BakeOptions) -> (BakeReport, Texels) {
-    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    let report = Bake::new(options).run(&mut world).expect("the scene bakes");
     let mut query = world.query::<(&Lightmap, &TexelErrors)>();
     let mut maps: Vec<_> =
         query.iter(&world).map(|(map, error)| (map.image.clone(), error.0.clone())).collect();

@@ -8,7 +8,7 @@ use crate::common;
 use crate::scene_parts::{matt, run};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeError, BakeOptions, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeError, BakeOptions, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -264,11 +264,13 @@ fn only_what_is_called_for() {
 fn cancelling_leaves_the_world_alone() {
     let mut world = furnished(1.0, COLORS);
     let mut calls = 0;
-    let result = bake(&mut world, &draft(32), &mut |progress| {
-        calls += 1;
-        assert!((0.0..=1.0).contains(&progress.fraction));
-        if progress.stage == "final gather" { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    let result = Bake::new(&draft(32))
+        .progress(|progress| {
+            calls += 1;
+            assert!((0.0..=1.0).contains(&progress.fraction));
+            if progress.stage == "final gather" { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .run(&mut world);
     assert_eq!(result, Err(BakeError::Cancelled { stage: "final gather" }));
     assert!(calls > 3);
     assert!(common::maps(&mut world).is_empty());
@@ -284,7 +286,7 @@ fn options_out_of_range_are_named() {
         (BakeOptions { error: 0.0, ..draft(4) }, "error"),
         (BakeOptions { threads: Some(0), ..draft(4) }, "threads"),
     ] {
-        let error = bake(&mut World::new(), &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        let error = Bake::new(&options).run(&mut World::new()).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
     }
 }

@@ -1,7 +1,6 @@
 //! Light does not leak: two rooms with a thin wall between them and no opening, a lamp in one of them.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
@@ -9,7 +8,7 @@ use crate::scene_parts::grey;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DQuat, DVec2, DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality, TexelErrors};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, Transform};
@@ -73,7 +72,7 @@ fn run(world: &mut World) -> BakeReport {
 fn run_with(world: &mut World, quality: Quality) -> BakeReport {
     let options =
         BakeOptions { density: Density::TexelsPerMeter(1.0 / TEXEL), quality, ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(&options).run(world).expect("the scene bakes")
 }
 
 /// A point of a surface as the scene was modelled, the irradiance there by bilinear look-up, and the largest error stated

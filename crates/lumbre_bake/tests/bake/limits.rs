@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::world::World;
 use glam::Vec3;
-use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Ended, Progress, Quality, TexelErrors, bake};
+use lumbre_bake::{Bake, BakeError, BakeOptions, BakeReport, Density, Ended, Progress, Quality, TexelErrors};
 use lumbre_optics::{BakeMode, Light, Material};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
 
@@ -24,7 +24,7 @@ fn baked(
     progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
 ) -> (World, BakeReport) {
     let mut world = corner();
-    let report = bake(&mut world, options, progress).unwrap();
+    let report = Bake::new(options).progress(progress).run(&mut world).unwrap();
     (world, report)
 }
 
@@ -101,7 +101,7 @@ fn what_a_large_map_hides_is_told_without_any_time() {
             time,
             ..options()
         };
-        let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+        let report = Bake::new(&options).run(&mut world).unwrap();
         (texels(&mut world).len(), report)
     };
     let (closely, report) = shown(None);
@@ -130,7 +130,7 @@ fn the_end_is_named() {
 fn less_memory_means_fewer_patches_and_none_an_error_that_says_what_to_do() {
     let within = |memory| {
         let mut world = corner();
-        bake(&mut world, &BakeOptions { memory, ..options() }, &mut |_| ControlFlow::Continue(()))
+        Bake::new(&BakeOptions { memory, ..options() }).run(&mut world)
     };
     let free = within(None).unwrap();
     let enough = within(Some(free.memory_bytes)).unwrap();
@@ -188,7 +188,7 @@ fn baked_alone(
         Light { bake: BakeMode::Static, ..Light::point(Vec3::ONE) },
         Transform::from_xyz(5.0, 1.0, 9.0),
     ));
-    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(()));
+    let report = Bake::new(options).run(&mut world);
     (report, world.get::<Lightmap>(own).map(|map| map.image.width))
 }
 
@@ -232,7 +232,7 @@ fn the_scanned_bunny_fits_a_larger_map() {
     lumbre_scene::load(&mut world, &model).unwrap();
     let options = BakeOptions { density: Density::MapSize(64), ..options() };
     // Without a light in the file, only the layout is made.
-    let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let report = Bake::new(&options).run(&mut world).unwrap();
     assert!(
         report.warnings.iter().any(|warning| warning.contains("do not fit a map of 64 x 64")),
         "{:?}",

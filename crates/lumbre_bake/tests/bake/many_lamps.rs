@@ -4,13 +4,12 @@
 #![allow(clippy::print_stdout, reason = "the figures are what one wants to see of it")]
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
@@ -43,7 +42,7 @@ fn judge(name: &str, world: &mut World, value: impl Fn(DVec3) -> f64) -> BakeRep
     spawn_square(world, Vec3::ZERO, 4.0, true, 0.0);
     let options =
         BakeOptions { density: Density::TexelsPerMeter(24.0), error: 0.01, ..BakeOptions::default() };
-    let report = bake(world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    let report = Bake::new(&options).run(world).expect("the scene bakes");
     let point = |i: i32| {
         let place = |at: i32| 0.27 * f64::from(at - 6) + 0.011;
         let position = DVec3::new(place(i % 13), 0.0, place(i / 13));

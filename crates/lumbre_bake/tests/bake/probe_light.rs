@@ -5,10 +5,9 @@
 
 use std::f64::consts::PI;
 use std::fmt;
-use std::ops::ControlFlow;
 
 use glam::DVec3;
-use lumbre_bake::{BakeOptions, Density, Probes, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, Density, Probes, Quality};
 use lumbre_scene::{GlobalTransform, IrradianceVolume, VolumePlace};
 
 use crate::held_out::path_tracer::{Effort, Irradiance, PathTracer};
@@ -105,7 +104,7 @@ impl Judge {
             quality,
             ..BakeOptions::default()
         };
-        let report = bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+        let report = Bake::new(&options).run(&mut world).expect("the scene bakes");
         println!("{:?}", report.probes);
         let mut volumes = world.query::<(&IrradianceVolume, &GlobalTransform)>();
         let (volume, transform) = volumes.single(&world).expect("there is one volume");

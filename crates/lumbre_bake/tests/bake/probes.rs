@@ -1,12 +1,11 @@
 //! Irradiance probes against closed forms: closed boxes, a lit plane, solids between the probes; when they are called for.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::scene_parts::{matt, run};
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Probes, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{DynamicObject, EmissiveLight, IrradianceVolume, Mesh, Name, StaticObject, Transform};
@@ -245,7 +244,7 @@ fn only_where_something_moves() {
 
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = BakeOptions { probe_spacing: Some(spacing), ..draft() };
-        let error = bake(&mut still(), &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        let error = Bake::new(&options).run(&mut still()).unwrap_err();
         assert!(error.to_string().contains("probe spacing"), "{error}");
     }
 }

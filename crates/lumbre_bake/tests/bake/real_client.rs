@@ -6,13 +6,12 @@
 //! radiance, so a texel is E/π with an exposure of 1 (where the camera's own exposure is 1).
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use crate::common;
 use bevy_ecs::world::World;
 use glam::{DMat4, DVec2, DVec3};
-use lumbre_bake::{BakeOptions, Density, Probes, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, Density, Probes, Quality};
 use lumbre_scene::{LightmapEncoding, PackedFormat, SaveOptions, Supercompression, load, save_with};
 
 /// A texture as Bevy would upload it.
@@ -172,7 +171,7 @@ fn baked(model: &Path, density: Density, error: f64) -> World {
         probes: Probes::Never,
         ..BakeOptions::default()
     };
-    bake(&mut world, &options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    Bake::new(&options).run(&mut world).expect("the scene bakes");
     world
 }
 

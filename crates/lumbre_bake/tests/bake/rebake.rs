@@ -9,7 +9,7 @@ use std::sync::Arc;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{
-    BakeOptions, BakeReport, Checkpoint, Density, Probes, Samples, SamplesError, TexelErrors, bake, rebake,
+    Bake, BakeOptions, BakeReport, Checkpoint, Density, Probes, Samples, SamplesError, TexelErrors,
 };
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
@@ -75,8 +75,8 @@ fn texels(world: &mut World) -> (Vec<DVec3>, Vec<f32>) {
 }
 
 fn baked(mut world: World, former: Option<&Samples>, options: &BakeOptions) -> (World, BakeReport, Samples) {
-    let (report, samples) = rebake(&mut world, options, former, None, &mut |_| ControlFlow::Continue(()))
-        .expect("the rooms bake");
+    let (report, samples) =
+        Bake::new(options).former(former).run_keeping_samples(&mut world).expect("the rooms bake");
     (world, report, samples.expect("there is light"))
 }
 
@@ -301,28 +301,27 @@ fn the_same_bits_on_any_number_of_threads_from_a_file_and_after_an_interruption(
         ..Checkpoint::new(folder.path().join("checkpoint"), resume)
     };
     let mut world = rooms(LAMP, &[moved]);
-    let interrupted =
-        rebake(&mut world, &options(), Some(&read), Some(&checkpoint(false)), &mut |progress| match progress
-            .stage
-            == "final gather"
-            && progress.stage_fraction > 0.3
-        {
+    let interrupted = Bake::new(&options())
+        .former(&read)
+        .checkpoint(&checkpoint(false))
+        .progress(|progress| match progress.stage == "final gather" && progress.stage_fraction > 0.3 {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
-        });
+        })
+        .run_keeping_samples(&mut world);
     assert!(interrupted.is_err());
-    let (report, _) = rebake(&mut world, &options(), Some(&read), Some(&checkpoint(true)), &mut |_| {
-        ControlFlow::Continue(())
-    })
-    .expect("it goes on");
+    let (report, _) = Bake::new(&options())
+        .former(&read)
+        .checkpoint(&checkpoint(true))
+        .run_keeping_samples(&mut world)
+        .expect("it goes on");
     assert!(report.resumed_seconds > 0.0);
     assert_eq!(report.warnings, Vec::<String>::new());
     assert!(texels(&mut world).0 == expected, "the interruption leaves the bits as they are");
     // The same scene, to be baked whole, is another bake.
-    let (report, _) =
-        rebake(&mut rooms(LAMP, &[moved]), &options(), None, Some(&checkpoint(true)), &mut |_| {
-            ControlFlow::Continue(())
-        })
+    let (report, _) = Bake::new(&options())
+        .checkpoint(&checkpoint(true))
+        .run_keeping_samples(&mut rooms(LAMP, &[moved]))
         .expect("it bakes");
     assert!(report.warnings.iter().any(|w| w.contains("another")), "{:?}", report.warnings);
 }
@@ -334,7 +333,7 @@ fn what_cannot_be_kept_is_said_and_baked() {
     let (again, report, _) = baked(rooms(LAMP, &[IN_THE_DARK]), Some(&samples), &other);
     assert!(report.rebake.is_some_and(|r| r.whole.contains("other options")));
     let mut whole = rooms(LAMP, &[IN_THE_DARK]);
-    bake(&mut whole, &other, &mut |_| ControlFlow::Continue(())).expect("it bakes");
+    Bake::new(&other).run(&mut whole).expect("it bakes");
     let (mut a, mut b) = (again, whole);
     assert!(texels(&mut a).0 == texels(&mut b).0, "then it is the bake that it always was");
     let far = (Vec3::new(60.0, 0.0, 0.0), RED);

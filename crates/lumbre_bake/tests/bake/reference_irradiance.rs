@@ -1,11 +1,9 @@
 //! Whole bakes against converged irradiance from an independent path tracer, looked up bilinearly in the map.
 //! The points and scenes are measured data beside the checkout; without them the tests say so and compare nothing.
 
-use std::ops::ControlFlow;
-
 use crate::common;
 use bevy_ecs::world::World;
-use lumbre_bake::{BakeOptions, Density, bake};
+use lumbre_bake::{Bake, BakeOptions, Density};
 
 /// Median, 95th percentile, RMSE and bias, relative to the mean irradiance. Measured at these sizes and this error asked
 /// for: 0.7, 3.5, 2.6, -0.2 % and 0.6, 3.2, 1.6, 0.2 %; another seed moves them by a tenth of that.
@@ -16,7 +14,7 @@ fn bake_and_compare(model: &str, reference: &str, options: &BakeOptions) -> Opti
     let (model, reference) = (common::shared(model)?, common::shared(reference)?);
     let mut world = World::new();
     lumbre_scene::load(&mut world, &model).expect("the model loads");
-    let report = bake(&mut world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes");
+    let report = Bake::new(options).run(&mut world).expect("the scene bakes");
     let found = common::compare(&mut world, &common::read_reference(&reference));
     eprintln!(
         "{}: {:.1} s, {} texels, {} patches, {:.2} Mrays/s; estimated error {:.2} %; {found}",

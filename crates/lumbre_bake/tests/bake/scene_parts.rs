@@ -1,10 +1,8 @@
 //! Materials, and the plain bake, that the tests of several subjects use.
 
-use std::ops::ControlFlow;
-
 use bevy_ecs::world::World;
 use glam::Vec3;
-use lumbre_bake::{BakeOptions, BakeReport, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport};
 use lumbre_optics::{Material, Surface};
 
 /// A diffuse material that shines by itself, both faces.
@@ -20,5 +18,5 @@ pub fn grey(reflectance: f32, emission: f32) -> Material {
 
 /// A bake of a World that can be baked.
 pub fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(options).run(world).expect("the scene bakes")
 }

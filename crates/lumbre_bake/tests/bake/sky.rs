@@ -1,13 +1,12 @@
 //! Light of the sky: scenes whose irradiance is known in closed form.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Mesh, SceneSettings, StaticObject};
@@ -20,7 +19,7 @@ fn options(side: u32, quality: Quality) -> BakeOptions {
 
 fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
     world.insert_resource(SceneSettings { sky: SKY, ..SceneSettings::default() });
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(options).run(world).expect("the scene bakes")
 }
 
 fn matt(reflectance: f32, emission: Vec3) -> Material {
@@ -170,10 +169,10 @@ fn furnace_under_the_sky() {
 fn no_sky_is_no_work_and_says_so() {
     let mut world = World::new();
     world.spawn((floor(1.0), matt(0.5, Vec3::ONE), StaticObject));
-    let report = bake(&mut world, &options(16, Quality::Draft), &mut |_| ControlFlow::Continue(())).unwrap();
+    let report = Bake::new(&options(16, Quality::Draft)).run(&mut world).unwrap();
     assert!(report.skipped.iter().any(|line| line == "sky light: the scene has no sky"), "{report}");
     let mut dark = World::new();
     dark.spawn((floor(1.0), matt(0.5, Vec3::ZERO), StaticObject));
-    let report = bake(&mut dark, &options(16, Quality::Draft), &mut |_| ControlFlow::Continue(())).unwrap();
+    let report = Bake::new(&options(16, Quality::Draft)).run(&mut dark).unwrap();
     assert!(report.rays == 0 && report.skipped[0].contains("there is no sky"), "{report}");
 }

@@ -1,21 +1,19 @@
 //! Shadows of lights with a size, in closed form.
 
 use std::f64::consts::{FRAC_1_PI, PI};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Mesh, StaticObject, Transform};
 
 fn run(world: &mut World, side: u32) -> BakeReport {
     let options = BakeOptions { density: Density::MapSize(side), error: 0.0005, ..BakeOptions::default() };
-    let report =
-        bake(world, &BakeOptions { quality: Quality::Final, ..options }, &mut |_| ControlFlow::Continue(()));
+    let report = Bake::new(&BakeOptions { quality: Quality::Final, ..options }).run(world);
     report.expect("the scene bakes")
 }
 

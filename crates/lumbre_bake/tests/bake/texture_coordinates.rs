@@ -1,12 +1,11 @@
 //! Textures that read TEXCOORD_1, which the lightmap needs: what moves, what stays and what is refused; through files, too.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{Vec2, Vec3};
-use lumbre_bake::{BakeError, BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeError, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{
@@ -56,7 +55,7 @@ fn run(world: &mut World) -> Result<BakeReport, BakeError> {
     world.spawn((light, Transform::from_xyz(0.0, 1.0, 0.0)));
     let options =
         BakeOptions { density: Density::MapSize(24), quality: Quality::Draft, ..BakeOptions::default() };
-    bake(world, &options, &mut |_| ControlFlow::Continue(()))
+    Bake::new(&options).run(world)
 }
 
 /// Where the texture is read at each corner of each triangle.

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec2, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Checkpoint, bake, bake_with};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Checkpoint};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_scene::{Lightmap, Mesh, StaticObject, save};
 use serde_json::{Value, json};
@@ -135,14 +135,16 @@ fn bits_after_an_interruption() -> Outcome {
     let path = folder.path().join("checkpoint");
     let kept = |resume| Checkpoint { interval: Duration::ZERO, ..Checkpoint::new(&path, resume) };
     for stop in [0.2, 0.5, 0.9] {
-        let stopped = bake_with(&mut corner(), &quick(), Some(&kept(stop > 0.2)), &mut |progress| {
-            if progress.fraction >= stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
+        let stopped = Bake::new(&quick())
+            .checkpoint(&kept(stop > 0.2))
+            .progress(|progress| {
+                if progress.fraction >= stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .run(&mut corner());
         assert!(stopped.is_err(), "it was to be interrupted at {stop}");
     }
     let (mut resumed, mut whole) = (corner(), corner());
-    bake_with(&mut resumed, &quick(), Some(&kept(true)), &mut |_| ControlFlow::Continue(()))
-        .expect("it goes on");
+    Bake::new(&quick()).checkpoint(&kept(true)).run(&mut resumed).expect("it goes on");
     run(&mut whole, &quick());
     let why = "texels that differ in a bit from those of a bake that was never stopped; this one three times";
     Outcome::number(0.0, crate::scenes::different(&mut resumed, &mut whole), 0.0, why)
@@ -150,9 +152,12 @@ fn bits_after_an_interruption() -> Outcome {
 
 fn nothing_of_an_interrupted_bake_is_in_the_world() -> Outcome {
     let mut world = corner();
-    let stopped = bake(&mut world, &quick(), &mut |progress| {
-        if progress.fraction >= 0.7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    let stopped =
+        Bake::new(&quick())
+            .progress(|progress| {
+                if progress.fraction >= 0.7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .run(&mut world);
     assert!(stopped.is_err());
     let touched = world.query::<&Mesh>().iter(&world).filter(|mesh| !mesh.0.uv1.is_empty()).count();
     Outcome::number(
@@ -167,9 +172,7 @@ fn a_checkpoint_that_is_something_else() -> Outcome {
     let folder = tempfile::tempdir().expect("there is room for it");
     let path = folder.path().join("diary");
     fs::write(&path, "mine").expect("the folder takes it");
-    let refused = bake_with(&mut corner(), &quick(), Some(&Checkpoint::new(&path, true)), &mut |_| {
-        ControlFlow::Continue(())
-    });
+    let refused = Bake::new(&quick()).checkpoint(&Checkpoint::new(&path, true)).run(&mut corner());
     assert_eq!(fs::read(&path).expect("it is there"), b"mine");
     let refused = refused.expect_err("it has to be refused").to_string();
     Outcome::text(

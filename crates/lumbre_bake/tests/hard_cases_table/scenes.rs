@@ -1,13 +1,12 @@
 //! Small scenes and what is read of them, for the cases. Not the cases.
 
 use std::f64::consts::{FRAC_1_PI, PI};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, BakeReport, Density, Quality, bake};
+use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Quality};
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_scene::{Lightmap, Mesh, Name, StaticObject, Transform};
@@ -19,7 +18,7 @@ pub fn draft(side: u32) -> BakeOptions {
 }
 
 pub fn run(world: &mut World, options: &BakeOptions) -> BakeReport {
-    bake(world, options, &mut |_| ControlFlow::Continue(())).expect("the scene bakes")
+    Bake::new(options).run(world).expect("the scene bakes")
 }
 
 pub fn matt(reflectance: f32, emission: f32) -> Material {

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 
 use super::samples::{Reading, Sample};
 use super::{Maps, NO_CHART};
+use crate::cancel_token::CancelToken;
 use crate::report::SeamReport;
-use crate::stop::Stop;
 
 /// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.
 const STIFFNESS: f64 = 0.02;
@@ -81,7 +81,7 @@ impl Unknowns {
         filled: &mut [Vec3],
         mean: f64,
         patience: Patience,
-        stop: &Stop,
+        stop: &CancelToken,
     ) -> SeamReport {
         let equations: Vec<Equation> = samples.iter().map(|sample| self.equation(sample)).collect();
         let channels: Vec<(Vec<f64>, [f64; 2])> = (0..3usize)
@@ -203,11 +203,17 @@ struct Channel<'a> {
     stiffness: Vec<f64>,
     /// Of the system's diagonal, 1 over it.
     preconditioner: Vec<f64>,
-    stop: &'a Stop,
+    stop: &'a CancelToken,
 }
 
 impl<'a> Channel<'a> {
-    fn new(equations: &'a [Equation], values: &[f64], variances: &[f64], mean: f64, stop: &'a Stop) -> Self {
+    fn new(
+        equations: &'a [Equation],
+        values: &[f64],
+        variances: &[f64],
+        mean: f64,
+        stop: &'a CancelToken,
+    ) -> Self {
         let floor = (FLOOR * mean).powi(2);
         let stiffness: Vec<f64> = variances.iter().map(|variance| 1.0 / (variance + floor)).collect();
         let mut diagonal = stiffness.clone();
@@ -287,7 +293,7 @@ impl<'a> Channel<'a> {
         let mut energy = dot(&residual, &scaled);
         let enough = energy * RESIDUAL * RESIDUAL;
         for _ in 0..steps {
-            if energy <= enough || !energy.is_finite() || self.stop.is_set() {
+            if energy <= enough || !energy.is_finite() || self.stop.is_cancelled() {
                 break;
             }
             let mut product = multiply(&direction, None);

@@ -18,10 +18,11 @@ mod samples;
 use glam::Vec3;
 
 use super::footprint::Texel;
+use crate::progress::Watch;
 use crate::report::SeamReport;
 use crate::scene::{BakeScene, LightmapLayout};
-pub(crate) use least_squares::Patience;
-use least_squares::Unknowns;
+use crate::{BakeError, BakeOptions, BakeReport};
+use least_squares::{Patience, Unknowns};
 
 /// The maps as they are before the seams are closed.
 pub(crate) struct Maps<'a> {
@@ -39,7 +40,7 @@ pub(crate) struct Maps<'a> {
 const NO_CHART: u32 = u32::MAX;
 
 /// What closing came to.
-pub(crate) struct Closed {
+struct Closed {
     /// What was done, or why there was nothing to do.
     pub report: Result<SeamReport, &'static str>,
     pub rays: u64,
@@ -47,8 +48,34 @@ pub(crate) struct Closed {
     pub warning: Option<String>,
 }
 
+/// Closes the seams of `filled`, if that is asked for, and notes in the report what came of it.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn close_seams(
+    maps: &Maps<'_>,
+    filled: &mut [Vec3],
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<(), BakeError> {
+    if !options.seams {
+        report.skipped.push("seams: switched off".into());
+        return Ok(());
+    }
+    let patience = if watch.clock().late() { Patience::LATE } else { Patience::WHOLE };
+    let closed = watch.during(0.0, || close(maps, filled, patience))?;
+    report.rays += closed.rays;
+    report.warnings.extend(closed.warning);
+    match closed.report {
+        Ok(closed) => report.seams = closed,
+        Err(reason) => report.skipped.push(format!("seams: {reason}")),
+    }
+    Ok(())
+}
+
 /// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known).
-pub(crate) fn close_seams(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
+fn close(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
     if maps.mean.is_nan() || maps.mean <= 0.0 {
         return Closed { report: Err("the maps are black"), rays: 0, warning: None };
     }

@@ -67,7 +67,7 @@ impl Sampling<'_> {
             let mut own = Found { samples: Vec::new(), pairs: 0, rays: 0, crowded: 0 };
             let (near, crowded) = grid.near(index);
             own.crowded = usize::from(crowded);
-            for other in near.into_iter().take_while(|_| !self.maps.scene.stop.is_set()) {
+            for other in near.into_iter().take_while(|_| !self.maps.scene.stop.is_cancelled()) {
                 let before = own.samples.len();
                 own.rays += self.between(index, other, &mut own.samples);
                 own.pairs += usize::from(own.samples.len() > before);

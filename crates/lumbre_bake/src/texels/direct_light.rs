@@ -2,7 +2,10 @@
 //! there or next to it, saw a source partly or differently, unless it was exact (a penumbra's faint ends are found by their neighbours),
 //! then more where the error asked for is not in sight. The other sources share samples: that is `shared_light`.
 
+use glam::Vec3;
+
 use super::allocation::allot;
+use super::covered_texels::CoveredTexels;
 use super::footprint::{Texel, receiver};
 use super::light_cuts::LightCuts;
 use super::local_light::LocalLight;
@@ -14,22 +17,44 @@ use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
 use crate::transport::direct::{Direct, Seen, Sources};
-use crate::{BakeError, BakeOptions};
+use crate::{BakeError, BakeOptions, BakeReport};
 
 /// How far a penumbra is suspected around a texel that saw one, in texels.
 const REACH: u32 = 2;
 
+/// What arrives from lamps, lights and emissive surfaces without a bounce.
+pub(crate) struct DirectLight {
+    /// Per covered texel.
+    pub texels: Vec<Direct>,
+    /// The light around each of them, beside which errors count.
+    pub local: LocalLight,
+}
+
+impl DirectLight {
+    /// Per texel of all maps, irradiance (mixed lights included); NaN where nothing is shown.
+    pub fn by_place(&self, texels: &CoveredTexels<'_>) -> Vec<Vec3> {
+        let mut total = vec![Vec3::NAN; texels.layout.texels];
+        for (texel, direct) in texels.list.iter().zip(&self.texels).filter(|(texel, _)| !texel.is_hidden()) {
+            total[texel.index as usize] = direct.total();
+        }
+        total
+    }
+}
+
 /// Direct light of every covered texel, and the light around it. What is `known` of a former bake stays as it is; an empty list knows nothing.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
 pub(crate) fn direct_light(
     sources: &Sources<'_>,
-    layout: &LightmapLayout,
-    texels: &[Texel],
-    charts: &[u32],
+    texels: &CoveredTexels<'_>,
     known: &[Option<Direct>],
     options: &BakeOptions,
     watch: &mut Watch<'_>,
-) -> Result<(Vec<Direct>, LocalLight), BakeError> {
+    report: &mut BakeReport,
+) -> Result<DirectLight, BakeError> {
     let scene = sources.scene;
+    let CoveredTexels { layout, list: texels, charts, .. } = texels;
     let known = |index: u32| known.get(index as usize).copied().flatten();
     let [few, many, most] = options.effort().direct;
     let mut cuts = watch.during(1.0, || LightCuts::new(sources, texels, charts))?;
@@ -113,7 +138,9 @@ pub(crate) fn direct_light(
         let left = goal - sum(&relative(&direct, &local));
         shared.finish(&mut direct, &local, left.max(own_goal), watch)?;
     }
-    Ok((direct, local))
+    let new = unknown.iter().map(|&index| u64::from(direct[index as usize].rays));
+    report.rays += new.sum::<u64>();
+    Ok(DirectLight { texels: direct, local })
 }
 
 /// Of the squared error asked for, what direct light may have for itself.
