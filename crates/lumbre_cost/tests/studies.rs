@@ -14,7 +14,7 @@ use lumbre_cost::{
     read_report, studies_named,
 };
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{Light, Material, Surface};
+use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_render::Gpu;
 use lumbre_scene::{Camera, Mesh, Name, StaticObject, Transform, save};
 
@@ -106,6 +106,49 @@ fn a_furnace_is_baked_without_error() {
         );
         assert!(point.counts["texels"] > 100.0);
     }
+}
+
+/// Two closed rooms apart from each other, each with a lamp; in one stand a box and the camera.
+fn two_rooms() -> World {
+    let mut world = World::new();
+    let mut inward = shapes::cuboid(Vec3::new(4.0, 2.5, 4.0), 1);
+    inward.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
+    inward.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let room = Mesh(Arc::new(inward));
+    for (name, x) in [("near room", 0.0), ("far room", 9.0)] {
+        let place = Transform::from_xyz(x, 1.25, 0.0);
+        let walls = Material::matt(Vec3::new(0.8, 0.7, 0.5));
+        world.spawn((Name::new(name), room.clone(), walls, StaticObject, place));
+        let lamp = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(2.0)) };
+        world.spawn((Name::new("lamp"), lamp, Transform::from_xyz(x + 1.0, 2.0, 1.0)));
+    }
+    let cuboid = Mesh(Arc::new(shapes::cuboid(Vec3::splat(0.5), 1)));
+    let at = Transform::from_xyz(-0.5, 0.25, -0.5);
+    world.spawn((Name::new("small box"), cuboid, Material::matt(Vec3::splat(0.4)), StaticObject, at));
+    let eye = Transform::from_xyz(1.5, 1.4, 1.5).looking_at(DVec3::new(-0.5, 0.5, -0.5), DVec3::Y);
+    world.spawn((Name::new("eye"), Camera::default(), eye));
+    world
+}
+
+#[test]
+fn lightmaps_beat_ambient_light_and_a_far_room_is_not_baked_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = saved(folder.path(), "rooms.glb", two_rooms());
+    let report = measured(&options(&["preprocessing"], vec![path]), &folder.path().join("report"));
+    let study = report.study("preprocessing").unwrap();
+    let error = |label: &str| {
+        let point = study.of_series("frame").find(|point| point.label == label).unwrap();
+        point.error.unwrap().relative_rmse
+    };
+    let (alone, ambient, lightmaps) =
+        (error("by lamps alone"), error("with the best ambient light"), error("with lightmaps"));
+    assert!(lightmaps < ambient && ambient < 0.8 * alone, "{alone} {ambient} {lightmaps}");
+    let bakes: Vec<&Point> = study.of_series("bake after a change").collect();
+    let [whole, changed] = bakes[..] else { panic!("{bakes:?}") };
+    assert!(changed.label.contains("small box"), "{}", changed.label);
+    // Half of the level is another room; form factors take as many rays in any case.
+    assert!(changed.counts["rays"] < 0.85 * whole.counts["rays"], "{changed:?} {whole:?}");
+    assert!(study.findings.len() == 3 && study.notes.is_empty(), "{:?} {:?}", study.findings, study.notes);
 }
 
 /// Root mean square difference over that of the reference, by the plain formula.

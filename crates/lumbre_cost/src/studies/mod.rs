@@ -6,6 +6,7 @@ mod lamps;
 mod light_transport;
 mod lightmaps;
 mod precision;
+mod preprocessing;
 mod reflection;
 mod shading;
 
@@ -31,6 +32,11 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "lamps", about: "many lights, and how they are found", run: lamps::run },
     StudyKind { name: "effects", about: "every effect of a scene, switched off in turn", run: effects::run },
     StudyKind { name: "bake", about: "the error that a bake is asked for", run: bake::run },
+    StudyKind {
+        name: "preprocessing",
+        about: "light that bounces, before the game or in it",
+        run: preprocessing::run,
+    },
     StudyKind { name: "transport", about: "from the frame to the truth", run: light_transport::run },
     StudyKind { name: "reflection", about: "reflection models against Phong's", run: reflection::run },
     StudyKind { name: "lightmaps", about: "density and format of lightmaps", run: lightmaps::run },

@@ -1,0 +1,310 @@
+//! Light that bounces, before the game or in it: what it costs a frame when it was baked, what baking takes, and what it takes again when something of the
+//! level has moved. Not how good a bake of which price is: that is `bake`.
+
+use std::time::Duration;
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use lumbre_bake::{BakeOptions, Quality, Samples};
+use lumbre_optics::Material;
+use lumbre_render::FrameOptions;
+use lumbre_scene::{
+    ChildOf, EmissiveLight, GlobalTransform, Mesh, Name, SceneSettings, StaticObject, Transform,
+    hidden_entities,
+};
+
+use super::over_scenes;
+use crate::baked::{Baked, bake_arguments, bake_options, bake_world, maps_of, texel_error};
+use crate::findings::{error_of, is_above_one, milliseconds, ratio_of, rounded};
+use crate::frames::{DrawnFrame, Frame, draw_frames, draw_picture};
+use crate::measured::Measured;
+use crate::picture::Picture;
+use crate::scene_file::SceneFile;
+use crate::scenes::Air;
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Spread, Study};
+
+const SECONDS: f64 = 4.0;
+/// Bakes take seconds: each is done so often.
+const ROUNDS: usize = 2;
+/// What moves goes by this part of its longest side.
+const STEP: f64 = 0.1;
+const FRAME: &str = "frame";
+const BAKE: &str = "bake after a change";
+const BEFORE: &str = "baked before, ms";
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
+}
+
+fn study() -> Study {
+    Study {
+        name: "preprocessing".into(),
+        title: "Before the game, or in it".into(),
+        question: "Light that bounces is baked once and read in every frame: what does a frame pay for it, what does the bake take, and what does it take again when something has moved?".into(),
+        reference: "frames: the frame with lightmaps of a converged bake; bakes after a change: a converged bake of the changed level, whose own noise is taken off".into(),
+        plots: vec![Plot {
+            title: "Error against time".into(),
+            across: Quantity::Milliseconds,
+            up: Quantity::Error,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let part = |share: f64| before + share * (after - before);
+    let options = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 1_500.0))?;
+    let options = BakeOptions { error: 0.02, ..options };
+    let converged = BakeOptions {
+        quality: Quality::Reference,
+        error: 1e-3,
+        time: Some(Duration::from_secs_f64(conditions.unless_quick(10.0, 2.0))),
+        seed: conditions.seed.wrapping_add(99),
+        denoise: false,
+        ..options
+    };
+    let open = || scene.open(conditions.aspect());
+    let (baked, samples) = bake_world(conditions, open()?, &options, None, [part(0.0), part(0.1)])?;
+    let (mut truth, _) = bake_world(conditions, open()?, &converged, None, [part(0.1), part(0.3)])?;
+    let truth = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
+    let first = measured.study.points.len();
+    let drawn = frames(conditions, scene, baked, &options, truth, [part(0.3), part(0.6)], measured)?;
+    let findings = findings_of_frames(&scene.name, &measured.study.points[first..], &drawn);
+    measured.study.findings.extend(findings);
+
+    let mut changed = open()?;
+    let Some(moved) = moved(&mut changed) else {
+        measured
+            .study
+            .notes
+            .push(format!("Nothing of {} could be moved: all of it shines or moves already.", scene.name));
+        return Ok(());
+    };
+    let Some(samples) = samples else {
+        measured.study.notes.push(format!("The bake of {} left no samples to keep.", scene.name));
+        return Ok(());
+    };
+    let changed = || -> Result<World, CostError> {
+        let mut world = open()?;
+        self::moved(&mut world);
+        Ok(world)
+    };
+    let first = measured.study.points.len();
+    let (mut truth, _) = bake_world(conditions, changed()?, &converged, None, [part(0.6), part(0.8)])?;
+    let truth = maps_of(&mut truth.world);
+    let (mut whole, mut kept) = (Vec::new(), Vec::new());
+    let mut last = None;
+    for round in 0..ROUNDS {
+        let share = |step: usize| part(0.8 + 0.2 * (2 * round + step) as f64 / (2 * ROUNDS) as f64);
+        let bake = |former: Option<&Samples>, step| {
+            let (baked, _) =
+                bake_world(conditions, changed()?, &options, former, [share(step), share(step + 1)])?;
+            Ok::<Baked, CostError>(baked)
+        };
+        let (of_all, of_change) = (bake(None, 0)?, bake(Some(&samples), 1)?);
+        whole.push(1e3 * of_all.report.seconds);
+        kept.push(1e3 * of_change.report.seconds);
+        last = Some([of_all, of_change]);
+    }
+    let labels = [format!("whole, {moved} moved"), format!("what {moved} changed")];
+    let whole_for = last.as_ref().and_then(|[_, of_change]| of_change.report.rebake.as_ref());
+    if let Some(why) = whole_for.map(|rebake| &rebake.whole).filter(|why| !why.is_empty()) {
+        measured.study.notes.push(format!("Of {} nothing was kept: {why}.", scene.name));
+    }
+    for ((mut baked, label), times) in last.into_iter().flatten().zip(labels).zip([&whole, &kept]) {
+        let error = texel_error(&maps_of(&mut baked.world), &truth);
+        measured.study.points.push(Point {
+            series: named(conditions, scene, BAKE),
+            label,
+            milliseconds: Spread::of(times),
+            error,
+            counts: [
+                ("rays".to_owned(), baked.report.rays as f64),
+                ("texels".to_owned(), baked.report.texels as f64),
+            ]
+            .into(),
+            command: "lumbre cost -o again --study preprocessing".into(),
+            ..Point::default()
+        });
+    }
+    let finding = finding_of_change(&moved, &measured.study.points[first..], &whole, &kept);
+    measured.study.findings.extend(finding);
+    Ok(())
+}
+
+/// A series of one scene among several.
+fn named(conditions: &Conditions<'_>, scene: &SceneFile, series: &str) -> String {
+    if conditions.files.len() > 1 { format!("{series}, {}", scene.name) } else { series.to_owned() }
+}
+
+/// Three frames: by lamps alone, with the constant ambient light that comes nearest to the reference, and with lightmaps.
+fn frames(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    baked: Baked,
+    options: &BakeOptions,
+    truth: Picture,
+    told: [f64; 2],
+    measured: &mut Measured,
+) -> Result<Vec<DrawnFrame>, CostError> {
+    let draw = FrameOptions::default();
+    let with_ambient = |ambient: Vec3| -> Result<World, CostError> {
+        let mut world = scene.open(conditions.aspect())?;
+        world.get_resource_or_insert_with(SceneSettings::default).ambient = ambient;
+        Ok(world)
+    };
+    let alone = draw_picture(conditions, &mut with_ambient(Vec3::ZERO)?, &draw)?;
+    let under_one = draw_picture(conditions, &mut with_ambient(Vec3::ONE)?, &draw)?;
+    let ambient = best_ambient(&alone, &under_one, &truth);
+    let bake_time = 1e3 * baked.report.seconds;
+    let frames = [with_ambient(Vec3::ZERO)?, with_ambient(ambient)?, baked.world];
+    let frames = frames.map(|world| Frame::new(world, draw.clone()));
+    let drawn = draw_frames(conditions, frames.into(), SECONDS, told)?;
+    let reference = measured.keep_reference(&format!("{} converged", scene.name), truth);
+    let labels = ["by lamps alone", "with the best ambient light", "with lightmaps"];
+    for (label, frame) in labels.into_iter().zip(&drawn) {
+        let has_lightmaps = label == labels[2];
+        let render = |file: &str| {
+            format!(
+                "lumbre render {file} -o frame.exr --size {} --frames 20 --timings times.json",
+                conditions.size_text()
+            )
+        };
+        let command = match has_lightmaps {
+            true => format!(
+                "lumbre bake {} -o baked.glb {} && {}",
+                scene.in_commands(),
+                bake_arguments(options),
+                render("baked.glb")
+            ),
+            false if label == labels[0] => render(scene.in_commands()),
+            // A file's ambient light cannot be told to `lumbre render`.
+            false => "lumbre cost -o again --study preprocessing".into(),
+        };
+        let mut point = Point {
+            series: named(conditions, scene, FRAME),
+            label: label.to_owned(),
+            milliseconds: frame.spread(),
+            counts: frame.counts(),
+            command,
+            ..Point::default()
+        };
+        if has_lightmaps {
+            point.figures.insert(BEFORE.to_owned(), bake_time);
+        }
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    Ok(drawn)
+}
+
+/// The ambient light, per channel, with which the frame comes nearest to the reference: light is linear, so that this is the least squares of one number,
+/// from a frame without and one under ambient light of 1.
+fn best_ambient(alone: &Picture, under_one: &Picture, reference: &Picture) -> Vec3 {
+    let (mut products, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+    for ((alone, lit), wanted) in alone.radiance.iter().zip(&under_one.radiance).zip(&reference.radiance) {
+        let by_one = *lit - *alone;
+        products += by_one * (*wanted - *alone);
+        squares += by_one * by_one;
+    }
+    (products / squares.max(DVec3::splat(f64::MIN_POSITIVE))).max(DVec3::ZERO).as_vec3()
+}
+
+/// Moves the smallest static object that does not shine, along x, by a part of its longest side; its name, or nothing where there is none.
+fn moved(world: &mut World) -> Option<String> {
+    let hidden = hidden_entities(world);
+    let mut objects = world.query_filtered::<(Entity, &Mesh, &GlobalTransform, &Material), (With<StaticObject>, With<Transform>, Without<EmissiveLight>)>();
+    let side = |mesh: &Mesh, place: &GlobalTransform| {
+        let corners = mesh.0.positions.iter().map(|point| place.0.transform_point3(point.as_dvec3()));
+        let (low, high) = corners
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+        (high - low).max_element()
+    };
+    let candidates = objects
+        .iter(world)
+        .filter(|(entity, .., material)| !hidden.contains(entity) && material.front.emission == Vec3::ZERO)
+        .map(|(entity, mesh, place, _)| (entity, side(mesh, place)))
+        .filter(|(_, side)| side.is_finite() && *side > 0.0);
+    let (entity, side) = candidates.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    world.get_mut::<Transform>(entity)?.translation.x += STEP * side;
+    // A primitive's name is that of its node.
+    let above = |entity: &Entity| world.get::<ChildOf>(*entity).map(ChildOf::parent);
+    let named = |entity: Entity| world.get::<Name>(entity).map(|name| name.as_str().to_owned());
+    let name = std::iter::successors(Some(entity), above).filter_map(named).find(|name| !name.is_empty());
+    Some(name.unwrap_or_else(|| "an object without a name".to_owned()))
+}
+
+fn findings_of_frames(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Vec<String> {
+    let [alone, ambient, lightmaps] = points else { return Vec::new() };
+    let errors = [alone, ambient, lightmaps]
+        .map(|point| point.error.map_or_else(String::new, |error| error_of(&error)));
+    let mut findings = vec![format!(
+        "Without light that bounces, frames of the {scene} are off by {}; the best constant ambient light leaves {}, lightmaps {}.",
+        errors[0], errors[1], errors[2]
+    )];
+    let ratio = drawn.first().zip(drawn.last()).and_then(|(alone, lit)| ratio_of(&lit.times, &alone.times));
+    let before = lightmaps.figures.get(BEFORE);
+    if let (Some(ratio), Some(time), Some(bake)) = (ratio, &lightmaps.milliseconds, before) {
+        let decided = match is_above_one(&ratio) {
+            Some(true) => "",
+            Some(false) => ", since static lamps are not shaded any more",
+            None => ", which is not told apart from 1",
+        };
+        findings.push(format!(
+            "With lightmaps a frame takes {} of its time without them ({} to {}){decided}; they take {} s once, as long as {} such frames ({}).",
+            rounded(ratio.median),
+            rounded(ratio.lower),
+            rounded(ratio.upper),
+            rounded(1e-3 * bake),
+            rounded(bake / time.median.max(1e-9)),
+            milliseconds(time)
+        ));
+    }
+    findings
+}
+
+fn finding_of_change(moved: &str, points: &[Point], whole: &[f64], kept: &[f64]) -> Option<String> {
+    let [all, changed] = points else { return None };
+    let ratio = ratio_of(kept, whole)?;
+    let rays = |point: &Point| point.counts.get("rays").copied().unwrap_or(0.0);
+    let error =
+        |point: &Point| point.error.map_or_else(|| "an unknown error".to_owned(), |error| error_of(&error));
+    Some(format!(
+        "After \"{moved}\" has moved, baking what has changed takes {} of a whole bake's time and {} of its rays, with {} of error beside {}.",
+        rounded(ratio.median),
+        rounded(rays(changed) / rays(all).max(1.0)),
+        error(changed),
+        error(all)
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_ambient_light_is_found_per_channel() {
+        let picture = |radiance: Vec<DVec3>| Picture { width: radiance.len(), radiance };
+        let alone: Vec<DVec3> = (0..8).map(|i| DVec3::new(0.1 * f64::from(i), 0.3, 0.0)).collect();
+        let albedo: Vec<DVec3> = (0..8).map(|i| DVec3::new(0.5, 0.1 + 0.1 * f64::from(i), 0.0)).collect();
+        let under = |ambient: DVec3| -> Vec<DVec3> {
+            alone.iter().zip(&albedo).map(|(a, b)| *a + *b * ambient).collect()
+        };
+        let planted = DVec3::new(0.25, 0.0625, 9.0);
+        let found =
+            best_ambient(&picture(alone.clone()), &picture(under(DVec3::ONE)), &picture(under(planted)));
+        // Nothing is told of a channel in which nothing reflects.
+        assert!((found.as_dvec3() - DVec3::new(0.25, 0.0625, 0.0)).length() < 1e-6, "{found}");
+    }
+}
