@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{FlatRule, ReflectionModel, Shading};
 use lumbre::render::Display;
 use lumbre::scene::PackedFormat;
@@ -90,14 +90,15 @@ Examples:
     /// Measure what accuracy costs in time: a page with plots and pictures, and the same as JSON and CSV.
     #[command(after_help = "\
 Studies:
-  shading      flat, Gouraud and Phong shading
-  lamps        many lights, and how they are found
-  effects      every effect of a scene, switched off in turn
-  bake         the error that a bake is asked for
-  transport    from the frame to the truth
-  reflection   reflection models against Phong's
-  lightmaps    density and format of lightmaps
-  precision    f32 on the device against f64
+  shading        flat, Gouraud and Phong shading
+  lamps          many lights, and how they are found
+  effects        every effect of a scene, switched off in turn
+  bake           the error that a bake is asked for
+  preprocessing  light that bounces, before the game or in it
+  transport      from the frame to the truth
+  reflection     reflection models against Phong's
+  lightmaps      density and format of lightmaps
+  precision      f32 on the device against f64
 
 Examples:
   lumbre cost -o report --quick
@@ -105,6 +106,9 @@ Examples:
   lumbre cost -o report --resume
   lumbre cost --compare before/cost.json after/cost.json")]
     Cost(Cost),
+    /// Measures every way to draw a level, and says which keeps a time or an error; writes the level with it.
+    #[command(after_help = "lumbre tune level.glb --frame-ms 16 -o level.tuned.glb")]
+    Tune(Tune),
 }
 
 /// How files are read.
@@ -429,6 +433,35 @@ pub struct Cost {
     /// Exit status 1 also for times that grew, by more than the factor and with quartiles that lie apart.
     #[arg(long, conflicts_with = "output")]
     pub times: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(group(ArgGroup::new("goal").args(["frame_ms", "error"]).multiple(true)))]
+pub struct Tune {
+    /// The level: .glb or .gltf, baked or not.
+    #[arg(value_name = "IN.glb")]
+    pub input: PathBuf,
+    /// Milliseconds that a frame may take at any of its cameras: the least error within them is taken.
+    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
+    pub frame_ms: Option<f64>,
+    /// Relative RMSE that a frame may have against the most accurate settings (0.02 or 2%): without --frame-ms the least time within it is taken.
+    #[arg(long, value_name = "ERROR", value_parser = share, allow_negative_numbers = true)]
+    pub error: Option<f64>,
+    /// Where the level goes with the settings that were taken: its shading, and whether its lights cast shadows in frames.
+    #[arg(short, long, value_name = "OUT.glb", requires = "goal")]
+    pub output: Option<PathBuf>,
+    /// Where a report goes, as of `lumbre cost`: every setting with its picture, time and error.
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Width and height of the frames in pixels; 1280x720 without this, with --quick 480x270.
+    #[arg(long, value_name = "WxH", value_parser = picture_size, allow_negative_numbers = true)]
+    pub size: Option<(u32, u32)>,
+    /// Fewer rounds of smaller frames.
+    #[arg(long)]
+    pub quick: bool,
+    /// Says nothing of how far it is.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 #[derive(Args, Debug)]

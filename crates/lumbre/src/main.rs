@@ -14,6 +14,7 @@ mod play;
 mod progress;
 mod render;
 mod trace;
+mod tune;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         Some(Command::Compare(options)) => compare::run(&options),
         Some(Command::Explain(options)) => explain::run(&options),
         Some(Command::Cost(options)) => cost::run(&options),
+        Some(Command::Tune(options)) => tune::run(&options),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

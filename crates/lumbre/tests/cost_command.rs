@@ -4,8 +4,13 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::Arc;
 
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
 use lumbre::cost::{CostReport, read_report};
+use lumbre::optics::{Light, Material, SpotCone};
+use lumbre::scene::{Mesh, Name, SceneSettings, Transform, load, save};
 
 fn lumbre(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lumbre")).args(arguments).output().unwrap()
@@ -117,4 +122,46 @@ fn bad_arguments_are_refused_with_what_to_do() {
         assert_eq!(output.status.code(), Some(*status), "{arguments:?}: {}", stderr(&output));
         assert!(stderr(&output).contains(words), "{arguments:?}: {}", stderr(&output));
     }
+}
+
+#[test]
+fn a_level_with_the_settings_that_keep_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let (level, tuned) = (folder.path().join("level.glb"), folder.path().join("tuned.glb"));
+    let mut world = World::new();
+    let ball = Mesh(Arc::new(lumbre::mesh::shapes::uv_sphere(1.0, 24, 13)));
+    world.spawn((Name::new("ball"), ball, Material::default()));
+    let torch =
+        Light { shadow: true, ..Light::spot(Vec3::splat(20.0), SpotCone::Smooth { inner: 0.3, outer: 0.5 }) };
+    let aimed = Transform::from_xyz(0.0, 3.0, 3.0).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("torch"), torch, aimed));
+    save(&mut world, &level).unwrap();
+    let tune = |goal: [&str; 2]| {
+        lumbre(
+            &[&["tune", text(&level), "--quick", "--size", "48x32", "-o", text(&tuned)], &goal[..]].concat(),
+        )
+    };
+
+    // Nothing is this fast; nothing is written.
+    let output = tune(["--frame-ms", "0.000001"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
+    assert!(stdout(&output).contains("Nothing keeps within"), "{}", stdout(&output));
+    assert!(!tuned.exists());
+
+    // Everything is this accurate: the cheapest is taken, whichever it is here, and the file has it.
+    let output = tune(["--error", "1000"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let said = stdout(&output);
+    let command = said.lines().find(|line| line.starts_with("lumbre render ")).unwrap();
+    let mut read = World::new();
+    load(&mut read, &tuned).unwrap();
+    let shading = read.resource::<SceneSettings>().shading;
+    assert!(command.contains(&format!("--shading {}", shading.name())), "{command}, {shading:?}");
+    let mut lights = read.query::<&Light>();
+    let shadow = lights.iter(&read).next().unwrap().shadow;
+    assert_eq!(shadow, !command.contains("--no-shadows"), "{command}");
+
+    // Without a goal there is nothing to write.
+    let output = lumbre(&["tune", text(&level), "-o", text(&tuned)]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
 }

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::time::Instant;
 
 use bevy_ecs::world::World;
@@ -13,8 +14,8 @@ use crate::{Conditions, CostError, Spread};
 
 /// A scene, and how a frame of it is drawn.
 pub struct Frame {
-    /// The scene.
-    pub world: World,
+    /// The scene, perhaps of several frames.
+    pub world: Rc<RefCell<World>>,
     /// How it is drawn.
     pub options: FrameOptions,
     /// Frames of one name share a renderer, and with it what it has compiled, which takes longer than many a frame. Each is then drawn twice in a row, and the
@@ -25,7 +26,12 @@ pub struct Frame {
 impl Frame {
     /// A frame with a renderer of its own.
     pub fn new(world: World, options: FrameOptions) -> Self {
-        Self { world, options, renderer: None }
+        Self::of(&Rc::new(RefCell::new(world)), options)
+    }
+
+    /// The same of a scene that other frames show, too.
+    pub fn of(world: &Rc<RefCell<World>>, options: FrameOptions) -> Self {
+        Self { world: Rc::clone(world), options, renderer: None }
     }
 
     /// The same with a renderer in common with all that name it so.
@@ -73,7 +79,7 @@ impl DrawnFrame {
 /// [`CostError::Render`], [`CostError::Interrupted`].
 pub fn draw_frames(
     conditions: &Conditions<'_>,
-    mut frames: Vec<Frame>,
+    frames: Vec<Frame>,
     seconds: f64,
     told: [f64; 2],
 ) -> Result<Vec<DrawnFrame>, CostError> {
@@ -82,9 +88,9 @@ pub fn draw_frames(
     let mut drawn = Vec::new();
     let mut renderer = Renderer::new(gpu);
     let count = frames.len() as f64;
-    for frame in &mut frames {
+    for frame in &frames {
         conditions.tell(before + 0.3 * (after - before) * drawn.len() as f64 / count)?;
-        drawn.push(picture_of(conditions, &mut renderer, &mut frame.world, &frame.options)?);
+        drawn.push(picture_of(conditions, &mut renderer, &mut frame.world.borrow_mut(), &frame.options)?);
     }
     let target = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
     let target = target.target();
@@ -93,12 +99,12 @@ pub fn draw_frames(
     shared.dedup();
     let shared: Vec<_> = shared.into_iter().map(|name| (name, RefCell::new(Renderer::new(gpu)))).collect();
     let mut work: Vec<Work<'_>> = Vec::new();
-    for Frame { world, options, renderer } in &mut frames {
+    for Frame { world, options, renderer } in &frames {
         let named = shared.iter().find(|(name, _)| Some(*name) == *renderer);
         let target = &target;
-        let mut draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
+        let draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
             let begun = Instant::now();
-            renderer.render(world, target, options)?;
+            renderer.render(&mut world.borrow_mut(), target, options)?;
             renderer.wait()?;
             Ok(milliseconds_since(begun))
         };

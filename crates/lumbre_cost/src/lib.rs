@@ -48,6 +48,7 @@ mod spread;
 mod studies;
 mod table;
 mod traced;
+mod tune;
 
 pub use comparison::{Change, What, compare_reports};
 pub use conditions::{Conditions, Listener};
@@ -63,3 +64,4 @@ pub use report::{
 pub use run::{CostOptions, CostProgress, measure};
 pub use spread::Spread;
 pub use studies::{STUDIES, StudyKind, studies_named};
+pub use tune::{DrawSettings, Goal, TuneOptions, Tuned, tune};

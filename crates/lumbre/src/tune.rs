@@ -1,0 +1,97 @@
+//! `lumbre tune`: which settings draw a level within a time or an error, and the level with them.
+
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Mutex;
+
+use anyhow::bail;
+use lumbre::bake::Progress;
+use lumbre::cost::{CostError, DrawSettings, Goal, PAGE, TuneOptions, Tuned, tune};
+use lumbre::optics::Light;
+use lumbre::render::Gpu;
+use lumbre::scene::{SaveOptions, SceneSettings, save_baked};
+
+use crate::arguments::{Reading, Tune};
+use crate::interruption::Interruption;
+use crate::loading::{Loaded, load_source};
+use crate::progress::Shown;
+
+/// Width and height of the frames where none is asked for: whole, and quick.
+const SIZES: [(u32, u32); 2] = [(1280, 720), (480, 270)];
+
+/// Runs the command.
+pub fn run(asked: &Tune) -> anyhow::Result<()> {
+    let goal = Goal { milliseconds: asked.frame_ms, error: asked.error };
+    let options = TuneOptions {
+        file: asked.input.clone(),
+        goal,
+        quick: asked.quick,
+        size: asked.size.unwrap_or(SIZES[usize::from(asked.quick)]),
+    };
+    let gpu = Gpu::headless()?;
+    let interruption = Interruption::handle();
+    let shown = Mutex::new(Shown::of("settings", asked.quiet));
+    let tuned = interruption.told(|is_asked| {
+        tune(&gpu, &options, asked.report.as_deref(), &|fraction| {
+            if let (Some(fraction), Ok(mut shown)) = (fraction, shown.lock()) {
+                let fraction = fraction as f32;
+                shown.update(Progress { stage: "frames", stage_fraction: fraction, fraction, error: None });
+            }
+            if is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+    });
+    if let Ok(shown) = shown.lock() {
+        shown.finish();
+    }
+    let tuned = match tuned {
+        Err(CostError::Interrupted) => bail!("interrupted; nothing was written"),
+        tuned => tuned?,
+    };
+    print(&tuned, asked)?;
+    let chosen = tuned.chosen.and_then(|place| tuned.settings.get(place));
+    match (chosen, &asked.output) {
+        (Some(settings), Some(output)) => write(settings, asked, output),
+        (None, _) if goal != Goal::default() => bail!("no settings keep the goal; nothing was written"),
+        _ => Ok(()),
+    }
+}
+
+fn print(tuned: &Tuned, asked: &Tune) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let points = &tuned.study.points;
+    let width = points.iter().map(|point| point.label.len()).max().unwrap_or(0);
+    writeln!(out, "{:width$}  {:>10}  {:>9}", "the front", "ms", "error, %")?;
+    for &place in &tuned.front {
+        let point = &points[place];
+        let (time, error) =
+            (point.milliseconds.map_or(f64::NAN, |time| time.median), point.error.unwrap_or_default());
+        let mark = if tuned.chosen == Some(place) { " <" } else { "" };
+        writeln!(out, "{:width$}  {time:>10.2}  {:>9.3}{mark}", point.label, 100.0 * error.relative_rmse)?;
+    }
+    for line in tuned.study.findings.iter().chain(&tuned.study.notes) {
+        writeln!(out, "{line}")?;
+    }
+    if let Some(settings) = tuned.chosen.and_then(|place| tuned.settings.get(place)) {
+        writeln!(out, "lumbre render {} {}", asked.input.display(), settings.arguments())?;
+    }
+    if let Some(report) = &asked.report {
+        writeln!(out, "{}", report.join(PAGE).display())?;
+    }
+    Ok(())
+}
+
+/// Writes the level again with the settings that a file can hold: the scene's shading, and no light with a shadow where shadows are not worth it.
+fn write(settings: &DrawSettings, asked: &Tune, output: &Path) -> anyhow::Result<()> {
+    let (source, Loaded { mut world, .. }) = load_source(&asked.input, &Reading::default())?;
+    world.get_resource_or_insert_with(SceneSettings::default).shading = settings.shading;
+    if !settings.shadows {
+        let mut lights = world.query::<&mut Light>();
+        lights.iter_mut(&mut world).for_each(|mut light| light.shadow = false);
+    }
+    save_baked(&mut world, &source, output, &SaveOptions::default())?;
+    let samples =
+        if settings.multisample { "; four samples a pixel are the program's choice (--msaa)" } else { "" };
+    eprintln!("lumbre: {} has these settings{samples}", output.display());
+    Ok(())
+}
