@@ -457,7 +457,9 @@ impl Renderer {
         let mut shading_by_need = ShadingNeeds::default();
         let mut need = |slot: usize, object: &Object, max_error: ErrorBound| {
             let Some(mesh) = meshes.get(object.mesh) else { return Shading::Phong };
-            let lights = || found.lights_of(object.entity, object.center, object.half_size);
+            let lights = || -> Vec<u32> {
+                found.lights_of(object.entity, object.center, object.half_size).collect()
+            };
             let chosen = needs.choose((slot, object), mesh, &sized, max_error, lights);
             shading_by_need.add(&chosen);
             chosen.shading

@@ -107,13 +107,13 @@ impl ShadingByNeed {
     }
 
     /// What an object takes. `lights` are the numbers of the lamps that reach it, looked up only if nothing is known of it.
-    pub fn choose<L: Iterator<Item = u32>>(
+    pub fn choose(
         &mut self,
         (slot, object): (usize, &Object),
         mesh: &GpuMesh,
         view: &SizedView,
         max_error: ErrorBound,
-        lights: impl FnOnce() -> L,
+        lights: impl FnOnce() -> Vec<u32>,
     ) -> Chosen {
         let Some(conditions) = &self.conditions else {
             return Chosen { shading: Shading::Phong, ..Chosen::default() };
@@ -131,7 +131,7 @@ impl ShadingByNeed {
             Some(kept) => kept.prediction,
             None => {
                 let surface = LitSurface::of_object(object, mesh);
-                let lamps = lights().filter_map(|number| self.lamps.get(number as usize));
+                let lamps = lights().into_iter().filter_map(|number| self.lamps.get(number as usize));
                 let prediction = Prediction::new(&surface, conditions, &view.view, lamps);
                 let (eye, backward) = (view.view.eye, view.view.basis.z_axis);
                 *kept = Some(Kept { object: object.changed, eye, backward, prediction });

@@ -1,6 +1,5 @@
 //! A surface as lights fall on it: what of an object decides how far interpolated lighting is off. From a frame's record of an object, or from the World.
 
-use bevy_ecs::entity::Entity;
 use glam::{DAffine3, DMat3, DVec3};
 use lumbre_mesh::{NormalCone, SurfaceSpread};
 use lumbre_optics::TriangleSpread;
@@ -12,7 +11,6 @@ use crate::mesh_buffers::GpuMesh;
 /// An object, as predictions see it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LitSurface<'a> {
-    pub entity: Entity,
     pub traits: &'a ObjectTraits,
     pub reflectance: Reflectance,
     pub spread: &'a SurfaceSpread,
@@ -26,7 +24,6 @@ pub(crate) struct LitSurface<'a> {
 impl<'a> LitSurface<'a> {
     pub fn of_object(object: &'a Object, mesh: &'a GpuMesh) -> Self {
         Self {
-            entity: object.entity,
             traits: &object.traits,
             reflectance: object.reflectance,
             spread: mesh.spread(),

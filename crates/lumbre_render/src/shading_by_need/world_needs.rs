@@ -83,7 +83,6 @@ impl WorldNeeds {
         let (center, half_size) = mesh_box(&object.mesh.0);
         let (center, half_size, radius) = world_box(center, half_size, &object.place);
         let surface = LitSurface {
-            entity: object.entity,
             traits: &object.traits,
             reflectance: object.reflectance,
             spread: &object.spread,
