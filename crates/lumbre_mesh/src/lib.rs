@@ -42,7 +42,7 @@ mod vertex_split;
 mod weld;
 
 pub use adjacency::Adjacency;
-pub use surface_spread::{NormalCone, SurfaceSpread, TriangleClass};
+pub use surface_spread::{MOST_PATCHES, NormalCone, SurfacePatch, SurfaceSpread};
 pub use tangents::TextureCoordinateSet;
 pub use triangle_mesh::{MeshError, TriangleMesh};
 pub use unwrap::{Chart, Charted, UnwrapError, UnwrapOptions, Unwrapped, unwrap};

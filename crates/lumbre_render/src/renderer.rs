@@ -448,8 +448,8 @@ impl Renderer {
         };
         if by_need {
             let settings = SceneSettings { flat_rule: decision.flat_rule(), ..*settings };
-            self.needs
-                .begin(Conditions::new(&settings, &decision.features), std::mem::take(&mut lights.lamps));
+            let conditions = Conditions::new(&settings, &decision.features);
+            self.needs.begin(conditions, std::mem::take(&mut lights.lamps), &self.objects);
         }
         let size = [seen.target.width, seen.target.height];
         let sized = SizedView { view: seen.view, size, exposure: seen.exposure };
@@ -457,9 +457,8 @@ impl Renderer {
         let mut shading_by_need = ShadingNeeds::default();
         let mut need = |slot: usize, object: &Object, max_error: ErrorBound| {
             let Some(mesh) = meshes.get(object.mesh) else { return Shading::Phong };
-            let lights = || -> Vec<u32> {
-                found.lights_of(object.entity, object.center, object.half_size).collect()
-            };
+            let lights =
+                || -> Vec<u32> { found.lights_of(object.entity, object.center, object.half_size).collect() };
             let chosen = needs.choose((slot, object), mesh, &sized, max_error, lights);
             shading_by_need.add(&chosen);
             chosen.shading

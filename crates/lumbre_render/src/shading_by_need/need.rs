@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use lumbre_optics::{ErrorBound, Shading};
+use lumbre_optics::Shading;
 
 /// Why an object's error is known, or is not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -10,6 +10,8 @@ pub(crate) enum Reason {
     /// It follows from mesh, lights and viewer.
     #[default]
     Predicted,
+    /// Nothing is cheaper than Phong shading.
+    FewPixels,
     NoLight,
     Unlit,
     NormalTexture,
@@ -21,16 +23,12 @@ pub(crate) enum Reason {
 }
 
 impl Reason {
-    /// Whether light is evaluated at all.
-    pub fn is_lit(self) -> bool {
-        self != Self::Unlit
-    }
-
     fn sentence(self) -> &'static str {
         match self {
             Self::Predicted => "predicted from mesh, lights and viewer",
+            Self::FewPixels => "its pixels cost less than its vertices",
             Self::NoLight => "no light reaches it",
-            Self::Unlit => "it takes no light",
+            Self::Unlit => "no light is evaluated on it",
             Self::NormalTexture => "its normal map is seen in fragments alone",
             Self::MetallicRoughnessTexture => "its metallic-roughness texture is seen in fragments alone",
             Self::VertexColors => "the colours of its vertices are interpolated beside the light",
@@ -85,33 +83,29 @@ pub struct ShadingNeed {
     pub objects: usize,
     /// Why.
     pub reason: String,
-    /// The smallest and the largest predicted error of Gouraud shading on them, in exposed linear radiance between 0 and 1; absent where it is not predicted.
+    /// The smallest and the largest predicted error of Gouraud shading on them, in exposed linear radiance between 0 and 1; absent where it is not predicted. What is beyond the
+    /// bound may be farther beyond it: then nobody looks any longer.
     pub gouraud_error: Option<[f64; 2]>,
     /// The same of flat shading.
     pub flat_error: Option<[f64; 2]>,
 }
 
 impl ShadingNeed {
-    /// Groups what objects take that may be so far off each.
-    pub(crate) fn group(chosen: &[(Chosen, ErrorBound)]) -> Vec<Self> {
-        let mut groups: BTreeMap<(&'static str, Reason, bool), Vec<&Chosen>> = BTreeMap::new();
-        for (one, max_error) in chosen {
-            let allowed = one.errors.iter().any(|error| *error <= f64::from(max_error.get()));
-            let costlier = allowed && one.shading == Shading::Phong && one.reason.is_lit();
-            groups.entry((one.shading.name(), one.reason, costlier)).or_default().push(one);
+    /// Groups what objects take.
+    pub(crate) fn group(chosen: &[Chosen]) -> Vec<Self> {
+        let mut groups: BTreeMap<(&'static str, Reason), Vec<&Chosen>> = BTreeMap::new();
+        for one in chosen {
+            groups.entry((one.shading.name(), one.reason)).or_default().push(one);
         }
-        let group = |((shading, reason, costlier), chosen): ((&'static str, Reason, bool), Vec<&Chosen>)| {
+        let group = |((shading, reason), chosen): ((&'static str, Reason), Vec<&Chosen>)| {
             let range = |which: usize| {
                 let least = chosen.iter().map(|one| one.errors[which]).fold(f64::INFINITY, f64::min);
                 let most = chosen.iter().map(|one| one.errors[which]).fold(0.0, f64::max);
                 // More than white is white.
-                most.is_finite().then_some([least.min(1.0), most.min(1.0)])
-            };
-            let reason = match costlier {
-                true => format!("{}, and its pixels cost less than its vertices", reason.sentence()),
-                false => reason.sentence().to_owned(),
+                (least.is_finite() && reason == Reason::Predicted).then_some([least.min(1.0), most.min(1.0)])
             };
             let (gouraud_error, flat_error) = (range(1), range(0));
+            let reason = reason.sentence().to_owned();
             Self { shading, objects: chosen.len(), reason, gouraud_error, flat_error }
         };
         groups.into_iter().map(group).collect()
@@ -121,8 +115,8 @@ impl ShadingNeed {
     pub fn line(&self) -> String {
         let objects = if self.objects == 1 { "1 object" } else { &format!("{} objects", self.objects) };
         let range = |name: &str, error: Option<[f64; 2]>| match error {
-            Some([least, most]) if least == most => format!("; {name} at most {most:.4} off"),
-            Some([least, most]) => format!("; {name} at most {least:.4} to {most:.4} off"),
+            Some([least, most]) if least == most => format!("; {name} may be {most:.4} off"),
+            Some([least, most]) => format!("; {name} may be {least:.4} to {most:.4} off"),
             None => String::new(),
         };
         let errors = range("Gouraud", self.gouraud_error) + &range("flat", self.flat_error);

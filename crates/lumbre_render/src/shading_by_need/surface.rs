@@ -1,72 +1,87 @@
 //! A surface as lights fall on it: what of an object decides how far interpolated lighting is off. From a frame's record of an object, or from the World.
 
+use std::f64::consts::PI;
+
 use glam::{DAffine3, DMat3, DVec3};
-use lumbre_mesh::{NormalCone, SurfaceSpread};
+use lumbre_mesh::{NormalCone, SurfacePatch, SurfaceSpread};
 use lumbre_optics::TriangleSpread;
 use lumbre_scene::{GlobalTransform, ObjectTraits};
 
-use crate::extract::{Object, Reflectance};
-use crate::mesh_buffers::GpuMesh;
+use crate::extract::{Reflectance, world_box};
 
 /// An object, as predictions see it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LitSurface<'a> {
+pub(super) struct LitSurface<'a> {
     pub traits: &'a ObjectTraits,
     pub reflectance: Reflectance,
-    pub spread: &'a SurfaceSpread,
-    pub world_from_mesh: DAffine3,
-    /// Middle of the bounding box in the world, half its sides along the world's axes, and the ball around it.
-    pub center: DVec3,
-    pub half_size: DVec3,
-    pub radius: f64,
+    spread: &'a SurfaceSpread,
+    world_from_mesh: DAffine3,
+    world_from_mesh_normal: DMat3,
+    stretch: Stretch,
 }
 
 impl<'a> LitSurface<'a> {
-    pub fn of_object(object: &'a Object, mesh: &'a GpuMesh) -> Self {
-        Self {
-            traits: &object.traits,
-            reflectance: object.reflectance,
-            spread: mesh.spread(),
-            world_from_mesh: object.world_from_mesh,
-            center: object.center,
-            half_size: object.half_size,
-            radius: object.radius,
-        }
+    pub fn new(
+        traits: &'a ObjectTraits,
+        reflectance: Reflectance,
+        spread: &'a SurfaceSpread,
+        world_from_mesh: DAffine3,
+    ) -> Self {
+        let world_from_mesh_normal = GlobalTransform(world_from_mesh).normal_matrix();
+        let stretch = Stretch::of(world_from_mesh.matrix3);
+        Self { traits, reflectance, spread, world_from_mesh, world_from_mesh_normal, stretch }
     }
 
-    /// From the surface to the nearest point, and to the farthest one at most, of its box, in metres.
+    /// All of it as one patch in the world; none of a mesh without area.
+    pub fn whole(&self) -> Option<WorldPatch> {
+        self.spread.whole.as_ref().map(|patch| self.in_world(patch))
+    }
+
+    /// Its patches in the world.
+    pub fn patches(&self) -> impl Iterator<Item = WorldPatch> + '_ {
+        self.spread.patches.iter().map(|patch| self.in_world(patch))
+    }
+
+    fn in_world(&self, patch: &SurfacePatch) -> WorldPatch {
+        let Stretch { longest, bend } = self.stretch;
+        let chord = |chord: f64| match bend {
+            1.0 => chord,
+            bend => chord_of((bend * angle_of(chord)).min(PI)),
+        };
+        let (center, half_size, radius) =
+            world_box(patch.center, patch.half_size, &GlobalTransform(self.world_from_mesh));
+        let normals = patch.cone.and_then(|NormalCone { axis, half_angle }| {
+            let axis = (self.world_from_mesh_normal * axis).try_normalize()?;
+            Some(NormalCone { axis, half_angle: (bend * half_angle).min(PI) })
+        });
+        let (edge, normal_difference) = (longest * patch.edge, chord(patch.normals));
+        let triangle =
+            TriangleSpread { edge, normals: normal_difference, face_normals: chord(patch.face_normals) };
+        WorldPatch { center, half_size, radius, normals, triangle }
+    }
+}
+
+/// A part of a surface in the world: its box and the ball around it, the cone of its normals, and the largest and most curved of its triangles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WorldPatch {
+    pub center: DVec3,
+    pub half_size: DVec3,
+    pub radius: f64,
+    pub normals: Option<NormalCone>,
+    pub triangle: TriangleSpread,
+}
+
+impl WorldPatch {
+    /// From a point to the nearest point, and to the farthest one at most, of its box, in metres.
     pub fn distances(&self, from: DVec3) -> [f64; 2] {
         let apart = (from - self.center).abs();
         [(apart - self.half_size).max(DVec3::ZERO).length(), (apart + self.half_size).length()]
     }
 
-    /// The half angle in radians of the cone of directions from its points to a point so far from its middle.
+    /// The half angle in radians of the cone of directions from its points to all points within `room` of one that is so far from its middle.
     pub fn half_angle(&self, distance: f64, room: f64) -> f64 {
         let within = self.radius + room;
-        if distance > within { (within / distance).asin() } else { std::f64::consts::PI }
-    }
-
-    /// Its classes of triangles in the world.
-    pub fn triangles(&self) -> impl Iterator<Item = TriangleSpread> + '_ {
-        let Stretch { longest, bend } = Stretch::of(self.world_from_mesh.matrix3);
-        let chord = move |chord: f64| match bend {
-            1.0 => chord,
-            bend => chord_of((bend * angle_of(chord)).min(std::f64::consts::PI)),
-        };
-        self.spread.classes.iter().map(move |class| TriangleSpread {
-            edge: longest * class.edge,
-            normals: chord(class.normals),
-            face_normals: chord(class.face_normals),
-        })
-    }
-
-    /// The cone of its normals in the world.
-    pub fn normals(&self) -> Option<NormalCone> {
-        let NormalCone { axis, half_angle } = self.spread.normals?;
-        let axis = (GlobalTransform(self.world_from_mesh).normal_matrix() * axis).try_normalize()?;
-        let half_angle =
-            (Stretch::of(self.world_from_mesh.matrix3).bend * half_angle).min(std::f64::consts::PI);
-        Some(NormalCone { axis, half_angle })
+        if distance > within { (within / distance).asin() } else { PI }
     }
 }
 

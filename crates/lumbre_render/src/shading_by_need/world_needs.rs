@@ -22,7 +22,7 @@ pub(crate) struct WorldNeeds {
     objects: Vec<ShownObject>,
     lamps: Vec<Lamp>,
     seen: Option<(Conditions, SizedView)>,
-    chosen: Vec<(Chosen, ErrorBound)>,
+    chosen: Vec<Chosen>,
 }
 
 struct ShownObject {
@@ -82,23 +82,19 @@ impl WorldNeeds {
         };
         let (center, half_size) = mesh_box(&object.mesh.0);
         let (center, half_size, radius) = world_box(center, half_size, &object.place);
-        let surface = LitSurface {
-            traits: &object.traits,
-            reflectance: object.reflectance,
-            spread: &object.spread,
-            world_from_mesh: object.place.0,
-            center,
-            half_size,
-            radius,
+        let predict = |enough| {
+            let surface = LitSurface::new(&object.traits, object.reflectance, &object.spread, object.place.0);
+            let reaching =
+                self.lamps.iter().filter(|lamp| lamp.reach.touches(object.entity, center, half_size));
+            Prediction::new(&surface, conditions, &view.view, enough, reaching)
         };
-        let reaching = self.lamps.iter().filter(|lamp| lamp.reach.touches(object.entity, center, half_size));
-        let prediction = Prediction::new(&surface, conditions, &view.view, reaching);
         let place = Place { center, half_size, radius };
         let mesh =
             MeshSize { vertices: object.mesh.0.positions.len(), triangles: object.mesh.0.triangle_count() };
         let evaluations = Evaluations::new(&object.traits, &conditions.settings, place, mesh, view);
-        let chosen = chosen(&prediction, &evaluations, !self.lamps.is_empty(), view, max_error);
-        self.chosen.push((chosen, max_error));
+        let lit = !self.lamps.is_empty() && !object.traits.unlit;
+        let chosen = chosen(&evaluations, lit, view.exposure, max_error, predict);
+        self.chosen.push(chosen);
         chosen.shading
     }
 
