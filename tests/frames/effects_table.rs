@@ -601,6 +601,7 @@ const ROWS: &[Row] = &[
 /// Lines of the census that are no work of their own within a frame, each with what they come to.
 const NO_EFFECT: &[(&str, &str)] = &[
     ("meshes", "what is drawn at all"),
+    ("shading by need", "one of the shadings above, chosen on the CPU"),
     ("own reflection models", "one of the models above"),
     ("global ambient", "a number of the frame's uniform"),
     ("sky", "the same, and the colour that the background is cleared to"),

@@ -33,6 +33,7 @@ mod polygon_lights;
 mod properties;
 mod reflection;
 mod settings;
+mod shading_by_need;
 mod shadows;
 mod textures;
 mod traced;

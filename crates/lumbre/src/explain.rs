@@ -22,7 +22,7 @@ pub fn run(asked: &Explain) -> anyhow::Result<()> {
     let mut explanation = explain(&mut world, &options, width, height)?;
     if let Some(time) = asked.measure {
         let gpu = Gpu::headless()?;
-        let effects = removable_effects(&explanation.census);
+        let effects = removable_effects(&explanation.census, &options);
         let mut again = || again(asked);
         let cost = effect_costs(&gpu, &mut again, &effects, [width, height], time)
             .with_context(|| format!("{} could not be drawn", asked.input.display()))?;

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use bevy_ecs::prelude::*;
-use lumbre_optics::{Light, Shading};
+use lumbre_optics::{ErrorBound, Light, Shading};
 use lumbre_render::{FrameOptions, Gpu};
 use lumbre_scene::{ActiveCamera, Camera, Name, SceneSettings};
 
@@ -78,14 +78,14 @@ impl DrawSettings {
     fn label(&self) -> String {
         let shadows = if self.shadows { "" } else { ", no shadows" };
         let samples = if self.multisample { ", four samples" } else { "" };
-        format!("{}{shadows}{samples}", self.shading.name())
+        format!("{}{shadows}{samples}", self.shading)
     }
 
     /// As `lumbre render` is asked for them.
     pub fn arguments(&self) -> String {
         let shadows = if self.shadows { "" } else { " --no-shadows" };
         let samples = if self.multisample { " --msaa" } else { "" };
-        format!("--shading {}{shadows}{samples}", self.shading.name())
+        format!("--shading {}{shadows}{samples}", self.shading)
     }
 
     /// What of them is the World's: objects that choose their shading keep it.
@@ -100,11 +100,14 @@ impl DrawSettings {
     }
 }
 
+/// Errors that shading by need is tried with.
+const BOUNDS: [f32; 4] = [0.003, 0.01, 0.03, 0.1];
+
 /// Rates of evaluation that are tried, the most accurate first.
 fn rates() -> Vec<Shading> {
-    let mut rates = Shading::ALL.to_vec();
-    rates.reverse();
-    rates
+    let by_need = BOUNDS.into_iter().filter_map(ErrorBound::new);
+    let by_need = by_need.map(|max_error| Shading::Auto { max_error });
+    [Shading::Phong].into_iter().chain(by_need).chain([Shading::Gouraud, Shading::Flat]).collect()
 }
 
 /// Seconds for frames of all settings, and of those at the front once more.

@@ -6,6 +6,7 @@
 //!   surfaces ► shapes ┐              ┌─► normals (flat, smooth)
 //!                   ├─► TriangleMesh ┼─► flat (triangle, normal, centroid)
 //!                   │                ├─► tangents (MikkTSpace)
+//!                   │                ├─► surface_spread (how large and curved triangles are)
 //!   a file's mesh ──┘                ├─► weld ─► adjacency
 //!                                    └─► unwrap ─► charts ─► atlas ─► uv1 ─► uv_validation
 //! ```
@@ -31,6 +32,7 @@ mod grid;
 pub mod normals;
 mod planar_overlap;
 pub mod shapes;
+mod surface_spread;
 pub mod surfaces;
 mod tangents;
 mod triangle_mesh;
@@ -40,6 +42,7 @@ mod vertex_split;
 mod weld;
 
 pub use adjacency::Adjacency;
+pub use surface_spread::{MOST_PATCHES, NormalCone, SurfacePatch, SurfaceSpread};
 pub use tangents::TextureCoordinateSet;
 pub use triangle_mesh::{MeshError, TriangleMesh};
 pub use unwrap::{Chart, Charted, UnwrapError, UnwrapOptions, Unwrapped, unwrap};

@@ -49,11 +49,13 @@ mod attenuation;
 mod blinn_phong;
 mod emission;
 mod energy_keeping;
+mod error_bound;
 mod evaluate_light;
 mod fog;
 mod fog_validation;
 mod fresnel;
 mod half_vector;
+mod interpolation_error;
 mod lambert;
 mod light;
 mod light_matrix;
@@ -91,6 +93,7 @@ pub use attenuation::{
 pub use blinn_phong::{blinn_phong, blinn_phong_4n, blinn_phong_matched};
 pub use emission::{add_emission, exitance};
 pub use energy_keeping::{distribution_ggx, gltf_reflection, lobe_peak, smith_attenuation};
+pub use error_bound::ErrorBound;
 pub use evaluate_light::{LightSample, NoLight, evaluate_light, try_evaluate_light};
 pub use fog::{
     Fog, FogMode, apply_fog, fog_depth_cue, fog_exponential, fog_exponential_squared, fog_fraction,
@@ -101,6 +104,9 @@ pub use fresnel::{
     fresnel_conductor, fresnel_dielectric, fresnel_schlick, try_fresnel_conductor, try_fresnel_dielectric,
 };
 pub use half_vector::{half_vector, try_half_vector};
+pub use interpolation_error::{
+    ConeOverObject, Highlight, InterpolationError, LightOverObject, TriangleSpread, interpolation_error,
+};
 pub use lambert::lambert;
 pub use light::{BakeMode, Light, LightKind};
 pub use light_matrix::{LightMatrix, ReflectionMatrix};
@@ -135,7 +141,7 @@ pub use shade::{
     Contribution, DEFAULT_IOR, SurfaceSample, light_contribution, model_exponent, shade, specular_factor,
     specular_reflection,
 };
-pub use shading::{FlatRule, ReflectionModel, Shading};
+pub use shading::{FlatRule, NoShading, ReflectionModel, Shading};
 pub use snell::{
     critical_angle, is_totally_reflected, transmitted_cosine, transmitted_direction, transmitted_highlight,
     try_transmitted_cosine, try_transmitted_direction,

@@ -1,6 +1,11 @@
 //! Which model is evaluated, and how often: the choices, not the equations.
 
+use std::fmt;
+use std::str::FromStr;
+
 use bevy_ecs::component::Component;
+
+use crate::ErrorBound;
 
 /// How often the lighting equation is evaluated on an object. As a component it overrides the scene's choice.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -12,6 +17,12 @@ pub enum Shading {
     /// At every fragment; normals are interpolated.
     #[default]
     Phong,
+    /// As rarely as an error allows: each object in view takes the cheapest of the other three of which it is known beforehand that no pixel is farther from Phong
+    /// shading than this. No shader does this: it is one of the others by the time that anything is drawn.
+    Auto {
+        /// The largest difference of a pixel and channel, in exposed linear radiance between 0 and 1, the display's white.
+        max_error: ErrorBound,
+    },
 }
 
 /// Where flat shading evaluates a polygon.
@@ -43,17 +54,17 @@ pub enum ReflectionModel {
 }
 
 macro_rules! names {
-    ($type:ident, $($variant:ident => $name:literal),+) => {
+    ($type:ident, $($variant:ident => $name:literal),+ $(; $other:ident { .. } => $other_name:literal)?) => {
         impl $type {
-            /// Every choice, in the order of the documentation.
+            /// Every choice that needs no number, in the order of the documentation.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
             /// The name used in files and on the command line.
             pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $name),+ }
+                match self { $(Self::$variant => $name,)+ $(Self::$other { .. } => $other_name)? }
             }
 
-            /// The choice with that name, if there is one.
+            /// The choice with that name, if there is one that needs no number beside it.
             pub fn from_name(name: &str) -> Option<Self> {
                 match name { $($name => Some(Self::$variant),)+ _ => None }
             }
@@ -61,10 +72,37 @@ macro_rules! names {
     };
 }
 
-names!(Shading, Flat => "flat", Gouraud => "gouraud", Phong => "phong");
+names!(Shading, Flat => "flat", Gouraud => "gouraud", Phong => "phong"; Auto { .. } => "auto");
 names!(FlatRule, Centroid => "centroid", FirstVertex => "first-vertex", LastVertex => "last-vertex");
 names!(ReflectionModel, Phong => "phong", Blinn => "blinn", Blinn4n => "blinn-4n",
     BlinnMatched => "blinn-matched", TorranceSparrow => "torrance-sparrow");
+
+impl fmt::Display for Shading {
+    /// As files and the command line have it: `phong`, `auto:0.01`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto { max_error } => write!(f, "{}:{}", self.name(), max_error.get()),
+            _ => f.write_str(self.name()),
+        }
+    }
+}
+
+/// What is no shading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("use one of flat, gouraud, phong, or auto:ERROR with an error above 0 and at most 1, like auto:0.01")]
+pub struct NoShading;
+
+impl FromStr for Shading {
+    type Err = NoShading;
+
+    fn from_str(text: &str) -> Result<Self, NoShading> {
+        if let Some(error) = text.strip_prefix("auto:") {
+            let max_error = error.trim().parse().ok().and_then(ErrorBound::new);
+            return max_error.map(|max_error| Self::Auto { max_error }).ok_or(NoShading);
+        }
+        Self::from_name(text).ok_or(NoShading)
+    }
+}
 
 impl ReflectionModel {
     /// The feature that `shaders/optics/shade.wesl` compiles this model under.
@@ -95,5 +133,17 @@ mod tests {
             assert_eq!(FlatRule::from_name(rule.name()), Some(rule));
         }
         assert_eq!(ReflectionModel::from_name("Phong"), None);
+    }
+
+    #[test]
+    fn a_shading_is_read_as_it_is_written() {
+        let auto = |max_error| Shading::Auto { max_error: ErrorBound::new(max_error).unwrap() };
+        for shading in [Shading::Flat, Shading::Phong, auto(0.01), auto(1.0), auto(1e-6)] {
+            assert_eq!(shading.to_string().parse(), Ok(shading));
+        }
+        assert_eq!(auto(0.01).to_string(), "auto:0.01");
+        for text in ["auto", "auto:", "auto:0", "auto:-0.1", "auto:1.5", "auto:NaN", "auto:x", "Phong", ""] {
+            assert_eq!(text.parse::<Shading>(), Err(NoShading), "{text}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What a frame of many objects and many lights costs the CPU, stage by stage: boxes on a plane, as many lamps of two metres just above
 //! them, of both a part moves every frame.
-//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1] [--shading phong|gouraud] [--frames 30]`
+//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1] [--shading phong|gouraud|auto:0.01] [--frames 30]`
 //!
 //! `--moving` is a percentage. Medians of the frames, in milliseconds; the frames are small, and their drawing is not counted.
 
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "--number" => number = value.parse()?,
             "--moving" => moving = value.parse()?,
             "--frames" => frames = value.parse()?,
-            "--shading" => shading = Shading::from_name(&value).ok_or("no such shading")?,
+            "--shading" => shading = value.parse()?,
             _ => return Err(format!("{argument} is unknown").into()),
         }
     }

@@ -1,5 +1,5 @@
 //! What a frame costs against the number of lights: 64 balls (73,728 triangles with the floor) under point lights of three metres.
-//! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong] [--reflection blinn]
+//! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong|auto:0.01] [--reflection blinn]
 //! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--png FOLDER] [--account] [LIGHTS …]`
 //!
 //! Wall clock from the call to the finished frame, the device waited for: of frames of a still World the median and the least; the median of frames before each of which the camera is marked as
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let (width, height) = text.split_once('x').ok_or("--size takes WIDTHxHEIGHT")?;
                 size = (width.parse()?, height.parse()?);
             }
-            "--shading" => options.shading = Some(Shading::from_name(&value()?).ok_or("no such shading")?),
+            "--shading" => options.shading = Some(value()?.parse()?),
             "--reflection" => {
                 options.reflection = Some(ReflectionModel::from_name(&value()?).ok_or("no such model")?);
             }

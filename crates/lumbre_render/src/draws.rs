@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::DVec3;
+use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{ObjectTraits, SceneSettings};
 
 use crate::extract::{CameraView, LitPass, Object, Objects};
@@ -63,7 +64,7 @@ struct Visible<'a> {
 }
 
 impl<'a> VisibleObjects<'a> {
-    /// What `view` sees, each with the pipeline that `choose` answers with for the one that it calls for.
+    /// What `view` sees, each with the pipeline that `choose` answers with for the one that it calls for. What asks to be shaded by need is shaded as `need` says.
     pub fn new(
         objects: &'a Objects,
         view: &CameraView,
@@ -71,6 +72,7 @@ impl<'a> VisibleObjects<'a> {
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
         choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
+        need: &mut dyn FnMut(usize, &Object, ErrorBound) -> Shading,
     ) -> Self {
         let mut seen = Self::default();
         let planes = view.frustum(objects.origin);
@@ -79,7 +81,7 @@ impl<'a> VisibleObjects<'a> {
             planes.iter().all(|plane| plane.dot(center) >= -object.radius)
         };
         // Most objects are as the one before.
-        let mut known: Option<(ObjectTraits, Variant)> = None;
+        let mut known: Option<(ObjectTraits, Shading, Variant)> = None;
         let mut known_key: Option<(PipelineKey, Option<PipelineKey>)> = None;
         for (slot, object) in objects.iter() {
             if !inside(object) {
@@ -88,11 +90,15 @@ impl<'a> VisibleObjects<'a> {
             }
             let traits = &object.traits;
             let pass = LitPass::of(traits, frame.lightmaps);
-            let variant = match known {
-                Some((of, variant)) if of == *traits => variant,
-                _ => features::variant(traits, settings, frame),
+            let shading = match features::asked_shading(traits, settings, frame) {
+                Shading::Auto { max_error } => need(slot, object, max_error),
+                asked => asked,
             };
-            known = Some((*traits, variant));
+            let variant = match known {
+                Some((of, at, variant)) if of == *traits && at == shading => variant,
+                _ => features::variant(traits, shading, settings, frame),
+            };
+            known = Some((*traits, shading, variant));
             let pipeline = PipelineKey {
                 variant,
                 format,

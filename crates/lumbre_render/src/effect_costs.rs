@@ -27,22 +27,39 @@ impl Removable {
     }
 }
 
-/// The effects that a scene calls for and that can be left out, in the order of the census.
-pub fn removable_effects(census: &Census) -> Vec<Removable> {
+/// The effects that a scene, or the options of its frame, call for and that can be left out, in the order of the census.
+pub fn removable_effects(census: &Census, options: &FrameOptions) -> Vec<Removable> {
     let called_for: Vec<_> = census.lines().into_iter().filter(|line| line.called_for).collect();
-    let is_called_for = |effect: &Removable| called_for.iter().any(|line| line.effect == effect.effect);
+    let by_need = matches!(options.shading, Some(Shading::Auto { .. }));
+    let is_called_for = |effect: &Removable| {
+        called_for.iter().any(|line| line.effect == effect.effect) || by_need && effect.effect == BY_NEED
+    };
     EFFECTS.iter().copied().filter(is_called_for).collect()
 }
+
+/// As a line of the census names it.
+pub(crate) const BY_NEED: &str = "shading by need";
 
 const EFFECTS: &[Removable] = &[
     // Against the next cheaper shading.
     Removable {
         effect: "Gouraud shading",
-        without: |world, options| shade_otherwise(world, options, Shading::Gouraud, Shading::Flat),
+        without: |world, options| {
+            shade_otherwise(world, options, |shading| shading == Shading::Gouraud, Shading::Flat);
+        },
     },
     Removable {
         effect: "Phong shading",
-        without: |world, options| shade_otherwise(world, options, Shading::Phong, Shading::Gouraud),
+        without: |world, options| {
+            shade_otherwise(world, options, |shading| shading == Shading::Phong, Shading::Gouraud);
+        },
+    },
+    // Against what it may not be far from: what it adds is below zero as a rule.
+    Removable {
+        effect: BY_NEED,
+        without: |world, options| {
+            shade_otherwise(world, options, |it| matches!(it, Shading::Auto { .. }), Shading::Phong);
+        },
     },
     Removable { effect: "sky", without: |world, _| settings(world, |settings| settings.sky = Vec3::ZERO) },
     Removable {
@@ -126,16 +143,16 @@ fn each_textures(world: &mut World, change: impl Fn(&mut MaterialTextures)) {
 }
 
 /// Shades objects of one technique by another, whether they chose it themselves or the scene for them.
-fn shade_otherwise(world: &mut World, options: &mut FrameOptions, from: Shading, to: Shading) {
-    if options.shading == Some(from) {
+fn shade_otherwise(world: &mut World, options: &mut FrameOptions, from: fn(Shading) -> bool, to: Shading) {
+    if options.shading.is_some_and(from) {
         options.shading = Some(to);
     }
     settings(world, |settings| {
-        if settings.shading == from {
+        if from(settings.shading) {
             settings.shading = to;
         }
     });
-    for mut shading in world.query::<&mut Shading>().iter_mut(world).filter(|shading| **shading == from) {
+    for mut shading in world.query::<&mut Shading>().iter_mut(world).filter(|shading| from(**shading)) {
         *shading = to;
     }
 }

@@ -10,7 +10,7 @@ use lumbre_scene::{
     Census, HiddenCone, ObjectCensus, SceneSettings, hidden_cones, shown_objects, usable_irradiance_volumes,
 };
 
-use crate::effect_costs::FrameCost;
+use crate::effect_costs::{BY_NEED, FrameCost};
 use crate::effects::{self, Effect, Stage};
 use crate::extract::LightSet;
 use crate::facts::SceneFacts;
@@ -19,6 +19,7 @@ use crate::frame_bindings::FrameBindings;
 use crate::frame_graph::{Last, declare};
 use crate::frame_plan::{Ending, FramePlan};
 use crate::shader::Feature;
+use crate::shading_by_need::{Conditions, ShadingNeed, WorldNeeds, is_shaded_by_need};
 use crate::{FrameOptions, RenderError, Renderer};
 
 /// A scene's frame, explained.
@@ -32,6 +33,8 @@ pub struct SceneExplanation {
     pub frame: Explanation,
     /// By which lists lights are found, and why.
     pub light_lists: Vec<String>,
+    /// What objects take that are shaded by need, and why; nothing where none is.
+    pub shading_by_need: Vec<ShadingNeed>,
     /// Each shader variant in use with the number of objects it draws.
     pub variants: BTreeMap<String, usize>,
     /// What each effect costs, where somebody has measured it (see [`crate::effect_costs`]).
@@ -86,8 +89,9 @@ fn explain_with(
         lights = lights.without_shadows();
     }
     let objects = shown_objects(world);
+    let counted = ObjectCensus::of(&objects);
     let volumes = usable_irradiance_volumes(world);
-    let facts = SceneFacts::new(&ObjectCensus::of(&objects), &lights, volumes, &settings, options);
+    let facts = SceneFacts::new(&counted, &lights, volumes, &settings, options);
     let mut radiance = false;
     for effect in effects.iter_mut() {
         let called_for = effect.extract(world, &facts, options);
@@ -98,8 +102,18 @@ fn explain_with(
     let common = FrameFeatures::new(options, &settings, &facts, lights, (plan.ending, target_format, half));
     let mut variants = BTreeMap::new();
     let (mut clustered, mut bindings) = (0, FrameBindings::default());
-    for (object, _) in &objects {
-        let variant = features::variant(object, &settings, &common);
+    let flat_rule = options.flat_rule.unwrap_or(settings.flat_rule);
+    let conditions = Conditions::new(&SceneSettings { flat_rule, ..settings }, &common);
+    let mut needs = match is_shaded_by_need(&counted, options, &settings) {
+        true => WorldNeeds::of(world, &conditions, options, [width, height])?,
+        false => WorldNeeds::default(),
+    };
+    for (index, (object, _)) in objects.iter().enumerate() {
+        let shading = match features::asked_shading(object, &settings, &common) {
+            Shading::Auto { max_error } => needs.choose(index, max_error),
+            asked => asked,
+        };
+        let variant = features::variant(object, shading, &settings, &common);
         clustered += usize::from(variant.has(Feature::Clusters));
         bindings = bindings.and(FrameBindings::of(&variant));
         *variants.entry(variant.to_string()).or_insert(0) += 1;
@@ -116,7 +130,15 @@ fn explain_with(
         _ => hidden_cones(world),
     };
     let census = Census::clone(&facts.census);
-    Ok(SceneExplanation { census, hidden_cones, frame, light_lists, variants, cost: None })
+    Ok(SceneExplanation {
+        census,
+        hidden_cones,
+        frame,
+        light_lists,
+        shading_by_need: needs.groups(),
+        variants,
+        cost: None,
+    })
 }
 
 impl SceneExplanation {
@@ -144,6 +166,7 @@ impl SceneExplanation {
         }
         let objects: usize = self.variants.values().sum();
         let _ = writeln!(text, "\n  {} shader variants for {objects} objects", self.variants.len());
+        self.write_needs(&mut text);
         text + &self.account()
     }
 
@@ -193,11 +216,23 @@ impl SceneExplanation {
         for line in &self.light_lists {
             let _ = writeln!(text, "  {line}");
         }
+        self.write_needs(&mut text);
         text.push_str("\nShader variants\n");
         for (variant, count) in &self.variants {
             let _ = writeln!(text, "  {count} x {variant}");
         }
         text + &self.account()
+    }
+
+    /// What objects take that are shaded by need.
+    fn write_needs(&self, text: &mut String) {
+        if self.shading_by_need.is_empty() {
+            return;
+        }
+        let _ = writeln!(text, "\nShading by need{}", self.cost_of(BY_NEED));
+        for need in &self.shading_by_need {
+            let _ = writeln!(text, "  {}", need.line());
+        }
     }
 
     /// What a frame went into, where it was measured.

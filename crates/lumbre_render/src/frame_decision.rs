@@ -15,6 +15,7 @@ use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
 use crate::shader::Feature;
+use crate::shading_by_need::ShadingNeeds;
 use crate::{
     FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics, Viewport,
 };
@@ -54,6 +55,8 @@ pub(crate) struct Decided {
     pub light_list: Vec<u32>,
     /// On average.
     pub lights_per_object: f32,
+    /// What objects in view take that are shaded by need.
+    pub shading_by_need: ShadingNeeds,
     /// An effect that is called for draws the shapes of objects.
     pub draws_objects: bool,
     /// What the frame was decided from.

@@ -68,29 +68,11 @@ impl<'a> ObjectLightLists<'a> {
             self.lengths.1 += 1;
             return InstanceData::default();
         }
-        let everything = self.everything;
-        let reaches = |light: &LightReach| {
-            if let Some(polygon) = light.polygon {
-                let farthest =
-                    (center - light.center).dot(polygon.front) + half_size.dot(polygon.front.abs());
-                return polygon.emitter != entity && farthest > 0.0;
-            }
-            if everything {
-                return true;
-            }
-            let outside = ((light.center - center).abs() - half_size).max(DVec3::ZERO);
-            light.radius.is_infinite() || outside.length() < light.radius
-        };
-        let reached = |index: &u32| reaches(&self.reaches[*index as usize]);
         let list: Vec<u32> = if clustered {
-            self.unbounded.iter().copied().filter(reached).collect()
-        } else if everything {
-            let all = u32::try_from(self.reaches.len()).unwrap_or(u32::MAX);
-            (0..all).filter(reached).collect()
+            let touches = |index: &u32| self.reaches[*index as usize].touches(entity, center, half_size);
+            self.unbounded.iter().copied().filter(touches).collect()
         } else {
-            let grid = self.grid.get_or_insert_with(|| LightGrid::new(self.reaches));
-            grid.near(center, half_size, &mut self.near);
-            self.near.iter().copied().filter(reached).collect()
+            self.lights_of(entity, center, half_size).collect()
         };
         self.lengths = (self.lengths.0 + list.len() as u64, self.lengths.1 + 1);
         if let Some(known) = self.known.get(&list) {
@@ -113,6 +95,29 @@ impl<'a> ObjectLightLists<'a> {
         };
         self.known.insert(list, instance);
         instance
+    }
+
+    /// The lights that reach an object with this bounding box in the world, or with brute force all, in rising order.
+    pub fn lights_of(
+        &mut self,
+        entity: Entity,
+        center: DVec3,
+        half_size: DVec3,
+    ) -> impl Iterator<Item = u32> + use<'_, 'a> {
+        let everything = self.everything;
+        if everything {
+            self.near.clear();
+            self.near.extend(0..u32::try_from(self.reaches.len()).unwrap_or(u32::MAX));
+        } else {
+            let grid = self.grid.get_or_insert_with(|| LightGrid::new(self.reaches));
+            grid.near(center, half_size, &mut self.near);
+        }
+        let reaches = self.reaches;
+        let reached = move |light: &LightReach| match light.polygon {
+            Some(polygon) => polygon.shines_on(light.center, entity, center, half_size),
+            None => everything || light.touches(entity, center, half_size),
+        };
+        self.near.iter().copied().filter(move |index| reached(&reaches[*index as usize]))
     }
 
     /// Whether all lists fit into the device's buffer: a light that is lost silently would be a wrong picture.

@@ -1,10 +1,10 @@
 //! GPU copies of meshes: one buffer per attribute, made when a variant first asks for it. Who uses which is decided in `draws`.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3, Vec4};
-use lumbre_mesh::{MeshError, TextureCoordinateSet, TriangleMesh};
+use lumbre_mesh::{MeshError, SurfaceSpread, TextureCoordinateSet, TriangleMesh};
 use lumbre_optics::FlatRule;
 use wgpu::util::DeviceExt;
 
@@ -61,6 +61,22 @@ pub(crate) struct GpuMesh {
     pub half_size: DVec3,
     /// A triangle with a vertex that is not there; attributes that are not there read as their neutral values instead.
     pub fault: Option<MeshError>,
+    /// How large and curved its triangles are, once something asked.
+    spread: OnceLock<SurfaceSpread>,
+}
+
+/// Middle of the bounding box in mesh space, and half its sides.
+pub(crate) fn mesh_box(mesh: &TriangleMesh) -> (DVec3, DVec3) {
+    let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for position in mesh.positions.iter().filter(|position| position.is_finite()) {
+        (min, max) = (min.min(*position), max.max(*position));
+    }
+    if min.cmple(max).all() {
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        (0.5 * (min + max), 0.5 * (max - min))
+    } else {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
 }
 
 /// A draw's worth of buffers.
@@ -72,20 +88,12 @@ pub(crate) struct MeshSlices<'a> {
 
 impl GpuMesh {
     fn new(source: Arc<TriangleMesh>, tangents: Option<TextureCoordinateSet>) -> Self {
-        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for position in source.positions.iter().filter(|position| position.is_finite()) {
-            (min, max) = (min.min(*position), max.max(*position));
-        }
-        let (center, half_size) = if min.cmple(max).all() {
-            let (min, max) = (min.as_dvec3(), max.as_dvec3());
-            (0.5 * (min + max), 0.5 * (max - min))
-        } else {
-            (DVec3::ZERO, DVec3::ZERO)
-        };
+        let (center, half_size) = mesh_box(&source);
         let fault = source.validate().err();
         let fault = fault.filter(|fault| matches!(fault, MeshError::IndexOutOfRange { .. }));
         Self {
             fault,
+            spread: OnceLock::new(),
             shared: Arc::clone(&source),
             source,
             tangents,
@@ -100,6 +108,16 @@ impl GpuMesh {
     /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.source.triangle_count()
+    }
+
+    /// Number of vertices.
+    pub fn vertices(&self) -> usize {
+        self.source.positions.len()
+    }
+
+    /// How large and curved its triangles are: looked up in all of them when this is first asked.
+    pub fn spread(&self) -> &SurfaceSpread {
+        self.spread.get_or_init(|| SurfaceSpread::of(&self.shared))
     }
 
     /// Makes what is missing of these attributes; answers with the bytes uploaded for it.

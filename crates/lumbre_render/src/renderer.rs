@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use bevy_ecs::prelude::*;
 use lumbre_graph::{Executor, Plan};
+use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{SceneSettings, propagate_transforms};
 
 use crate::accounting::FrameShares;
@@ -15,7 +16,8 @@ use crate::draws::{Draws, VisibleObjects};
 use crate::effect_shares::EffectShares;
 use crate::effects::{self, BuiltIn, Effect, Stage};
 use crate::extract::{
-    CameraView, Emitters, KnownLights, LightSet, LitPass, Objects, extract_lights, find_camera,
+    CameraView, Emitters, KnownLights, LightPlace, LightSet, LitPass, Object, Objects, extract_lights,
+    find_camera,
 };
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
@@ -35,6 +37,7 @@ use crate::mesh_buffers::{Attribute, MeshBuffers};
 use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
 use crate::rehearsal::Rehearsals;
 use crate::shader::Variant;
+use crate::shading_by_need::{Conditions, ShadingByNeed, ShadingNeeds, SizedView, is_shaded_by_need};
 use crate::shadows::{CasterPipelines, ShadowMaps, ShadowedView};
 use crate::stage_clock::{StageClock, timed};
 use crate::texture_sets::TextureSets;
@@ -70,6 +73,7 @@ pub struct Renderer {
     light_counter: LightCounter,
     /// Pipelines of lit surfaces that there were at the end of the last frame.
     pipelines_before: usize,
+    needs: ShadingByNeed,
     watch: WorldWatch,
     decisions: Decisions,
     /// None after a frame that failed.
@@ -146,6 +150,7 @@ impl Renderer {
             ledger: Ledger::default(),
             light_counter: LightCounter::default(),
             pipelines_before: 0,
+            needs: ShadingByNeed::default(),
             watch: WorldWatch::default(),
             decisions: Decisions::default(),
             last: None,
@@ -385,15 +390,18 @@ impl Renderer {
             lightmaps: options.lightmaps,
             shadows: options.shadows,
         });
-        let place = (self.objects.origin, known);
+        let by_need = is_shaded_by_need(&self.objects.census, options, settings);
+        let place = LightPlace { origin: self.objects.origin, known, lamps: by_need };
         let mut lights = extract_lights(world, &mut self.emitters, &mut self.lights, place, left_out)?;
         if !options.lightmaps {
             lights.set = lights.set.without_lightmaps();
             lights.reaches.iter_mut().for_each(|reach| reach.baked = false);
+            lights.lamps.iter_mut().for_each(|lamp| lamp.reach.baked = false);
         }
         if !options.shadows {
             lights.set = lights.set.without_shadows();
             lights.shadows.clear();
+            lights.lamps.iter_mut().for_each(|lamp| lamp.light.shadow = false);
         }
         clock.lap(|cpu| &mut cpu.lights_ms);
         let facts = SceneFacts::new(&self.objects.census, &lights.set, self.volumes.len(), settings, options);
@@ -438,6 +446,23 @@ impl Renderer {
             Some(_) if pipelines.get(&wanted).is_none() => pipelines.nearest(&wanted),
             _ => Some(wanted),
         };
+        if by_need {
+            let settings = SceneSettings { flat_rule: decision.flat_rule(), ..*settings };
+            let conditions = Conditions::new(&settings, &decision.features);
+            self.needs.begin(conditions, std::mem::take(&mut lights.lamps), &self.objects);
+        }
+        let size = [seen.target.width, seen.target.height];
+        let sized = SizedView { view: seen.view, size, exposure: seen.exposure };
+        let (needs, meshes, found) = (&mut self.needs, &self.meshes, &mut lists);
+        let mut shading_by_need = ShadingNeeds::default();
+        let mut need = |slot: usize, object: &Object, max_error: ErrorBound| {
+            let Some(mesh) = meshes.get(object.mesh) else { return Shading::Phong };
+            let lights =
+                || -> Vec<u32> { found.lights_of(object.entity, object.center, object.half_size).collect() };
+            let chosen = needs.choose((slot, object), mesh, &sized, max_error, lights);
+            shading_by_need.add(&chosen);
+            chosen.shading
+        };
         let visible = VisibleObjects::new(
             &self.objects,
             &seen.view,
@@ -445,6 +470,7 @@ impl Renderer {
             &decision.features,
             (decision.plan.lit_format, decision.plan.samples),
             &choose,
+            &mut need,
         );
         clock.lap(|cpu| &mut cpu.visibility_ms);
         let draws = Draws::new(&visible, &mut lists, &self.volumes);
@@ -460,6 +486,7 @@ impl Renderer {
             draws,
             light_list,
             lights_per_object,
+            shading_by_need,
             draws_objects,
             census: facts.census,
         })
@@ -587,6 +614,7 @@ impl Renderer {
             lights: lights.set.every.all,
             static_lights: lights.set.every.all - lights.set.every.dynamic,
             lights_per_object: decided.lights_per_object,
+            shading_by_need: decided.shading_by_need,
             objects: draws.instances.len(),
             objects_outside: draws.outside,
             triangles,

@@ -2,6 +2,8 @@
 
 use lumbre_graph::ExecutionStages;
 
+use crate::shading_by_need::ShadingNeeds;
+
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
@@ -27,6 +29,8 @@ pub struct Statistics {
     /// Pipelines, and effects, that this frame called for and that are still being made: it went on as one before it
     /// ([`MissingPipelines::Background`](crate::MissingPipelines)).
     pub pipelines_awaited: usize,
+    /// What the objects in view take that are shaded by need.
+    pub shading_by_need: ShadingNeeds,
     /// How fragments and vertices find their lights.
     pub light_lists: LightListing,
     /// What the passes that draw lit surfaces draw and test, each its own; zeros where nothing is measured, since every object's list is counted for it.

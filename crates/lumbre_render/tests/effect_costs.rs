@@ -41,7 +41,7 @@ fn half_of_the_light_is_half_of_the_picture() {
             world.spawn((Light::directional(Vec3::ONE), Transform::IDENTITY));
         })
     };
-    let effects = removable_effects(&Census::of(&mut scene()));
+    let effects = removable_effects(&Census::of(&mut scene()), &FrameOptions::default());
     let names: Vec<_> = effects.iter().map(|effect| effect.effect).collect();
     assert_eq!(
         names,

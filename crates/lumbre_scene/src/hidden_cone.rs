@@ -58,7 +58,9 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
     let shown = query.iter(world).filter(|object| !hidden.contains(&object.0.entity));
     for (name, parent, mesh, material, transform, shading) in shown {
         let shading = shading.copied().unwrap_or(settings.shading);
-        if shading == Shading::Phong || material.unlit || !transform.0.is_finite() {
+        // Where shading is by need, a cone that falls between vertices is a need for Phong.
+        let per_fragment = matches!(shading, Shading::Phong | Shading::Auto { .. });
+        if per_fragment || material.unlit || !transform.0.is_finite() {
             continue;
         }
         let place = |vertex: u32| {

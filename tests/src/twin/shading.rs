@@ -39,7 +39,8 @@ impl<'a> ShadedTriangle<'a> {
         let mut shaded = Self { scene, object, triangle, front, colors: None };
         let [a, b, c] = triangle.each_ref().map(|vertex| vertex.point);
         shaded.colors = match object.shading {
-            Shading::Phong => None,
+            // The twin knows no need: it is what shading by need may not be far from.
+            Shading::Phong | Shading::Auto { .. } => None,
             Shading::Gouraud => {
                 Some(triangle.each_ref().map(|v| shaded.lit(v.point, shaded.facing(v.normal), 0.0)))
             }

@@ -51,7 +51,7 @@ fn of_scene(
     measured: &mut Measured,
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
-    let effects = removable_effects(&Census::of(&mut whole));
+    let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
     let mut frames = vec![Frame::new(whole, FrameOptions::default())];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());

@@ -138,6 +138,7 @@ fn point(conditions: &Conditions<'_>, subject: &Subject, shading: Shading, frame
             Shading::Flat => "flat",
             Shading::Gouraud => "Gouraud",
             Shading::Phong => "Phong",
+            Shading::Auto { .. } => "by need",
         }
         .into(),
         label: subject.label.clone(),

@@ -214,7 +214,7 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
 /// What can be changed, with its key.
 fn choices(ui: &mut Ui, facts: &Facts) {
     let view = &facts.view;
-    let shading = view.shading.map_or("as the file asks", |shading| shading.name());
+    let shading = view.shading.map_or("as the file asks".to_owned(), |shading| shading.to_string());
     let reflection = view.reflection.map_or("as the file asks", |model| model.name());
     let switch = |on: bool| if on { "on" } else { "off" };
     let exposure = match (facts.exposure, facts.adapts) {
@@ -230,7 +230,7 @@ fn choices(ui: &mut Ui, facts: &Facts) {
             ("B", "bake", bake),
             ("K", "keep the bake", if facts.file.can_save { "ready" } else { "when it is done" }),
             ("E", "exposure", &exposure),
-            ("1 2 3, G", "shading", shading),
+            ("1 2 3, G", "shading", shading.as_str()),
             ("R", "reflection", reflection),
             ("L", "baked light", switch(view.lightmaps)),
             ("M", "multisampling", switch(view.multisample)),

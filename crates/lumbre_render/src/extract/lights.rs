@@ -342,6 +342,70 @@ impl LightReach {
     }
 }
 
+impl LightReach {
+    /// Whether it may light anything of an object with this bounding box in the world.
+    pub fn touches(&self, entity: Entity, center: DVec3, half_size: DVec3) -> bool {
+        if let Some(polygon) = self.polygon {
+            return polygon.shines_on(self.center, entity, center, half_size);
+        }
+        let outside = ((self.center - center).abs() - half_size).max(DVec3::ZERO);
+        self.radius.is_infinite() || outside.length() < self.radius
+    }
+}
+
+impl PolygonReach {
+    /// Whether anything of an object with this bounding box lies before the polygon with this corner, and the object is not its own.
+    pub fn shines_on(&self, corner: DVec3, entity: Entity, center: DVec3, half_size: DVec3) -> bool {
+        let farthest = (center - corner).dot(self.front) + half_size.dot(self.front.abs());
+        self.emitter != entity && farthest > 0.0
+    }
+}
+
+/// A light with all that the CPU may ask of it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Lamp {
+    pub reach: LightReach,
+    /// Nothing of a polygon light but that it shines.
+    pub light: Light,
+    pub position: DVec3,
+    /// Unit: where it shines.
+    pub axis: DVec3,
+}
+
+impl Lamp {
+    fn new(light: &Light, transform: &GlobalTransform, reach: LightReach) -> Self {
+        Self { reach, light: light.clone(), position: transform.translation(), axis: transform.forward() }
+    }
+
+    fn of_polygon(polygon: &EmissivePolygon) -> Self {
+        let (reach, position) = (LightReach::of_polygon(polygon), polygon.light.corner);
+        Self { reach, light: Light::point(Vec3::ONE), position, axis: DVec3::NEG_Z }
+    }
+
+    /// The lights of a World that a frame would evaluate, with lightmaps and shadows or without.
+    ///
+    /// # Errors
+    /// [`RenderError::TooManyEmissiveFaces`].
+    pub fn of(world: &mut World, lightmaps: bool, shadows: bool) -> Result<Vec<Self>, RenderError> {
+        let polygons = Emitters::default().polygons(world)?;
+        let mut query = world.query::<(&Light, Option<&GlobalTransform>)>();
+        let shining = query
+            .iter(world)
+            .filter(|(light, transform)| light.kind != LightKind::Ambient && shines(light, *transform));
+        let mut lamps: Vec<Self> = shining
+            .filter_map(|(light, transform)| {
+                let light = Light { shadow: light.shadow && shadows, ..light.clone() };
+                let transform = transform?;
+                let reach = LightReach::new(&light, transform, LightClass::of(&light));
+                Some(Self::new(&light, transform, reach))
+            })
+            .chain(polygons.iter().map(Self::of_polygon))
+            .collect();
+        lamps.iter_mut().for_each(|lamp| lamp.reach.baked &= lightmaps);
+        Ok(lamps)
+    }
+}
+
 /// Middle and radius of the smallest ball around all that a point light reaches: the ball of its range, or around a spotlight's part of it.
 fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64) {
     let (place, range) = (transform.translation(), f64::from(light.attenuation.range));
@@ -367,6 +431,19 @@ pub(crate) struct SceneLights {
     pub inverse_square: Vec<InverseSquareLightData>,
     /// Those that cast shadows.
     pub shadows: Vec<ShadowLight>,
+    /// One for each of `reaches`, where they are asked for.
+    pub lamps: Vec<Lamp>,
+}
+
+/// Where the lights of a frame go, and what is wanted of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightPlace<'a> {
+    /// Of frame space, in the world.
+    pub origin: DVec3,
+    /// Only what these can show is lit.
+    pub known: Option<KnownLights<'a>>,
+    /// [`SceneLights::lamps`] are wanted.
+    pub lamps: bool,
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
@@ -378,7 +455,7 @@ pub(crate) fn extract_lights(
     world: &mut World,
     emitters: &mut Emitters,
     buffer: &mut GrowableBuffer<LightData>,
-    (origin, known): (DVec3, Option<KnownLights<'_>>),
+    LightPlace { origin, known, lamps }: LightPlace<'_>,
     left_out: &mut Vec<String>,
 ) -> Result<SceneLights, RenderError> {
     let mut scene = SceneLights::default();
@@ -414,7 +491,11 @@ pub(crate) fn extract_lights(
             if class == LightClass::InverseSquare {
                 scene.inverse_square.push(InverseSquareLightData::new(light, place, origin));
             }
-            scene.reaches.push(LightReach::new(light, place, class));
+            let reach = LightReach::new(light, place, class);
+            scene.reaches.push(reach);
+            if lamps {
+                scene.lamps.push(Lamp::new(light, place, reach));
+            }
             let shadow = ShadowLight::new(*entity, light, place, views);
             if shadow.is_none() && light.shadow {
                 let name = world.get::<Name>(*entity).map_or_else(|| entity.to_string(), ToString::to_string);
@@ -428,6 +509,9 @@ pub(crate) fn extract_lights(
         }
         for polygon in polygons.iter().filter(|polygon| polygon.baked == of_baked) {
             scene.reaches.push(LightReach::of_polygon(polygon));
+            if lamps {
+                scene.lamps.push(Lamp::of_polygon(polygon));
+            }
             data.push(LightData::polygon(&polygon.light, origin));
         }
     }

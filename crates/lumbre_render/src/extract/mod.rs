@@ -12,7 +12,8 @@ pub(crate) use emitters::Emitters;
 #[cfg(test)]
 pub(crate) use lights::PolygonReach;
 pub(crate) use lights::{
-    KnownLights, LightClass, LightCounts, LightReach, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
+    KnownLights, Lamp, LightClass, LightCounts, LightPlace, LightReach, LightSet, SceneLights,
+    UNIFORM_LIGHTS, extract_lights,
 };
 pub(crate) use lit_pass::LitPass;
-pub(crate) use objects::{Object, Objects};
+pub(crate) use objects::{Object, Objects, Reflectance, world_box};

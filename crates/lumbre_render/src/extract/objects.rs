@@ -9,7 +9,7 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use glam::{DAffine3, DVec3};
 use lumbre_mesh::TextureCoordinateSet;
-use lumbre_optics::{Material, ReflectionModel, Shading};
+use lumbre_optics::{Lobe, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{
     Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh, Name,
     ObjectCensus, ObjectTraits, StaticObject, with_descendants,
@@ -45,7 +45,26 @@ pub(crate) struct Object {
     pub half_size: DVec3,
     /// Of the sphere around the same middle.
     pub radius: f64,
+    /// What it reflects.
+    pub reflectance: Reflectance,
+    /// A number that is another one after each change of it.
+    pub changed: u64,
     seen: u64,
+}
+
+/// The coefficients of both sides of a material.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Reflectance {
+    pub front: Surface,
+    /// Of the back, if it differs.
+    pub back: Option<Surface>,
+    pub lobe: Lobe,
+}
+
+impl Reflectance {
+    pub fn of(material: &Material) -> Self {
+        Self { front: material.front, back: material.back, lobe: material.lobe }
+    }
 }
 
 /// What an object's components say that may be absent: their removal leaves no other mark.
@@ -232,6 +251,10 @@ impl Objects {
                     };
                 }
                 object.seen = self.frame;
+                if transformed || restated {
+                    object.changed = self.frame;
+                    object.reflectance = Reflectance::of(&material);
+                }
                 if restated {
                     let traits = ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks));
                     object.count(&mut self.census, traits, mesh.0.triangle_count());
@@ -289,6 +312,14 @@ impl Objects {
     }
 }
 
+/// Middle of the bounding box in the world of what has this one in mesh space, half its sides along the world's axes, and the radius of the sphere around it.
+pub(crate) fn world_box(center: DVec3, half: DVec3, transform: &GlobalTransform) -> (DVec3, DVec3, f64) {
+    let matrix = transform.0.matrix3;
+    let half_size =
+        matrix.x_axis.abs() * half.x + matrix.y_axis.abs() * half.y + matrix.z_axis.abs() * half.z;
+    (transform.0.transform_point3(center), half_size, half_size.length())
+}
+
 impl Object {
     fn new(entity: Entity, mesh: MeshKey, traits: ObjectTraits) -> Self {
         Self {
@@ -306,6 +337,8 @@ impl Object {
             center: DVec3::ZERO,
             half_size: DVec3::ZERO,
             radius: 0.0,
+            reflectance: Reflectance::default(),
+            changed: 0,
             seen: 0,
         }
     }
@@ -332,13 +365,8 @@ impl Object {
     fn bound(&mut self, meshes: &MeshBuffers, transform: &GlobalTransform) {
         self.mirrored = transform.mirrors();
         self.world_from_mesh = transform.0;
-        let matrix = transform.0.matrix3;
         if let Some(mesh) = meshes.get(self.mesh) {
-            let half = mesh.half_size;
-            self.center = transform.0.transform_point3(mesh.center);
-            self.half_size =
-                matrix.x_axis.abs() * half.x + matrix.y_axis.abs() * half.y + matrix.z_axis.abs() * half.z;
-            self.radius = self.half_size.length();
+            (self.center, self.half_size, self.radius) = world_box(mesh.center, mesh.half_size, transform);
         }
     }
 }

@@ -87,10 +87,32 @@ impl Subject<'_> {
     }
 }
 
-/// The variant that draws an object in such a frame.
-pub(crate) fn variant(object: &ObjectTraits, settings: &SceneSettings, frame: &FrameFeatures) -> Variant {
-    let shading = frame.shading.or(object.shading).unwrap_or(settings.shading);
-    let reflection = frame.reflection.or(object.reflection).unwrap_or(settings.reflection);
+/// How often an object asks to be lit in such a frame; by need perhaps.
+pub(crate) fn asked_shading(
+    object: &ObjectTraits,
+    settings: &SceneSettings,
+    frame: &FrameFeatures,
+) -> Shading {
+    frame.shading.or(object.shading).unwrap_or(settings.shading)
+}
+
+/// The specular model of an object in such a frame.
+pub(crate) fn asked_reflection(
+    object: &ObjectTraits,
+    settings: &SceneSettings,
+    frame: &FrameFeatures,
+) -> ReflectionModel {
+    frame.reflection.or(object.reflection).unwrap_or(settings.reflection)
+}
+
+/// The variant that draws an object in such a frame, lit so often, which is no longer by need.
+pub(crate) fn variant(
+    object: &ObjectTraits,
+    shading: Shading,
+    settings: &SceneSettings,
+    frame: &FrameFeatures,
+) -> Variant {
+    let reflection = asked_reflection(object, settings, frame);
     let subject = Subject { object, settings, frame, shading, lit: !object.unlit };
     let mut variant = Variant::new(shading, reflection);
     variant.set(Feature::Lit, subject.lit);

@@ -78,6 +78,12 @@ impl Census {
             mesh("Gouraud shading", self.gouraud, "shaded per vertex", "no lit mesh asks for it"),
             mesh("Phong shading", self.phong, "shaded per fragment", "no lit mesh asks for it"),
             mesh(
+                "shading by need",
+                self.shaded_by_need,
+                "shaded as rarely as an error allows",
+                "no lit mesh asks for it",
+            ),
+            mesh(
                 "own reflection models",
                 self.own_reflection,
                 "with another specular model than the scene",

@@ -91,6 +91,8 @@ pub struct Census {
     pub gouraud: usize,
     /// Meshes shaded per fragment.
     pub phong: usize,
+    /// Meshes shaded by need: as rarely as an error allows.
+    pub shaded_by_need: usize,
     /// Lit meshes with a specular model of their own.
     pub own_reflection: usize,
     /// Lit meshes with a highlight, by the name of their specular model; models that nothing uses are missing.
@@ -153,6 +155,7 @@ impl Census {
             flat: shaded(Shading::Flat),
             gouraud: shaded(Shading::Gouraud),
             phong: shaded(Shading::Phong),
+            shaded_by_need: objects.shaded_by_need(settings.shading),
             own_reflection: objects.reflection[1..].iter().sum(),
             reflection_models: highlights,
             fog: settings.fog.is_some(),

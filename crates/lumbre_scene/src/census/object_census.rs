@@ -45,8 +45,8 @@ pub struct ObjectCensus {
     pub glowing_behind: usize,
     /// Objects whose faces light others in real time.
     pub emissive_lights: usize,
-    /// Lit objects by their own rate of evaluation: none of its own first, then as [`Shading::ALL`].
-    pub shading: [usize; 1 + Shading::ALL.len()],
+    /// Lit objects by their own rate of evaluation: none of its own first, then as [`Shading::ALL`], and last by need.
+    pub shading: [usize; 2 + Shading::ALL.len()],
     /// Lit objects by their own specular model: none of its own first, then as [`ReflectionModel::ALL`].
     pub reflection: [usize; 1 + ReflectionModel::ALL.len()],
     /// As `reflection`, of those with a highlight.
@@ -60,6 +60,16 @@ pub struct ObjectCensus {
 /// 0 for none, or one more than the place among all.
 fn choice<T: PartialEq>(own: Option<T>, all: &[T]) -> usize {
     own.and_then(|own| all.iter().position(|one| *one == own)).map_or(0, |place| place + 1)
+}
+
+/// The place of [`Shading::Auto`] among rates of evaluation.
+const BY_NEED: usize = 1 + Shading::ALL.len();
+
+fn shading_choice(own: Option<Shading>) -> usize {
+    match own {
+        Some(Shading::Auto { .. }) => BY_NEED,
+        own => choice(own, Shading::ALL),
+    }
 }
 
 impl ObjectCensus {
@@ -103,7 +113,7 @@ impl ObjectCensus {
             (&mut self.glowing, traits.glows),
             (&mut self.glowing_behind, traits.back_glows && !traits.glows),
             (&mut self.emissive_lights, traits.lights_others),
-            (&mut self.shading[choice(traits.shading, Shading::ALL)], !traits.unlit),
+            (&mut self.shading[shading_choice(traits.shading)], !traits.unlit),
             (&mut self.reflection[choice(traits.reflection, ReflectionModel::ALL)], !traits.unlit),
             (
                 &mut self.highlights[choice(traits.reflection, ReflectionModel::ALL)],
@@ -121,7 +131,12 @@ impl ObjectCensus {
 
     /// Lit objects shaded at this rate in a scene that sets `scene`.
     pub fn shaded(&self, rate: Shading, scene: Shading) -> usize {
-        self.shading[choice(Some(rate), Shading::ALL)] + usize::from(rate == scene) * self.shading[0]
+        self.shading[shading_choice(Some(rate))] + usize::from(rate == scene) * self.shading[0]
+    }
+
+    /// Lit objects shaded by need, to whatever error, in a scene that sets `scene`.
+    pub fn shaded_by_need(&self, scene: Shading) -> usize {
+        self.shading[BY_NEED] + if let Shading::Auto { .. } = scene { self.shading[0] } else { 0 }
     }
 
     /// Lit objects with a highlight of this model in a scene that sets `scene`.

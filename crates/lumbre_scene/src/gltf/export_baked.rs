@@ -386,7 +386,7 @@ impl Baked<'_> {
             changed.push(("sky", json!(super::export_material::color(settings.sky))));
         }
         if own.as_ref().is_none_or(|own| own.shading != settings.shading) {
-            changed.push(("shading", settings.shading.name().into()));
+            changed.push(("shading", settings.shading.to_string().into()));
         }
         for (field, value) in changed {
             let scene = self.scene();

@@ -259,7 +259,7 @@ impl Nodes {
         }
         let mut choices = Map::new();
         if let Some(shading) = appearance.shading {
-            choices.insert("technique".to_owned(), shading.name().into());
+            choices.insert("technique".to_owned(), shading.to_string().into());
         }
         if let Some(reflection) = appearance.reflection {
             choices.insert("reflection".to_owned(), reflection.name().into());

@@ -56,7 +56,7 @@ pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
         local_viewer: Some(settings.local_viewer),
         two_sided: Some(settings.two_sided),
         reflection: Some(settings.reflection.name().to_owned()),
-        shading: Some(settings.shading.name().to_owned()),
+        shading: Some(settings.shading.to_string()),
         flat_rule: (settings.flat_rule != FlatRule::default()).then(|| settings.flat_rule.name().to_owned()),
         specular_antialiasing: settings.specular_antialiasing.then_some(true),
         fog,

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use lumbre_optics::{FlatRule, Fog, FogMode, ReflectionModel, Shading};
+use lumbre_optics::{FlatRule, Fog, FogMode, NoShading, ReflectionModel, Shading};
 
 use super::document::{Document, extension, shortened};
 use super::error::LoadProblem;
@@ -58,10 +58,14 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     Ok(settings)
 }
 
-/// The shading technique with a name.
+/// The shading technique with a name, or by need with an error behind it: `auto:0.01`.
 pub(crate) fn shading(name: &str, place: &str, field: &str) -> Result<Shading, LoadProblem> {
-    Shading::from_name(name)
-        .ok_or_else(|| unknown(place, field, name, Shading::ALL.iter().map(|technique| technique.name())))
+    name.parse().map_err(|unknown: NoShading| LoadProblem::Value {
+        place: place.to_owned(),
+        field: field.to_owned(),
+        value: format!("{:?}", shortened(name)),
+        expected: unknown.to_string(),
+    })
 }
 
 /// The specular model with a name.
