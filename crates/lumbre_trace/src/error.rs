@@ -5,6 +5,8 @@ use lumbre_mesh::MeshError;
 use lumbre_optics::MaterialError;
 use thiserror::Error;
 
+use crate::checkpoint::CheckpointError;
+
 /// Why a World cannot be traced. Each says what to do about it.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -46,6 +48,14 @@ pub enum TraceError {
         /// What it has to be.
         wanted: &'static str,
     },
+    /// No light, no shining object and no other source has that name.
+    #[error("no light and nothing that shines is called \"{name}\"; there are {known}")]
+    NoSuchSource {
+        /// The name.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// A mesh that is none.
     #[error("the mesh of \"{object}\" cannot be read: {source}")]
     Mesh {
@@ -76,6 +86,9 @@ pub enum TraceError {
         /// How many there are.
         triangles: usize,
     },
+    /// Samples that cannot be gone on from.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// The threads cannot be had.
     #[error("the threads cannot be started: {reason}; ask for fewer with --threads")]
     Threads {

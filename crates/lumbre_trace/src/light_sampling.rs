@@ -37,9 +37,24 @@ struct Emitter {
     area: f64,
 }
 
+/// A point of a lamp as a surface meets it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LampSample {
+    /// Which light of the scene.
+    pub number: usize,
+    /// Its light, along the ray to the point.
+    pub light: LightSample,
+    /// That it was chosen.
+    pub chance: f64,
+    /// Metres; infinite to distant lights.
+    pub distance: f64,
+}
+
 /// A point of an emissive triangle as a surface meets it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EmitterSample {
+    /// Whose triangle it is.
+    pub object: usize,
     /// Radiance towards the surface.
     pub radiance: DVec3,
     /// Unit, to the light.
@@ -99,14 +114,14 @@ impl LightSampler {
         Self { emitters, distribution, densities }
     }
 
-    /// A lamp at a point, with the chance that it was chosen, where on it the ray goes, how far that is, and what does not hide it.
-    pub fn lamp<'s>(
+    /// A lamp at a point, and where on it the ray goes.
+    pub fn lamp(
         &self,
-        scene: &'s Scene,
+        scene: &Scene,
         point: &SurfacePoint,
         choice: f64,
         numbers: DVec2,
-    ) -> Option<(LightSample, f64, f64, &'s [usize])> {
+    ) -> Option<LampSample> {
         let mut weights = smallvec::SmallVec::<[(usize, LightSample, f64); 32]>::new();
         let mut total = 0.0;
         for (number, placed) in scene.lights.iter().enumerate() {
@@ -134,7 +149,7 @@ impl LightSampler {
             (left < 0.0 || place == last).then_some(found)
         })?;
         let placed = &scene.lights[number];
-        let (sample, distance) = match placed.light.kind {
+        let (light, distance) = match placed.light.kind {
             LightKind::Point => {
                 let distance = placed.position.distance(point.position);
                 on_sphere_lamp(sample, f64::from(placed.light.radius), distance, numbers)
@@ -144,7 +159,7 @@ impl LightSampler {
                 (on_disc_of_sky(sample, half, numbers), f64::INFINITY)
             }
         };
-        Some((sample, weight / total, distance, &placed.bulbs))
+        Some(LampSample { number, light, chance: weight / total, distance })
     }
 
     /// A point of the emissive triangles as a point of a surface meets it; nothing where it is the back of one, or there are none.
@@ -175,6 +190,7 @@ impl LightSampler {
         let chance = self.distribution[place] - before;
         let density = chance / emitter.area * distance * distance / cosine.abs();
         (radiance != DVec3::ZERO && density.is_finite() && density > 0.0).then_some(EmitterSample {
+            object: emitter.object,
             radiance,
             direction,
             distance,

@@ -126,6 +126,11 @@ impl Geometry {
         (object as usize, number)
     }
 
+    /// What there is beside triangles, as it says of itself.
+    pub fn exact_surfaces(&self) -> &impl std::fmt::Debug {
+        &self.quadrics
+    }
+
     /// How many triangles there are.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()

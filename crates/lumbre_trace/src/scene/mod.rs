@@ -11,6 +11,7 @@ use lumbre_optics::{AlphaMode, ReflectionModel};
 use lumbre_scene::SceneSettings;
 
 use crate::TraceError;
+use crate::fingerprint::{Fingerprint, of_debug};
 use crate::geometry::{Crossing, Geometry, Place};
 
 pub(crate) use collect::PlacedLight;
@@ -95,6 +96,16 @@ impl Scene {
     /// Whether a surface stands in the light's way there, wholly or in part: both sides do.
     pub fn blocks(&self, crossing: &Crossing) -> bool {
         !self.is_hole(&self.objects[crossing.object], crossing)
+    }
+
+    /// A hash of all that rays can tell of it.
+    pub fn fingerprint(&self) -> Fingerprint {
+        of_debug(&(&self.settings, self.origin, &self.objects, &self.lights, self.geometry.exact_surfaces()))
+    }
+
+    /// Whether some objects are lit by lightmaps or irradiance volumes.
+    pub fn has_baked_light(&self) -> bool {
+        self.objects.iter().any(|object| object.lightmap.is_some() || object.volume.is_some())
     }
 
     fn is_hole(&self, object: &Object, crossing: &Crossing) -> bool {
