@@ -14,6 +14,7 @@
 //!
 //! A pass of a pixel depends on the pixel and the pass alone, so that the passes of every pixel and the rounds are all the state there is.
 
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use glam::DVec3;
@@ -43,9 +44,9 @@ pub type Keep<'a> = dyn Fn(&[u8]) + Sync + 'a;
 pub struct Continuation<'a> {
     /// What an earlier run of the same picture has kept.
     pub from: Option<&'a [u8]>,
-    /// Is given what the picture has: whenever `interval` is over, and where the picture ended before it was complete.
+    /// Is given what the picture has: whenever `interval` is over, and where the picture was interrupted.
     pub keep: Option<&'a Keep<'a>>,
-    /// Is given it where the picture is complete, too, so that a later run can go on with more samples.
+    /// Is given it where the picture ended as it was asked to, too, so that a later run can go on with more samples.
     pub keep_complete: bool,
     /// Time between two.
     pub interval: Duration,
@@ -74,16 +75,27 @@ pub enum CheckpointError {
     Options,
 }
 
-/// Gives away what a picture has.
+/// Gives away what a picture has, and takes it back.
 pub(crate) struct Keeper<'a> {
     view: &'a View,
     aovs: &'a LightAovs,
     continuation: Continuation<'a>,
+    /// Found when it is first needed: a scene with large textures takes a while.
+    identity: OnceLock<[Fingerprint; 3]>,
 }
 
 impl<'a> Keeper<'a> {
     pub fn new(view: &'a View, aovs: &'a LightAovs, continuation: &Continuation<'a>) -> Self {
-        Self { view, aovs, continuation: *continuation }
+        Self { view, aovs, continuation: *continuation, identity: OnceLock::new() }
+    }
+
+    /// What an earlier run has kept.
+    ///
+    /// # Errors
+    /// [`CheckpointError`].
+    pub fn kept(&self) -> Result<Option<PathState>, CheckpointError> {
+        let from = self.continuation.from;
+        from.map(|bytes| from_bytes(bytes, self.view, self.aovs, self.identity())).transpose()
     }
 
     /// Time between two.
@@ -93,15 +105,18 @@ impl<'a> Keeper<'a> {
 
     pub fn keep(&self, state: &PathState) {
         if let Some(keep) = self.continuation.keep {
-            keep(&bytes(state, &identity(self.view, self.aovs)));
+            keep(&bytes(state, self.identity()));
         }
     }
 
     pub fn keep_at_end(&self, state: &PathState, ended: Ended) {
-        let complete = matches!(ended, Ended::Complete | Ended::Error);
-        if self.continuation.keep_complete || !complete {
+        if self.continuation.keep_complete || ended == Ended::Interrupted {
             self.keep(state);
         }
+    }
+
+    fn identity(&self) -> &[Fingerprint; 3] {
+        self.identity.get_or_init(|| identity(self.view, self.aovs))
     }
 }
 
@@ -148,7 +163,12 @@ fn bytes(state: &PathState, identity: &[Fingerprint; 3]) -> Vec<u8> {
 }
 
 /// What was kept, if it is of this picture.
-pub(crate) fn from_bytes(file: &[u8], view: &View, aovs: &LightAovs) -> Result<PathState, CheckpointError> {
+fn from_bytes(
+    file: &[u8],
+    view: &View,
+    aovs: &LightAovs,
+    [program, scene, options]: &[Fingerprint; 3],
+) -> Result<PathState, CheckpointError> {
     let mut left = Left(file);
     let magic = left.take(8).ok_or(CheckpointError::NotSamples)?;
     if magic != MAGIC {
@@ -157,7 +177,6 @@ pub(crate) fn from_bytes(file: &[u8], view: &View, aovs: &LightAovs) -> Result<P
     let version = left.number32().ok_or(CheckpointError::Damaged)?;
     let parts = [(); 3].map(|()| left.take(32));
     let checksum = left.take(32).ok_or(CheckpointError::Damaged)?;
-    let [program, scene, options] = identity(view, aovs);
     if version != VERSION || parts[0] != Some(&program[..]) {
         return Err(CheckpointError::Version);
     }

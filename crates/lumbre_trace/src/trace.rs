@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use crate::TraceError;
 use crate::aov::{Aov, AovPicture, AovValues};
 use crate::branch::{Branch, Kind};
-use crate::checkpoint::{Continuation, Keeper, from_bytes};
+use crate::checkpoint::{Continuation, Keeper};
 use crate::direct_light::Lighting;
 use crate::film::Film;
 use crate::first_hit::{FirstHit, FirstHits};
@@ -69,14 +69,15 @@ impl Tracer {
         listener: &Listener<'_>,
     ) -> Result<(Picture, TraceReport), TraceError> {
         let view = &self.view;
-        let paths = view.options.integrator == Integrator::Path;
-        let kept = continuation.from.filter(|_| paths);
-        let from = kept.map(|bytes| from_bytes(bytes, view, &self.light)).transpose()?;
+        let keeper = Keeper::new(view, &self.light, continuation);
+        let from = match view.options.integrator {
+            Integrator::Whitted => None,
+            Integrator::Path => keeper.kept()?,
+        };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(view.options.threads.unwrap_or(0));
         let pool = pool.stack_size(STACK);
         let pool = pool.build().map_err(|error| TraceError::Threads { reason: error.to_string() })?;
         let started = Instant::now();
-        let keeper = Keeper::new(view, &self.light, continuation);
         let rendering = Rendering::new(view, &self.light, listener);
         let (film, ended) = match view.options.integrator {
             Integrator::Whitted => pool.install(|| rendering.ray_trees()),
@@ -122,7 +123,10 @@ impl Tracer {
         let asked = &self.view.options.aovs;
         let first_hits = asked.iter().any(Aov::is_first_hit).then(|| FirstHits::of(&self.view));
         let mut pictures = Vec::new();
-        for aov in asked {
+        for (number, aov) in asked.iter().enumerate() {
+            if asked[..number].contains(aov) {
+                continue;
+            }
             let values = match (aov, &first_hits) {
                 (Aov::Albedo, Some(found)) => AovValues::Colors(found.albedo.clone()),
                 (Aov::Normal, Some(found)) => AovValues::Directions(found.normals.clone()),
