@@ -206,7 +206,7 @@ impl DirectLight {
 }
 
 /// Metres to a light; infinite to distant ones.
-fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
+pub(crate) fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
     match placed.light.kind {
         LightKind::Point => placed.position.distance(point.position),
         LightKind::Directional | LightKind::Ambient => f64::INFINITY,

@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::coplanar::nearest_surface;
 use crate::geometry::Crossing;
 use crate::surface_point::SurfacePoint;
 use crate::tiles::for_every_pixel;
@@ -89,6 +90,6 @@ impl FirstHits {
 fn first_point(view: &View, place: DVec2) -> Option<SurfacePoint> {
     let (camera, scene) = (view.camera.through(place), &view.scene);
     let seen = |crossing: &Crossing| scene.is_seen(crossing);
-    let meeting = scene.geometry.closest(&camera.ray, camera.farthest, seen)?;
+    let meeting = nearest_surface(scene, &camera.ray, camera.farthest, seen)?;
     Some(SurfacePoint::new(scene, &camera.ray, &meeting))
 }

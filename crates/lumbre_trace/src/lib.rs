@@ -43,6 +43,7 @@ mod branch_drawing;
 mod camera_ray;
 mod checkpoint;
 mod comparison;
+mod coplanar;
 mod direct_light;
 mod display;
 mod error;
@@ -64,6 +65,7 @@ mod metering;
 mod options;
 mod path;
 mod random;
+mod ray_rates;
 mod ray_tree;
 mod rendering;
 mod sample_distribution;
@@ -89,5 +91,6 @@ pub use options::{
     Cut, DEFAULT_DEPTH, DEFAULT_PATHS, DEFAULT_WEIGHT, Ended, Integrator, MAXIMUM_DEPTH, MAXIMUM_SAMPLES,
     Picture, Progress, TraceOptions, TraceReport,
 };
+pub use ray_rates::{RayRate, RayRates};
 pub use rendering::Listener;
 pub use trace::{Tracer, trace};

@@ -9,6 +9,7 @@ use glam::DVec3;
 use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::camera_ray::{CameraRay, CameraRays};
+use crate::coplanar::nearest_surface;
 use crate::direct_light::shadow_ray;
 use crate::film::Sample;
 use crate::geometry::{Place, SpaceRay};
@@ -109,7 +110,7 @@ impl<'a> Paths<'a> {
         walk.rays += 1;
         let looks = walk.last.is_none();
         // What looks sees through the backs of what has none; light stops there.
-        let found = scene.geometry.closest(&walk.ray, walk.farthest, |crossing| {
+        let found = nearest_surface(scene, &walk.ray, walk.farthest, |crossing| {
             if looks { scene.is_seen(crossing) } else { scene.blocks(crossing) }
         });
         let Some(meeting) = found else {

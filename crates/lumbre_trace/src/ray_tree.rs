@@ -6,6 +6,7 @@ use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::branch::{Branch, Kind};
 use crate::camera_ray::CameraRays;
+use crate::coplanar::nearest_surface;
 use crate::direct_light::{DirectLight, Lighting, direct_light};
 use crate::geometry::SpaceRay;
 use crate::interface::Division;
@@ -105,7 +106,7 @@ impl RayTree<'_> {
         *left = left.saturating_sub(1);
         let own_terms = seen.terms.len();
         let scene = self.scene;
-        let found = scene.geometry.closest(&twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
+        let found = nearest_surface(scene, &twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
         let Some(meeting) = found else {
             // Nothing absorbs on the way to infinity but what has no end, and that leaves nothing.
             let background = scene.settings.shown_background().as_dvec3();

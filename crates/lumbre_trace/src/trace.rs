@@ -16,6 +16,7 @@ use crate::first_hit::{FirstHit, FirstHits};
 use crate::light_aovs::LightAovs;
 use crate::light_terms::LightTerms;
 use crate::options::{Ended, Integrator, Picture, TraceOptions, TraceReport};
+use crate::ray_rates::RayRates;
 use crate::rendering::{Listener, Rendering};
 use crate::view::View;
 
@@ -111,6 +112,11 @@ impl Tracer {
     /// The surface that is seen through a place of the picture; nothing where the background is.
     pub fn first_hit(&self, place: DVec2) -> Option<FirstHit> {
         FirstHit::through(&self.view, place)
+    }
+
+    /// How fast the picture's rays are found beside the bare hierarchy of triangles, on this thread, in so many rounds.
+    pub fn ray_rates(&self, rounds: usize) -> RayRates {
+        RayRates::of(&self.view, rounds)
     }
 
     /// What was left out of the World, and why.

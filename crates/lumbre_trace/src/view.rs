@@ -72,6 +72,11 @@ impl View {
         (numbers, pixel_middle(x, y) + offset, sign)
     }
 
+    /// The media that the eye is in.
+    pub fn media(&self) -> &MediumStack {
+        &self.media
+    }
+
     /// Rays of a pinhole start in one place; parallel ones do not.
     pub fn media_of(&self, ray: &SpaceRay) -> MediumStack {
         if self.scene.solids && self.camera.is_parallel() {

@@ -11,11 +11,18 @@ use super::ray::SpaceRay;
 #[derive(Debug)]
 pub(crate) struct Geometry {
     bvh: Bvh,
-    /// Of every triangle: its object, its number there.
-    triangles: Vec<(u32, u32)>,
-    /// Of every triangle, to its front; of any length.
-    fronts: Vec<Vec3>,
+    triangles: Vec<Facet>,
     quadrics: Vec<PlacedQuadric>,
+}
+
+/// What there is to know of a triangle that a ray meets, together in memory.
+#[derive(Debug)]
+struct Facet {
+    object: u32,
+    /// In its object.
+    number: u32,
+    /// To its front, unit.
+    front: Vec3,
 }
 
 #[derive(Debug)]
@@ -79,8 +86,14 @@ impl Geometry {
         };
         Self {
             bvh: Bvh::build(&corners),
-            fronts: corners.iter().map(front).collect(),
-            triangles: triangles.into_iter().map(|(_, owner)| owner).collect(),
+            triangles: triangles
+                .iter()
+                .map(|(corners, (object, number))| Facet {
+                    object: *object,
+                    number: *number,
+                    front: front(corners),
+                })
+                .collect(),
             quadrics: quadrics.iter().map(placed).collect(),
         }
     }
@@ -122,13 +135,18 @@ impl Geometry {
 
     /// The object and the number there of a triangle of the scene.
     pub fn owner(&self, triangle: u32) -> (usize, u32) {
-        let (object, number) = self.triangles[triangle as usize];
-        (object as usize, number)
+        let facet = &self.triangles[triangle as usize];
+        (facet.object as usize, facet.number)
     }
 
     /// What there is beside triangles, as it says of itself.
     pub fn exact_surfaces(&self) -> &impl std::fmt::Debug {
         &self.quadrics
+    }
+
+    /// The triangles alone.
+    pub fn hierarchy(&self) -> &Bvh {
+        &self.bvh
     }
 
     /// How many triangles there are.
@@ -138,11 +156,11 @@ impl Geometry {
 
     #[inline]
     fn crossing(&self, direction: Vec3, triangle: u32, u: f32, v: f32) -> Crossing {
-        let (object, number) = self.triangles[triangle as usize];
+        let facet = &self.triangles[triangle as usize];
         Crossing {
-            object: object as usize,
-            front: direction.dot(self.fronts[triangle as usize]) < 0.0,
-            place: Place::Triangle { triangle: number, weights: [f64::from(u), f64::from(v)] },
+            object: facet.object as usize,
+            front: direction.dot(facet.front) < 0.0,
+            place: Place::Triangle { triangle: facet.number, weights: [f64::from(u), f64::from(v)] },
         }
     }
 }

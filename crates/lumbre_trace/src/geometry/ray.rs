@@ -53,6 +53,12 @@ impl SpaceRay {
         Ray { origin: self.start_off_triangles(), direction, t_min: 0.0, t_max: farthest as f32 }
     }
 
+    /// Metres that its start is off the surface at most where it meets triangles.
+    pub fn set_off(&self) -> f64 {
+        let size = |departure: Departure| departure.extent.max(self.origin.abs().max_element());
+        self.departure.map_or(0.0, |departure| ROUNDING * size(departure))
+    }
+
     /// The same up to a point at a distance, or short of it by the rounding of its coordinates: what lies in that point's own surface is not
     /// between. Seen from where the ray is set off to, the point lies in a slightly other direction.
     pub fn between_triangles(&self, distance: f64) -> Ray {
