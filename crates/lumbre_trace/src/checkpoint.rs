@@ -18,8 +18,8 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use glam::DVec3;
-use thiserror::Error;
 
+use crate::error::CheckpointError;
 use crate::film::{Film, FilmPixel};
 use crate::fingerprint::{Fingerprint, of_debug};
 use crate::light_aovs::LightAovs;
@@ -50,29 +50,6 @@ pub struct Continuation<'a> {
     pub keep_complete: bool,
     /// Time between two.
     pub interval: Duration,
-}
-
-/// Why samples that were kept cannot be gone on from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum CheckpointError {
-    /// Something else.
-    #[error("these are no samples of a traced picture")]
-    NotSamples,
-    /// Of another version of the program, which may take others.
-    #[error("these samples are of another version of the program")]
-    Version,
-    /// Cut short, or changed.
-    #[error("these samples are damaged")]
-    Damaged,
-    /// Of another scene.
-    #[error("the scene has changed since these samples were taken")]
-    Scene,
-    /// Of another picture of the scene.
-    #[error(
-        "these samples are of another picture of the scene: size, camera, depth, shadows, filter, adaptive sampling and auxiliary pictures have to be the same"
-    )]
-    Options,
 }
 
 /// Gives away what a picture has, and takes it back.

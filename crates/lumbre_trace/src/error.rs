@@ -5,8 +5,6 @@ use lumbre_mesh::MeshError;
 use lumbre_optics::MaterialError;
 use thiserror::Error;
 
-use crate::checkpoint::CheckpointError;
-
 /// Why a World cannot be traced. Each says what to do about it.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -95,4 +93,27 @@ pub enum TraceError {
         /// What the system says.
         reason: String,
     },
+}
+
+/// Why samples that were kept cannot be gone on from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// Something else.
+    #[error("these are no samples of a traced picture")]
+    NotSamples,
+    /// Of another version of the program, which may take others.
+    #[error("these samples are of another version of the program")]
+    Version,
+    /// Cut short, or changed.
+    #[error("these samples are damaged")]
+    Damaged,
+    /// Of another scene.
+    #[error("the scene has changed since these samples were taken")]
+    Scene,
+    /// Of another picture of the scene.
+    #[error(
+        "these samples are of another picture of the scene: size, camera, depth, shadows, filter, adaptive sampling and auxiliary pictures have to be the same"
+    )]
+    Options,
 }

@@ -81,6 +81,7 @@ impl MediumStack {
     }
 
     /// What is left of the light after so many metres here.
+    #[inline]
     pub fn transmittance(&self, distance: f64) -> DVec3 {
         match self.0.last() {
             // What does not absorb lets through all of it, from infinity too.

@@ -32,6 +32,10 @@ pub(crate) fn transmittance(
     media: &MediumStack,
     (glass, bulbs): (Glass, &[usize]),
 ) -> (DVec3, u32) {
+    if bulbs.is_empty() && !scene.see_through && !scene.holes {
+        let hidden = scene.geometry.anything_between(ray, distance);
+        return (if hidden { DVec3::ZERO } else { media.transmittance(distance) }, 1);
+    }
     let open = |object: usize| scene.see_through && scene.is_open(object, glass == Glass::LetsThrough);
     // A ray that nothing hides has seen all that lies on its way.
     let through = Cell::new(false);

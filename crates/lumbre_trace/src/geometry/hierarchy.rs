@@ -1,7 +1,7 @@
 //! All surfaces of a scene, and the questions that rays ask of them: what is met first, and whether anything is. Not what happens there.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use lumbre_rays::Bvh;
+use lumbre_rays::{Bvh, Ray};
 use lumbre_scene::Quadric;
 
 use super::quadric::{QuadricHit, QuadricSurface};
@@ -106,8 +106,15 @@ impl Geometry {
         accept: impl Fn(&Crossing) -> bool,
     ) -> Option<Meeting> {
         let short = ray.for_triangles(farthest);
-        let found = self.bvh.closest_hit_filtered(&short, |triangle, u, v| {
-            accept(&self.crossing(short.direction, triangle, u, v))
+        let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
+        // The nearest of all is nearly always accepted: only then the others are asked too.
+        let found = self.bvh.closest_hit(&short).and_then(|hit| {
+            let (u, v) = hit.barycentric;
+            if accepted(hit.triangle, u, v) {
+                Some(hit)
+            } else {
+                self.bvh.closest_hit_filtered(&short, accepted)
+            }
         });
         let mut nearest = found.map(|hit| Meeting {
             crossing: self.crossing(short.direction, hit.triangle, hit.barycentric.0, hit.barycentric.1),
@@ -125,12 +132,19 @@ impl Geometry {
 
     /// Whether a surface for which `accept` holds lies between the ray's start and the point at a distance, which may be infinite.
     pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
-        let finite = distance.is_finite();
-        let short = if finite { ray.between_triangles(distance) } else { ray.for_triangles(distance) };
-        let farthest = if finite { distance * EXACTLY_SHORT } else { distance };
-        self.bvh.any_hit_filtered(&short, |triangle, u, v| {
-            accept(&self.crossing(short.direction, triangle, u, v))
-        }) || self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, &accept).is_some())
+        let short = short_of_end(ray, distance);
+        let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
+        self.bvh.any_hit_filtered(&short, accepted) || self.any_exact_between(ray, distance, &accept)
+    }
+
+    /// The same where every surface counts.
+    pub fn anything_between(&self, ray: &SpaceRay, distance: f64) -> bool {
+        self.bvh.any_hit(&short_of_end(ray, distance)) || self.any_exact_between(ray, distance, &|_| true)
+    }
+
+    fn any_exact_between(&self, ray: &SpaceRay, distance: f64, accept: &impl Fn(&Crossing) -> bool) -> bool {
+        let farthest = if distance.is_finite() { distance * EXACTLY_SHORT } else { distance };
+        self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, accept).is_some())
     }
 
     /// The object and the number there of a triangle of the scene.
@@ -163,6 +177,11 @@ impl Geometry {
             place: Place::Triangle { triangle: facet.number, weights: [f64::from(u), f64::from(v)] },
         }
     }
+}
+
+/// Not as far as the surface that a ray's end lies on.
+fn short_of_end(ray: &SpaceRay, distance: f64) -> Ray {
+    if distance.is_finite() { ray.between_triangles(distance) } else { ray.for_triangles(distance) }
 }
 
 impl PlacedQuadric {

@@ -34,6 +34,8 @@ pub(crate) struct Scene {
     passable: Vec<Passable>,
     /// Some objects let light past in part.
     pub see_through: bool,
+    /// Some objects have holes by their texture.
+    pub holes: bool,
     /// Some objects have an inside that light is refracted into.
     pub solids: bool,
     /// What was left out, and why.
@@ -88,6 +90,7 @@ impl Scene {
         let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
             see_through: passable.iter().any(is_open),
+            holes: passable.iter().any(|found| found.passage == Passage::Cut),
             solids: passable.iter().any(|found| found.solid),
             passable,
             geometry: Geometry::build(triangles, &quadrics),
