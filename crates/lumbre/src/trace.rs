@@ -9,13 +9,14 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use glam::DVec2;
 use lumbre::bake::Progress;
+use lumbre::demo::has_light_to_bake;
 use lumbre::render::Display;
 use lumbre::trace::{
     Continuation, Ended, Integrator, Metering, Picture, TraceError, TraceOptions, TraceReport, Tracer,
     draw_tree,
 };
 
-use crate::arguments::{Exposure, Trace};
+use crate::arguments::{Exposure, Frame, Trace};
 use crate::interruption::Interruption;
 use crate::kept_samples::KeptSamples;
 use crate::loading::{extension, frame_options, load};
@@ -45,7 +46,10 @@ pub fn run(asked: &Trace) -> anyhow::Result<()> {
     }
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
     let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
-    let frame = frame_options(&mut loaded.world, &asked.frame, display, aspect, &asked.input)?;
+    // Paths find the light of what shines, and of the sky, themselves.
+    let lit = asked.integrator == Integrator::Path && has_light_to_bake(&mut loaded.world);
+    let lighting = Frame { no_default_light: asked.frame.no_default_light || lit, ..asked.frame.clone() };
+    let frame = frame_options(&mut loaded.world, &lighting, display, aspect, &asked.input)?;
     let options = options(asked, &frame);
     let tracer = Tracer::new(&mut loaded.world, &options)
         .with_context(|| format!("{} cannot be traced", asked.input.display()))?;
