@@ -59,6 +59,7 @@ mod interface;
 mod light_aovs;
 mod light_sampling;
 mod light_terms;
+mod light_tree;
 mod lobe_sampling;
 mod medium;
 mod metering;

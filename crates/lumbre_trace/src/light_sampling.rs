@@ -1,8 +1,5 @@
-//! Which light a path asks at a point, and where on it: one lamp by what each would send if nothing stood between, and one point of the emissive
-//! triangles by their power. Not whether it is seen.
-//!
-//! Lamps are weighed one by one at every point, so that a point costs as many evaluations as there are lamps; the baker's light tree, which
-//! would find one among thousands sooner, stands above this crate.
+//! Which light a path asks at a point, and where on it: one lamp by what it would send if nothing stood between, and one point of the emissive
+//! triangles by their power. Not whether it is seen. Where there are many lamps a tree says which few of them are weighed one by one.
 
 use std::f64::consts::PI;
 
@@ -10,6 +7,7 @@ use glam::{DVec2, DVec3};
 use lumbre_optics::{LightKind, LightSample, evaluate_light};
 use lumbre_scene::EmissiveLight;
 
+use crate::light_tree::LightTree;
 use crate::lobe_sampling::within_cone;
 use crate::metering::luminance;
 use crate::scene::{Object, Passage, Scene, sample_color};
@@ -21,6 +19,10 @@ pub(crate) struct LightSampler {
     emitters: Vec<Emitter>,
     /// Distribution of the emitters, ending with 1.
     distribution: Vec<f64>,
+    /// Numbers of the lamps, where they are few.
+    lamps: Vec<usize>,
+    /// Where they are many.
+    tree: Option<LightTree>,
     /// Chance per square metre of every triangle of the scene, by its number; empty without emitters.
     densities: Vec<f64>,
 }
@@ -64,6 +66,8 @@ pub(crate) struct EmitterSample {
     pub density: f64,
 }
 
+/// So many lamps are weighed one by one at every point.
+const FEW_LAMPS: usize = 16;
 /// A texture that is dark in the middle of a triangle may be bright at its corners: a triangle's chance never falls below this part of it.
 const LEAST_TINT: f64 = 0.1;
 /// Lamps with a size reach beyond the horizon of their middle.
@@ -111,7 +115,9 @@ impl LightSampler {
                 densities[*triangle as usize] = power / total / emitter.area;
             }
         }
-        Self { emitters, distribution, densities }
+        let lamps = (0..scene.lights.len()).collect();
+        let tree = (scene.lights.len() > FEW_LAMPS).then(|| LightTree::new(scene));
+        Self { emitters, distribution, lamps, tree, densities }
     }
 
     /// A lamp at a point, and where on it the ray goes.
@@ -122,9 +128,14 @@ impl LightSampler {
         choice: f64,
         numbers: DVec2,
     ) -> Option<LampSample> {
+        let (asked, of_asked, choice) = match &self.tree {
+            Some(tree) => tree.few(scene, point.position, point.normal, choice)?,
+            None => (&self.lamps[..], 1.0, choice),
+        };
         let mut weights = smallvec::SmallVec::<[(usize, LightSample, f64); 32]>::new();
         let mut total = 0.0;
-        for (number, placed) in scene.lights.iter().enumerate() {
+        for &number in asked {
+            let placed = &scene.lights[number];
             let light = &placed.light;
             if light.kind == LightKind::Ambient {
                 continue;
@@ -159,7 +170,7 @@ impl LightSampler {
                 (on_disc_of_sky(sample, half, numbers), f64::INFINITY)
             }
         };
-        Some(LampSample { number, light, chance: weight / total, distance })
+        Some(LampSample { number, light, chance: of_asked * weight / total, distance })
     }
 
     /// A point of the emissive triangles as a point of a surface meets it; nothing where it is the back of one, or there are none.
