@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{FlatRule, NoShading, ReflectionModel, Shading};
 use lumbre::render::Display;
 use lumbre::scene::PackedFormat;
-use lumbre::trace::{DEFAULT_WEIGHT, Filter, Integrator, TreeFormat};
+use lumbre::trace::{Aov, DEFAULT_WEIGHT, Filter, Integrator, TreeFormat};
 
 /// Lighting for games that tells you what it costs.
 #[derive(Debug, Parser)]
@@ -73,6 +73,8 @@ Examples:
 Examples:
   lumbre trace room.glb -o room.png --depth 8
   lumbre trace room.glb -o room.exr --integrator path --error 0.01
+  lumbre trace room.glb -o room.exr --aov albedo,normal,depth,light:*
+  lumbre trace room.glb -o room.exr --integrator path --error 0.001 --resume
   lumbre trace room.glb --pixel 640,360 --tree text
   lumbre trace room.glb --pixel 640,360 --tree svg > rays.svg")]
     Trace(Trace),
@@ -367,6 +369,16 @@ pub struct Trace {
     /// Takes a quarter of the samples where neighbouring pixels differ by less than this as shown, 0 to 1.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub adaptive: Option<f64>,
+    /// Gives pixels paths in proportion to their noise, and as many as --samples in the mean.
+    #[arg(long)]
+    pub sample_by_noise: bool,
+    /// Auxiliary pictures, as layers of an .exr, or as files of their own beside a .png: albedo, normal, depth, rays, direct, indirect,
+    /// light:NAME, direct:NAME, indirect:NAME for what one source sends; * in place of NAME for every source.
+    #[arg(long, value_name = "NAME[,NAME…]", value_delimiter = ',', value_parser = aov, conflicts_with = "pixel")]
+    pub aov: Vec<Aov>,
+    /// Goes on with the paths that an earlier run has kept in OUT.samples, if it is there, and keeps them there at the end.
+    #[arg(long, conflicts_with = "pixel")]
+    pub resume: bool,
     /// Worker threads; as many as there are cores without this.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     pub threads: Option<u16>,
@@ -670,6 +682,13 @@ fn reflection(text: &str) -> Result<ReflectionModel, String> {
 
 fn integrator(text: &str) -> Result<Integrator, String> {
     named(Integrator::from_name(text), Integrator::ALL.iter().map(|choice| choice.name()))
+}
+
+fn aov(text: &str) -> Result<Aov, String> {
+    Aov::from_name(text).ok_or_else(|| {
+        "there are albedo, normal, depth, rays, direct, indirect, light:NAME, direct:NAME, indirect:NAME"
+            .to_owned()
+    })
 }
 
 fn filter(text: &str) -> Result<Filter, String> {

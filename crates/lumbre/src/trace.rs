@@ -4,25 +4,31 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Mutex;
+use std::time::Duration;
 
 use anyhow::{Context, bail};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use lumbre::bake::Progress;
+use lumbre::demo::has_light_to_bake;
 use lumbre::render::Display;
 use lumbre::trace::{
-    Ended, Integrator, Metering, Picture, TraceOptions, TraceReport, Tracer, draw_tree, shown,
+    Continuation, Ended, Integrator, Metering, Picture, TraceError, TraceOptions, TraceReport, Tracer,
+    draw_tree,
 };
 
-use crate::arguments::{Exposure, Trace};
+use crate::arguments::{Exposure, Frame, Trace};
 use crate::interruption::Interruption;
+use crate::kept_samples::KeptSamples;
 use crate::loading::{extension, frame_options, load};
-use crate::output::write_file;
+use crate::picture_files::{Development, write_open_exr, write_png};
 use crate::progress::Shown;
 
 /// Share of a picture that has to be white for want of an exposure before one is metered unasked: as of a frame.
 const CLIPPED: f64 = 0.02;
 /// Samples of the ray tree with `--msaa`: as many as a frame then has.
 const MULTISAMPLES: u32 = 4;
+/// Time between two writes of the samples that a picture has: what a crash costs.
+const KEPT_EVERY: Duration = Duration::from_secs(60);
 
 /// Runs the command.
 pub fn run(asked: &Trace) -> anyhow::Result<()> {
@@ -40,7 +46,10 @@ pub fn run(asked: &Trace) -> anyhow::Result<()> {
     }
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
     let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
-    let frame = frame_options(&mut loaded.world, &asked.frame, display, aspect, &asked.input)?;
+    // Paths find the light of what shines, and of the sky, themselves.
+    let lit = asked.integrator == Integrator::Path && has_light_to_bake(&mut loaded.world);
+    let lighting = Frame { no_default_light: asked.frame.no_default_light || lit, ..asked.frame.clone() };
+    let frame = frame_options(&mut loaded.world, &lighting, display, aspect, &asked.input)?;
     let options = options(asked, &frame);
     let tracer = Tracer::new(&mut loaded.world, &options)
         .with_context(|| format!("{} cannot be traced", asked.input.display()))?;
@@ -51,10 +60,11 @@ pub fn run(asked: &Trace) -> anyhow::Result<()> {
         return print_tree(asked, &tracer, (x, y));
     }
     let Some(output) = &asked.output else { bail!("say with -o where the picture goes") };
-    let (picture, report) = traced(asked, &tracer)?;
+    let kept = KeptSamples::beside(output);
+    let (picture, report) = traced(asked, &tracer, &kept)?;
     let photometric = loaded.report.photometric_lights > 0 && !loaded.report.states_exposure;
     let exposure = exposure(asked, &picture, photometric && display == Display::Srgb);
-    write_picture(output, &picture, display, exposure, floats)?;
+    write_picture(output, &picture, Development { display, exposure }, floats)?;
     let black = picture.radiance.iter().all(|pixel| pixel.max_element() <= 0.0);
     if black && loaded.report.triangles > 0 && report.finished == 1.0 {
         eprintln!(
@@ -64,9 +74,15 @@ pub fn run(asked: &Trace) -> anyhow::Result<()> {
     }
     print_report(asked, &report)?;
     if report.ended == Ended::Interrupted {
-        bail!("interrupted; {} holds {:.0} % of the picture", output.display(), 100.0 * report.finished);
+        let goes_on =
+            if kept.are_kept() { "; the same command with --resume goes on from there" } else { "" };
+        bail!(
+            "interrupted; {} holds {:.0} % of the picture{goes_on}",
+            output.display(),
+            100.0 * report.finished
+        );
     }
-    Ok(())
+    if asked.resume { Ok(()) } else { kept.remove() }
 }
 
 fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions {
@@ -88,6 +104,8 @@ fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions 
         threads: asked.threads.map(usize::from),
         filter: asked.filter,
         adaptive: asked.adaptive,
+        sample_by_noise: asked.sample_by_noise,
+        aovs: asked.aov.clone(),
     }
 }
 
@@ -106,8 +124,13 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
         (trees && asked.error.is_some(), "--error is for --integrator path: the ray tree has no noise"),
         (
             !trees && asked.adaptive.is_some(),
-            "--adaptive is for the ray tree: paths sample every pixel alike",
+            "--adaptive is for the ray tree: --sample-by-noise is what paths have",
         ),
+        (
+            trees && asked.sample_by_noise,
+            "--sample-by-noise is for --integrator path: --adaptive is what the ray tree has",
+        ),
+        (trees && asked.resume, "--resume is for --integrator path: ray trees begin anew"),
         (
             !trees && asked.frame.no_lightmaps,
             "--no-lightmaps is for the ray tree: paths never read lightmaps, they find that light themselves",
@@ -139,7 +162,22 @@ fn print_tree(asked: &Trace, tracer: &Tracer, (x, y): (u32, u32)) -> anyhow::Res
     Ok(())
 }
 
-fn traced(asked: &Trace, tracer: &Tracer) -> anyhow::Result<(Picture, TraceReport)> {
+/// The picture, from the samples of an earlier run if that is asked for.
+fn traced(asked: &Trace, tracer: &Tracer, samples: &KeptSamples) -> anyhow::Result<(Picture, TraceReport)> {
+    let from = if asked.resume { samples.read()? } else { None };
+    if !asked.resume && asked.integrator == Integrator::Path && samples.path.exists() {
+        eprintln!(
+            "lumbre: note: {}: the samples of an earlier picture are not used (--resume would go on with them)",
+            samples.path.display()
+        );
+    }
+    let keep = |bytes: &[u8]| samples.write(bytes);
+    let continuation = Continuation {
+        from: from.as_deref(),
+        keep: Some(&keep),
+        keep_complete: asked.resume,
+        interval: KEPT_EVERY,
+    };
     let stage = match asked.integrator {
         Integrator::Whitted => "ray trees",
         Integrator::Path => "paths",
@@ -147,7 +185,7 @@ fn traced(asked: &Trace, tracer: &Tracer) -> anyhow::Result<(Picture, TraceRepor
     let interruption = Interruption::handle();
     let shown = Mutex::new(Shown::of("picture", asked.quiet));
     let found = interruption.told(|is_asked| {
-        tracer.picture(&|progress| {
+        tracer.continued(&continuation, &|progress| {
             if let Ok(mut shown) = shown.lock() {
                 let fraction = progress.fraction as f32;
                 let error = progress.error;
@@ -159,7 +197,13 @@ fn traced(asked: &Trace, tracer: &Tracer) -> anyhow::Result<(Picture, TraceRepor
     if let Ok(shown) = shown.lock() {
         shown.finish();
     }
-    Ok(found?)
+    found.map_err(|error| match error {
+        TraceError::Checkpoint(_) => anyhow::Error::new(error).context(format!(
+            "{} cannot be gone on with; remove it, or leave out --resume",
+            samples.path.display()
+        )),
+        error => error.into(),
+    })
 }
 
 /// The factor on radiance that is asked for, or metered as of a frame, or the camera's.
@@ -181,32 +225,16 @@ fn exposure(asked: &Trace, picture: &Picture, may_be_metered: bool) -> f64 {
     f64::from(found.exposure)
 }
 
-fn write_picture(
-    path: &Path,
-    picture: &Picture,
-    display: Display,
-    exposure: f64,
-    floats: bool,
-) -> anyhow::Result<()> {
-    let shown = |radiance: &DVec3| {
-        let color = *radiance * exposure;
-        match display {
-            Display::Linear => color,
-            Display::Clamp => color.clamp(DVec3::ZERO, DVec3::ONE),
-            Display::Srgb => shown(color),
+fn write_picture(path: &Path, picture: &Picture, how: Development, floats: bool) -> anyhow::Result<()> {
+    if floats {
+        return write_open_exr(path, picture, how);
+    }
+    for (beside, meaning) in write_png(path, picture, how)? {
+        if let Some(meaning) = meaning {
+            eprintln!("lumbre: note: {}: {meaning}", beside.display());
         }
-    };
-    let (width, height) = (picture.width, picture.height);
-    let image = if floats {
-        let values = picture.radiance.iter().flat_map(|pixel| shown(pixel).as_vec3().to_array()).collect();
-        image::Rgb32FImage::from_raw(width, height, values).map(image::DynamicImage::ImageRgb32F)
-    } else {
-        let byte = |value: f64| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-        let bytes = picture.radiance.iter().flat_map(|pixel| shown(pixel).to_array().map(byte)).collect();
-        image::RgbImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgb8)
-    };
-    let image = image.context("the picture has another size than was asked for")?;
-    write_file(path, |path| Ok(image.save(path)?))
+    }
+    Ok(())
 }
 
 fn print_report(asked: &Trace, report: &TraceReport) -> anyhow::Result<()> {

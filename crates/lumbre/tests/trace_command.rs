@@ -81,6 +81,139 @@ fn a_picture_its_report_and_a_comparison() {
     assert!(found["flip"].as_f64().unwrap() > 0.01 && heat.exists(), "{found}");
 }
 
+/// The channels of an OpenEXR file by their names.
+fn channels(path: &Path) -> std::collections::BTreeMap<String, Vec<f32>> {
+    let image = exr::prelude::read_first_flat_layer_from_file(path).unwrap();
+    let list = image.layer_data.channel_data.list;
+    list.into_iter()
+        .map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect()))
+        .collect()
+}
+
+#[test]
+fn auxiliary_pictures_are_layers_of_open_exr_and_files_beside_png() {
+    let (folder, scene) = glass();
+    let at = |name: &str| folder.path().join(name);
+    for integrator in ["whitted", "path"] {
+        let (exr, asked) = (at("out.exr"), "albedo,normal,depth,rays,direct,bounced,light:*,light:lamp");
+        let told = lumbre(&[
+            "trace",
+            text(&scene),
+            "-o",
+            text(&exr),
+            "--size",
+            "40x30",
+            "--samples",
+            "8",
+            "--integrator",
+            integrator,
+            "--aov",
+            asked,
+        ]);
+        assert!(told.status.success(), "{}", stderr(&told));
+        let found = channels(&exr);
+        let light = found.keys().filter(|name| name.starts_with("light:") && name.ends_with(".R")).count();
+        assert_eq!(light, if integrator == "whitted" { 3 } else { 2 }, "{:?}", found.keys());
+        let more = 3 * (1 + 2 + 2 + light) + 2;
+        assert_eq!(found.len(), more, "{:?}", found.keys());
+        for channel in ["R", "G", "B"] {
+            let sum =
+                |names: &[String], pixel: usize| names.iter().map(|name| found[name][pixel]).sum::<f32>();
+            let parts = ["direct", "indirect"].map(|part| format!("{part}.{channel}"));
+            let lights = found.keys().filter(|name| name.starts_with("light:") && name.ends_with(channel));
+            let lights: Vec<String> = lights.cloned().collect();
+            for pixel in 0..40 * 30 {
+                let whole = found[channel][pixel];
+                for sum in [sum(&parts, pixel), sum(&lights, pixel)] {
+                    assert!((sum - whole).abs() <= 1e-5 * whole.max(1e-3), "{sum} for {whole}");
+                }
+            }
+        }
+        assert!(found["depth.Z"].iter().any(|depth| depth.is_infinite()));
+        assert!(found["rays.Y"].iter().all(|rays| *rays >= 8.0));
+    }
+    // What reads three channels reads the picture.
+    assert_eq!(image::open(at("out.exr")).unwrap().width(), 40);
+    let png = at("out.png");
+    let asked =
+        ["trace", text(&scene), "-o", text(&png), "--size", "40x30", "--aov", "normal,depth,light:lamp"];
+    let told = lumbre(&asked);
+    assert!(told.status.success() && stderr(&told).contains("m away"), "{}", stderr(&told));
+    for name in ["out.normal.png", "out.depth.png", "out.light-lamp.png"] {
+        assert_eq!(image::open(at(name)).unwrap().width(), 40, "{name}");
+    }
+    let refused = |aov: &str| lumbre(&["trace", text(&scene), "-o", text(&png), "--aov", aov]);
+    let (unknown, nobody) = (refused("beauty"), refused("light:moon"));
+    assert!(unknown.status.code() == Some(2) && stderr(&unknown).contains("albedo, normal"));
+    assert!(nobody.status.code() == Some(1) && stderr(&nobody).contains("\"lamp\""), "{}", stderr(&nobody));
+}
+
+#[test]
+fn paths_go_on_where_they_were_left() {
+    let (folder, scene) = glass();
+    let at = |name: &str| folder.path().join(name);
+    let draw = |output: &str, more: &[&str]| {
+        let output = at(output);
+        let mut asked = vec!["trace", text(&scene), "-o", text(&output), "--size", "48x36"];
+        asked.extend(["--integrator", "path"]);
+        asked.extend(more);
+        lumbre(&asked)
+    };
+    let done = |output: Output| assert!(output.status.success(), "{}", stderr(&output));
+    done(draw("whole.exr", &["--samples", "96"]));
+    assert!(!at("whole.exr.samples").exists(), "nobody asked for them");
+    done(draw("parts.exr", &["--samples", "32", "--resume"]));
+    let kept = std::fs::read(at("parts.exr.samples")).unwrap();
+    done(draw("parts.exr", &["--samples", "96", "--resume"]));
+    let read = |name: &str| std::fs::read(at(name)).unwrap();
+    assert!(read("whole.exr") == read("parts.exr"), "the same bits");
+    // Time ends a picture wherever it is; it goes on from there all the same.
+    done(draw("timed.exr", &["--samples", "96", "--time", "0.01", "--resume"]));
+    done(draw("timed.exr", &["--samples", "96", "--resume"]));
+    assert!(read("whole.exr") == read("timed.exr"), "the same bits");
+    // Another picture, and a file that is none: refused, and left as they are.
+    let other = draw("parts.exr", &["--samples", "96", "--resume", "--no-shadows"]);
+    assert!(
+        other.status.code() == Some(1) && stderr(&other).contains("another picture"),
+        "{}",
+        stderr(&other)
+    );
+    std::fs::write(at("parts.exr.samples"), &kept[..kept.len() / 2]).unwrap();
+    let cut = draw("parts.exr", &["--samples", "96", "--resume"]);
+    assert!(cut.status.code() == Some(1) && stderr(&cut).contains("damaged"), "{}", stderr(&cut));
+    assert!(stderr(&cut).contains("remove it"), "{}", stderr(&cut));
+    assert_eq!(read("parts.exr.samples").len(), kept.len() / 2);
+    let names = std::fs::read_dir(folder.path()).unwrap();
+    let names: Vec<_> = names.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    assert!(names.iter().all(|name| !name.starts_with('.')), "nothing half-written is left: {names:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interruption_keeps_the_picture_and_its_samples() {
+    let (folder, scene) = glass();
+    let output = folder.path().join("out.png");
+    let asked = ["trace", text(&scene), "-o", text(&output), "--size", "64x48", "--integrator", "path"];
+    let mut program = Command::new(env!("CARGO_BIN_EXE_lumbre"))
+        .args(asked)
+        .args(["--error", "1e-9", "--quiet"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let interrupt = Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
+    assert!(interrupt.success());
+    let ended = program.wait().unwrap();
+    let mut words = String::new();
+    std::io::Read::read_to_string(program.stderr.as_mut().unwrap(), &mut words).unwrap();
+    assert!(ended.code() == Some(1) && words.contains("--resume goes on"), "{words}");
+    assert!(output.exists() && folder.path().join("out.png.samples").exists());
+    // With an error that is reached already it ends at once.
+    let told = lumbre(&[&asked[..], &["--error", "0.5", "--resume", "--json"]].concat());
+    let report: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+    assert_eq!(report["ended"].as_str(), Some("error"), "{}", stderr(&told));
+}
+
 #[test]
 fn the_tree_of_a_pixel_names_what_it_meets() {
     let (_folder, scene) = glass();

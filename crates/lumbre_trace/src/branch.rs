@@ -107,6 +107,8 @@ pub struct BranchLamp {
     pub light: String,
     /// S_i: what the shadow ray found, per channel.
     pub visibility: DVec3,
+    /// Its part of the ambient term.
+    pub ambient: DVec3,
     /// Its part of the diffuse term.
     pub diffuse: DVec3,
     /// Its part of the specular term.
@@ -166,6 +168,7 @@ impl Branch {
         let lamps = light.lights.iter().map(|term| BranchLamp {
             light: name(term.light),
             visibility: term.visibility,
+            ambient: term.ambient,
             diffuse: term.diffuse,
             specular: term.specular,
             transmitted: term.transmitted,

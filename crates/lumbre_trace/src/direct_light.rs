@@ -17,8 +17,10 @@ use crate::surface_point::SurfacePoint;
 /// The terms of the sum at one point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DirectLight {
-    /// k_a (I_a + Σ L_a).
+    /// k_a (I_a + Σ L_a), or what an irradiance volume has in place of I_a.
     pub ambient: DVec3,
+    /// The part of it that is no light's.
+    pub ambient_of_scene: DVec3,
     pub diffuse: DVec3,
     pub specular: DVec3,
     /// Highlights of light that shines through.
@@ -38,6 +40,8 @@ pub(crate) struct LightTerm {
     pub light: usize,
     /// S_i per channel.
     pub visibility: DVec3,
+    /// k_a L_a, which no shadow takes away.
+    pub ambient: DVec3,
     pub diffuse: DVec3,
     pub specular: DVec3,
     pub transmitted: DVec3,
@@ -76,11 +80,12 @@ pub(crate) fn direct_light(
     light.baked = point.baked.unwrap_or(DVec3::ZERO);
     // Either holds what the ambient term stands for.
     let indirect = mapped || point.from_volume.is_some();
-    light.ambient = match point.from_volume {
+    light.ambient_of_scene = match point.from_volume {
         Some(from_volume) => from_volume,
         None if mapped => DVec3::ZERO,
         None => point.surface.ambient * scene.settings.ambient_with_sky().as_dvec3(),
     };
+    light.ambient = light.ambient_of_scene;
     let passing = object.transmission();
     for (number, placed) in scene.lights.iter().enumerate() {
         let sample = evaluate_light(&placed.light, placed.position, placed.axis, point.position);
@@ -105,6 +110,7 @@ pub(crate) fn direct_light(
             through = passing * sample.specular * (sample.attenuation * sample.spot * highlight);
         }
         if added.diffuse + added.specular + through == DVec3::ZERO {
+            light.add_ambient(number, added.ambient, lighting);
             continue;
         }
         let visibility = if lighting.shadows {
@@ -141,6 +147,7 @@ pub(crate) fn direct_light(
         }
         light.ambient += added.ambient;
         if added.diffuse + added.specular == DVec3::ZERO {
+            light.add_ambient(scene.lights.len() + number, added.ambient, lighting);
             continue;
         }
         let mut visibility = DVec3::ONE;
@@ -169,13 +176,37 @@ impl DirectLight {
         self.transmitted += visibility * through;
         if lighting.by_light {
             let transmitted = visibility * through;
-            self.lights.push(LightTerm { light: number, visibility, diffuse, specular, transmitted });
+            let ambient = added.ambient;
+            self.lights.push(LightTerm {
+                light: number,
+                visibility,
+                ambient,
+                diffuse,
+                specular,
+                transmitted,
+            });
+        }
+    }
+
+    /// The term of a light that adds nothing else, so that nothing is asked of its shadow.
+    fn add_ambient(&mut self, number: usize, ambient: DVec3, lighting: Lighting) {
+        if lighting.by_light && ambient != DVec3::ZERO {
+            let zero = DVec3::ZERO;
+            let [visibility, diffuse, specular, transmitted] = [DVec3::ONE, zero, zero, zero];
+            self.lights.push(LightTerm {
+                light: number,
+                visibility,
+                ambient,
+                diffuse,
+                specular,
+                transmitted,
+            });
         }
     }
 }
 
 /// Metres to a light; infinite to distant ones.
-fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
+pub(crate) fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
     match placed.light.kind {
         LightKind::Point => placed.position.distance(point.position),
         LightKind::Directional | LightKind::Ambient => f64::INFINITY,

@@ -46,6 +46,14 @@ pub enum TraceError {
         /// What it has to be.
         wanted: &'static str,
     },
+    /// No light, no shining object and no other source has that name.
+    #[error("no light and nothing that shines is called \"{name}\"; there are {known}")]
+    NoSuchSource {
+        /// The name.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// A mesh that is none.
     #[error("the mesh of \"{object}\" cannot be read: {source}")]
     Mesh {
@@ -76,10 +84,36 @@ pub enum TraceError {
         /// How many there are.
         triangles: usize,
     },
+    /// Samples that cannot be gone on from.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// The threads cannot be had.
     #[error("the threads cannot be started: {reason}; ask for fewer with --threads")]
     Threads {
         /// What the system says.
         reason: String,
     },
+}
+
+/// Why samples that were kept cannot be gone on from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// Something else.
+    #[error("these are no samples of a traced picture")]
+    NotSamples,
+    /// Of another version of the program, which may take others.
+    #[error("these samples are of another version of the program")]
+    Version,
+    /// Cut short, or changed.
+    #[error("these samples are damaged")]
+    Damaged,
+    /// Of another scene.
+    #[error("the scene has changed since these samples were taken")]
+    Scene,
+    /// Of another picture of the scene.
+    #[error(
+        "these samples are of another picture of the scene: size, camera, depth, shadows, filter, adaptive sampling and auxiliary pictures have to be the same"
+    )]
+    Options,
 }

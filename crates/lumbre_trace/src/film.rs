@@ -3,10 +3,11 @@
 use glam::{DVec2, DVec3};
 
 use crate::filter::Filter;
+use crate::light_terms::LightTerms;
 use crate::options::Cut;
 
 /// What one sample found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Sample {
     pub radiance: DVec3,
     pub rays: u32,
@@ -16,14 +17,17 @@ pub(crate) struct Sample {
     pub brightest: f64,
     /// The brightest that any ray could have brought, by the points that were met; may be infinite.
     pub limit: f64,
+    /// What the radiance is the sum of, if that is wanted.
+    pub terms: LightTerms,
 }
 
 /// What the samples of a pixel came to in one pass.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct PixelSum {
     pub radiance: DVec3,
     pub weight: f64,
-    pub squares: DVec3,
+    /// The part of the radiance that falls to each auxiliary picture.
+    pub light: Vec<DVec3>,
     pub samples: u32,
     pub rays: u32,
     pub cut: f64,
@@ -35,7 +39,6 @@ impl PixelSum {
     /// Adds a sample of a weight: the sign of the filter where it lies.
     pub fn add(&mut self, sample: &Sample, weight: f64) {
         self.radiance += sample.radiance * weight;
-        self.squares += sample.radiance * sample.radiance * weight;
         self.weight += weight;
         self.samples += 1;
         self.rays = self.rays.saturating_add(sample.rays);
@@ -44,10 +47,14 @@ impl PixelSum {
         self.limit = self.limit.max(sample.limit);
     }
 
+    fn over_weight(&self, sum: DVec3) -> DVec3 {
+        // Samples whose signs cancel say nothing of the pixel.
+        if self.weight.abs() > 1e-6 { sum / self.weight } else { DVec3::ZERO }
+    }
+
     /// Their mean.
     pub fn mean(&self) -> DVec3 {
-        // Samples whose signs cancel say nothing of the pixel.
-        if self.weight.abs() > 1e-6 { self.radiance / self.weight } else { DVec3::ZERO }
+        self.over_weight(self.radiance)
     }
 }
 
@@ -56,16 +63,19 @@ impl PixelSum {
 pub(crate) struct Film {
     pub width: usize,
     pub pixels: Vec<FilmPixel>,
+    /// Of each auxiliary picture of light and each pixel: the sum of the passes' means, each times its samples.
+    pub light: Vec<Vec<DVec3>>,
 }
 
 /// All passes of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FilmPixel {
     /// Sum of the passes' means, each times its samples.
-    sum: DVec3,
+    pub sum: DVec3,
     /// Sum of the squares of the passes' means.
-    squares: DVec3,
-    means: DVec3,
+    pub squares: DVec3,
+    /// Sum of the passes' means.
+    pub means: DVec3,
     pub passes: u32,
     pub samples: u32,
     pub rays: u32,
@@ -96,20 +106,43 @@ impl FilmPixel {
 
     /// Standard error of the mean by how much passes of as many samples differ; nothing before the second.
     pub fn standard_error(&self) -> Option<DVec3> {
-        if self.passes < 2 {
-            return None;
-        }
+        (self.passes >= 2).then(|| (self.variance() / f64::from(self.passes)).map(f64::sqrt))
+    }
+
+    /// Variance of a pass; 0 before there are two.
+    pub fn variance(&self) -> DVec3 {
         let count = f64::from(self.passes);
+        if self.passes < 2 {
+            return DVec3::ZERO;
+        }
         let mean = self.means / count;
-        let variance = (self.squares / count - mean * mean).max(DVec3::ZERO) * (count / (count - 1.0));
-        let root = variance / count;
-        Some(DVec3::new(root.x.sqrt(), root.y.sqrt(), root.z.sqrt()))
+        (self.squares / count - mean * mean).max(DVec3::ZERO) * (count / (count - 1.0))
     }
 }
 
 impl Film {
-    pub fn new(width: usize, height: usize) -> Self {
-        Self { width, pixels: vec![FilmPixel::default(); width * height] }
+    /// Without samples, with so many auxiliary pictures of light.
+    pub fn new((width, height): (usize, usize), light: usize) -> Self {
+        let count = width * height;
+        Self {
+            width,
+            pixels: vec![FilmPixel::default(); count],
+            light: vec![vec![DVec3::ZERO; count]; light],
+        }
+    }
+
+    /// Adds a pass of a pixel.
+    pub fn add(&mut self, at: usize, pass: &PixelSum) {
+        self.pixels[at].add(pass);
+        for (sums, sum) in self.light.iter_mut().zip(&pass.light) {
+            sums[at] += pass.over_weight(*sum) * f64::from(pass.samples);
+        }
+    }
+
+    /// An auxiliary picture of light, by its number.
+    pub fn light(&self, number: usize) -> Vec<DVec3> {
+        let samples = self.pixels.iter().map(|pixel| f64::from(pixel.samples.max(1)));
+        self.light[number].iter().zip(samples).map(|(sum, samples)| *sum / samples).collect()
     }
 
     /// Root mean square of the pixels' standard errors over the mean radiance of the picture, all channels together; nothing before it can

@@ -4,7 +4,8 @@
 use glam::DVec3;
 use lumbre_optics::{fresnel_dielectric, reflected_direction, transmitted_direction};
 
-use crate::geometry::{Meeting, SpaceRay};
+use crate::coplanar::coplanar_solids;
+use crate::geometry::SpaceRay;
 use crate::medium::MediumStack;
 use crate::scene::{Object, Scene};
 use crate::surface_point::SurfacePoint;
@@ -27,11 +28,6 @@ pub(crate) struct Division {
     /// Farthest coordinate of all surfaces that are crossed here.
     pub extent: f64,
 }
-
-/// Surfaces nearer to each other than this part of their coordinates are crossed together: more than rays are set off by.
-const TOGETHER: f64 = 64.0 / (1 << 24) as f64;
-/// So many surfaces lie in one place at most.
-const MOST_TOGETHER: usize = 8;
 
 impl Division {
     /// Of a ray in `media` that meets a point of a surface which mirrors or lets through.
@@ -113,33 +109,4 @@ fn mirror(normal: DVec3, viewer: DVec3, geometric: DVec3) -> DVec3 {
     let direction =
         if direction.dot(geometric) > 0.0 { direction } else { reflected_direction(geometric, viewer) };
     direction.normalize_or(geometric)
-}
-
-/// The other solids whose surface lies where one is met, each with the side that is met and its largest coordinate: glass that touches glass is one interface.
-fn coplanar_solids(scene: &Scene, ray: &SpaceRay, point: &SurfacePoint) -> Vec<(usize, bool, f64)> {
-    let mut found: Vec<(usize, bool, f64)> = Vec::new();
-    let size = point.extent.max(point.position.abs().max_element());
-    let cosine = ray.direction.dot(point.geometric).abs().max(1e-3);
-    let reach = TOGETHER * size / cosine;
-    let around = SpaceRay::new(point.position - ray.direction * reach, ray.direction);
-    while found.len() < MOST_TOGETHER {
-        let next: Option<Meeting> = scene.geometry.closest(&around, 2.0 * reach, |crossing| {
-            crossing.object != point.object
-                && scene.objects[crossing.object].is_solid()
-                && found.iter().all(|(own, ..)| *own != crossing.object)
-        });
-        let Some(meeting) = next else { break };
-        let at = SurfacePoint::new(scene, &around, &meeting);
-        // Only faces that lie in each other: where an edge of one touches the other, rays meet them one after another.
-        if at.geometric.dot(point.geometric) < 0.999_999 {
-            break;
-        }
-        // Slightly different extents, so that the transmitted ray is set off by the larger.
-        found.push((
-            meeting.crossing.object,
-            meeting.crossing.front,
-            at.extent.max(point.extent) * 1.000_001,
-        ));
-    }
-    found
 }

@@ -7,7 +7,7 @@
 //!      ▲                                                                  │
 //!      │ film: filters,          ┌────────────────────────────────────────┤
 //!      │ samples, errors         ▼                                        ▼
-//!    tiles, trace        ray_tree (Whitted)                          path (all light)
+//!    tiles, rendering    ray_tree (Whitted)                          path (all light)
 //!                          direct_light ─► shadow_ray                  light_sampling ─► shadow_ray
 //!                          interface: mirror, Snell, Fresnel           lobe_sampling, interface
 //!                          medium: what rays are inside of             medium
@@ -37,43 +37,61 @@
 //! # Ok::<(), lumbre_trace::TraceError>(())
 //! ```
 
+mod aov;
 mod branch;
 mod branch_drawing;
 mod camera_ray;
+mod checkpoint;
 mod comparison;
+mod coplanar;
 mod direct_light;
 mod display;
 mod error;
+mod estimator;
 mod film;
 mod filter;
+mod fingerprint;
+mod first_hit;
 pub mod flip;
 mod geometry;
 mod heat;
 mod interface;
+mod light_aovs;
 mod light_sampling;
+mod light_terms;
+mod light_tree;
 mod lobe_sampling;
 mod medium;
 mod metering;
 mod options;
 mod path;
 mod random;
+mod ray_rates;
 mod ray_tree;
+mod rendering;
+mod sample_distribution;
 mod scene;
 mod shadow_ray;
 mod surface_point;
 mod tiles;
 mod trace;
+mod view;
 
+pub use aov::{Aov, AovPicture, AovValues, LightPart};
 pub use branch::{Branch, BranchLamp, BranchLight, BranchPoint, Kind};
 pub use branch_drawing::{TreeFormat, draw_tree};
+pub use checkpoint::{Continuation, Keep};
 pub use comparison::{Comparison, compare};
 pub use display::shown;
-pub use error::TraceError;
+pub use error::{CheckpointError, TraceError};
 pub use filter::Filter;
+pub use first_hit::FirstHit;
 pub use heat::heat_color;
 pub use metering::Metering;
 pub use options::{
     Cut, DEFAULT_DEPTH, DEFAULT_PATHS, DEFAULT_WEIGHT, Ended, Integrator, MAXIMUM_DEPTH, MAXIMUM_SAMPLES,
     Picture, Progress, TraceOptions, TraceReport,
 };
-pub use trace::{FirstHit, Listener, Tracer, trace};
+pub use ray_rates::{RayRate, RayRates};
+pub use rendering::Listener;
+pub use trace::{Tracer, trace};

@@ -1,8 +1,5 @@
-//! Which light a path asks at a point, and where on it: one lamp by what each would send if nothing stood between, and one point of the emissive
-//! triangles by their power. Not whether it is seen.
-//!
-//! Lamps are weighed one by one at every point, so that a point costs as many evaluations as there are lamps; the baker's light tree, which
-//! would find one among thousands sooner, stands above this crate.
+//! Which light a path asks at a point, and where on it: one lamp by what it would send if nothing stood between, and one point of the emissive
+//! triangles by their power. Not whether it is seen. Where there are many lamps a tree says which few of them are weighed one by one.
 
 use std::f64::consts::PI;
 
@@ -10,6 +7,7 @@ use glam::{DVec2, DVec3};
 use lumbre_optics::{LightKind, LightSample, evaluate_light};
 use lumbre_scene::EmissiveLight;
 
+use crate::light_tree::LightTree;
 use crate::lobe_sampling::within_cone;
 use crate::metering::luminance;
 use crate::scene::{Object, Passage, Scene, sample_color};
@@ -21,6 +19,10 @@ pub(crate) struct LightSampler {
     emitters: Vec<Emitter>,
     /// Distribution of the emitters, ending with 1.
     distribution: Vec<f64>,
+    /// Numbers of the lamps, where they are few.
+    lamps: Vec<usize>,
+    /// Where they are many.
+    tree: Option<LightTree>,
     /// Chance per square metre of every triangle of the scene, by its number; empty without emitters.
     densities: Vec<f64>,
 }
@@ -37,9 +39,24 @@ struct Emitter {
     area: f64,
 }
 
+/// A point of a lamp as a surface meets it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LampSample {
+    /// Which light of the scene.
+    pub number: usize,
+    /// Its light, along the ray to the point.
+    pub light: LightSample,
+    /// That it was chosen.
+    pub chance: f64,
+    /// Metres; infinite to distant lights.
+    pub distance: f64,
+}
+
 /// A point of an emissive triangle as a surface meets it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EmitterSample {
+    /// Whose triangle it is.
+    pub object: usize,
     /// Radiance towards the surface.
     pub radiance: DVec3,
     /// Unit, to the light.
@@ -49,6 +66,8 @@ pub(crate) struct EmitterSample {
     pub density: f64,
 }
 
+/// So many lamps are weighed one by one at every point.
+const FEW_LAMPS: usize = 16;
 /// A texture that is dark in the middle of a triangle may be bright at its corners: a triangle's chance never falls below this part of it.
 const LEAST_TINT: f64 = 0.1;
 /// Lamps with a size reach beyond the horizon of their middle.
@@ -96,20 +115,27 @@ impl LightSampler {
                 densities[*triangle as usize] = power / total / emitter.area;
             }
         }
-        Self { emitters, distribution, densities }
+        let lamps = (0..scene.lights.len()).collect();
+        let tree = (scene.lights.len() > FEW_LAMPS).then(|| LightTree::new(scene));
+        Self { emitters, distribution, lamps, tree, densities }
     }
 
-    /// A lamp at a point, with the chance that it was chosen, where on it the ray goes, how far that is, and what does not hide it.
-    pub fn lamp<'s>(
+    /// A lamp at a point, and where on it the ray goes.
+    pub fn lamp(
         &self,
-        scene: &'s Scene,
+        scene: &Scene,
         point: &SurfacePoint,
         choice: f64,
         numbers: DVec2,
-    ) -> Option<(LightSample, f64, f64, &'s [usize])> {
+    ) -> Option<LampSample> {
+        let (asked, of_asked, choice) = match &self.tree {
+            Some(tree) => tree.few(scene, point.position, point.normal, choice)?,
+            None => (&self.lamps[..], 1.0, choice),
+        };
         let mut weights = smallvec::SmallVec::<[(usize, LightSample, f64); 32]>::new();
         let mut total = 0.0;
-        for (number, placed) in scene.lights.iter().enumerate() {
+        for &number in asked {
+            let placed = &scene.lights[number];
             let light = &placed.light;
             if light.kind == LightKind::Ambient {
                 continue;
@@ -134,7 +160,7 @@ impl LightSampler {
             (left < 0.0 || place == last).then_some(found)
         })?;
         let placed = &scene.lights[number];
-        let (sample, distance) = match placed.light.kind {
+        let (light, distance) = match placed.light.kind {
             LightKind::Point => {
                 let distance = placed.position.distance(point.position);
                 on_sphere_lamp(sample, f64::from(placed.light.radius), distance, numbers)
@@ -144,7 +170,7 @@ impl LightSampler {
                 (on_disc_of_sky(sample, half, numbers), f64::INFINITY)
             }
         };
-        Some((sample, weight / total, distance, &placed.bulbs))
+        Some(LampSample { number, light, chance: of_asked * weight / total, distance })
     }
 
     /// A point of the emissive triangles as a point of a surface meets it; nothing where it is the back of one, or there are none.
@@ -175,6 +201,7 @@ impl LightSampler {
         let chance = self.distribution[place] - before;
         let density = chance / emitter.area * distance * distance / cosine.abs();
         (radiance != DVec3::ZERO && density.is_finite() && density > 0.0).then_some(EmitterSample {
+            object: emitter.object,
             radiance,
             direction,
             distance,

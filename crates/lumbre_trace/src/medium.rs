@@ -35,9 +35,8 @@ impl MediumStack {
         let mut entered: Vec<usize> = Vec::new();
         let mut ray = SpaceRay::new(point, direction);
         for _ in 0..MOST_SURFACES {
-            let found = scene
-                .geometry
-                .closest(&ray, f64::INFINITY, |crossing| scene.objects[crossing.object].is_solid());
+            let found =
+                scene.geometry.closest(&ray, f64::INFINITY, |crossing| scene.is_solid(crossing.object));
             let Some(meeting) = found else { break };
             let at = crate::surface_point::SurfacePoint::new(scene, &ray, &meeting);
             let object = meeting.crossing.object;
@@ -82,9 +81,13 @@ impl MediumStack {
     }
 
     /// What is left of the light after so many metres here.
+    #[inline]
     pub fn transmittance(&self, distance: f64) -> DVec3 {
         match self.0.last() {
-            Some(layer) if layer.absorption != DVec3::ZERO => (-layer.absorption * distance).exp(),
+            // What does not absorb lets through all of it, from infinity too.
+            Some(layer) if layer.absorption != DVec3::ZERO => layer
+                .absorption
+                .map(|absorption| if absorption > 0.0 { (-absorption * distance).exp() } else { 1.0 }),
             _ => DVec3::ONE,
         }
     }

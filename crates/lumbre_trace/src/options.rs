@@ -8,6 +8,7 @@ use lumbre_optics::ReflectionModel;
 use serde::Serialize;
 
 use crate::TraceError;
+use crate::aov::{Aov, AovPicture};
 use crate::filter::Filter;
 
 /// How light is followed.
@@ -73,6 +74,10 @@ pub struct TraceOptions {
     /// Of the ray tree: pixels whose samples differ by more than this, as shown, get up to [`samples`](Self::samples) of them, others a
     /// quarter. Without it all get all.
     pub adaptive: Option<f64>,
+    /// Of paths: pixels get samples in proportion to their noise, and [`samples`](Self::samples) of them in the mean.
+    pub sample_by_noise: bool,
+    /// Auxiliary pictures that are wanted beside the picture.
+    pub aovs: Vec<Aov>,
 }
 
 impl Default for TraceOptions {
@@ -93,6 +98,8 @@ impl Default for TraceOptions {
             threads: None,
             filter: Filter::Box,
             adaptive: None,
+            sample_by_noise: false,
+            aovs: Vec::new(),
         }
     }
 }
@@ -182,6 +189,8 @@ pub struct Picture {
     pub rays: Vec<u32>,
     /// Factor on radiance of the camera.
     pub exposure: f32,
+    /// The auxiliary pictures that were asked for.
+    pub aovs: Vec<AovPicture>,
 }
 
 /// What is said about a picture.

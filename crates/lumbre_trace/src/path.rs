@@ -9,11 +9,13 @@ use glam::DVec3;
 use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::camera_ray::{CameraRay, CameraRays};
+use crate::coplanar::nearest_surface;
 use crate::direct_light::shadow_ray;
 use crate::film::Sample;
 use crate::geometry::{Place, SpaceRay};
 use crate::interface::Division;
 use crate::light_sampling::{LightSampler, emitted};
+use crate::light_terms::{LightTerms, Source};
 use crate::lobe_sampling::Lobes;
 use crate::medium::MediumStack;
 use crate::random::Numbers;
@@ -46,6 +48,8 @@ struct Walk {
     throughput: DVec3,
     /// What it brings.
     radiance: DVec3,
+    /// What that is the sum of, if it is wanted.
+    terms: LightTerms,
     /// Chance per steradian of the last direction, and metres since: nothing where it was a mirror's, glass's or the camera's.
     last: Option<(f64, f64)>,
     reflections: u32,
@@ -66,14 +70,21 @@ impl<'a> Paths<'a> {
         Self { scene, camera, lights: LightSampler::new(scene), depth, shadows }
     }
 
-    /// One path.
-    pub fn sample(&self, camera: &CameraRay, media: MediumStack, numbers: &mut Numbers) -> Sample {
+    /// One path, and the terms of its light.
+    pub fn sample(
+        &self,
+        camera: &CameraRay,
+        media: MediumStack,
+        numbers: &mut Numbers,
+        terms: LightTerms,
+    ) -> Sample {
         let mut walk = Walk {
             ray: camera.ray,
             farthest: camera.farthest,
             media,
             throughput: DVec3::ONE,
             radiance: DVec3::ZERO,
+            terms,
             last: None,
             reflections: 0,
             rays: 0,
@@ -85,8 +96,13 @@ impl<'a> Paths<'a> {
             }
         }
         // Lights at the ends of f64 may still be too much for a product of factors.
-        let radiance = if walk.radiance.is_finite() { walk.radiance } else { DVec3::ZERO };
-        Sample { radiance, rays: walk.rays, cut: 0.0, brightest: radiance.max_element(), limit: 0.0 }
+        let mut radiance = walk.radiance;
+        if !radiance.is_finite() {
+            radiance = DVec3::ZERO;
+            walk.terms.clear();
+        }
+        let brightest = radiance.max_element();
+        Sample { radiance, rays: walk.rays, cut: 0.0, brightest, limit: 0.0, terms: walk.terms }
     }
 
     fn step(&self, walk: &mut Walk, numbers: &mut Numbers) -> Next {
@@ -94,7 +110,7 @@ impl<'a> Paths<'a> {
         walk.rays += 1;
         let looks = walk.last.is_none();
         // What looks sees through the backs of what has none; light stops there.
-        let found = scene.geometry.closest(&walk.ray, walk.farthest, |crossing| {
+        let found = nearest_surface(scene, &walk.ray, walk.farthest, |crossing| {
             if looks { scene.is_seen(crossing) } else { scene.blocks(crossing) }
         });
         let Some(meeting) = found else {
@@ -113,7 +129,7 @@ impl<'a> Paths<'a> {
         }
         if object.material.unlit {
             if looks {
-                walk.radiance += walk.throughput * point.surface.diffuse;
+                walk.brings(Source::Object(point.object), walk.reflections, point.surface.diffuse);
             }
             return Next::Ends;
         }
@@ -128,14 +144,14 @@ impl<'a> Paths<'a> {
     fn add_fog(&self, walk: &mut Walk, point: &SurfacePoint) {
         let Some(fog) = &self.scene.settings.fog else { return };
         let clear = fog_weight(&fog.mode, self.camera.depth(point.position));
-        walk.radiance += walk.throughput * apply_fog(clear, DVec3::ZERO, fog.color.as_dvec3());
+        walk.brings(Source::Background, 0, apply_fog(clear, DVec3::ZERO, fog.color.as_dvec3()));
         walk.throughput *= clear;
     }
 
     /// What the surface sends by itself: all of it to what looks; to others by how probable the ways are on which it is found.
     fn add_emission(&self, walk: &mut Walk, point: &SurfacePoint, place: &Place, since: f64) {
         let Some((density, _)) = walk.last else {
-            walk.radiance += walk.throughput * point.emission;
+            walk.brings(Source::Object(point.object), walk.reflections, point.emission);
             return;
         };
         let object = &self.scene.objects[point.object];
@@ -148,7 +164,8 @@ impl<'a> Paths<'a> {
         }
         let cosine = point.geometric.dot(walk.ray.direction);
         let asked = self.lights.density(point.triangle, since, cosine);
-        walk.radiance += walk.throughput * radiance * (density / (density + asked));
+        let share = density / (density + asked);
+        walk.brings(Source::Object(point.object), walk.reflections, radiance * share);
     }
 
     /// Asks the lights, and sends the path on.
@@ -212,10 +229,11 @@ impl<'a> Paths<'a> {
         numbers: &mut Numbers,
     ) {
         let (choice, place) = (numbers.next(), numbers.pair());
-        if let Some((light, chance, distance, bulbs)) = self.lights.lamp(self.scene, point, choice, place) {
-            let reflected = lobes.reflected(&light) / chance;
-            let seen = self.seen(walk, point, (light.direction, distance, bulbs), reflected);
-            walk.radiance += walk.throughput * seen;
+        if let Some(lamp) = self.lights.lamp(self.scene, point, choice, place) {
+            let reflected = lobes.reflected(&lamp.light) / lamp.chance;
+            let bulbs = &self.scene.lights[lamp.number].bulbs;
+            let seen = self.seen(walk, point, (lamp.light.direction, lamp.distance, bulbs), reflected);
+            walk.brings(Source::Light(lamp.number), walk.reflections + 1, seen);
         }
         let (choice, place) = (numbers.next(), numbers.pair());
         if let Some(sample) = self.lights.emitter(self.scene, point, choice, place) {
@@ -223,7 +241,7 @@ impl<'a> Paths<'a> {
             let found = if last { 0.0 } else { self.chance(walk, point, lobes, sample.direction) };
             let reflected = lobes.reflectance(sample.direction) * sample.radiance / (sample.density + found);
             let seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
-            walk.radiance += walk.throughput * seen;
+            walk.brings(Source::Object(sample.object), walk.reflections + 1, seen);
         }
     }
 
@@ -262,13 +280,20 @@ impl<'a> Paths<'a> {
 }
 
 impl Walk {
+    /// Light that the rest of the path reflects to the eye, after so many surfaces.
+    fn brings(&mut self, source: Source, turns: u32, light: DVec3) {
+        let radiance = self.throughput * light;
+        self.radiance += radiance;
+        self.terms.add(source, turns, radiance);
+    }
+
     fn escapes(&mut self, scene: &Scene) {
         let radiance = match self.last {
             None => scene.settings.shown_background(),
             Some(_) => scene.settings.sky,
         };
         if self.media.transmittance(f64::INFINITY) == DVec3::ONE || self.media.innermost().is_none() {
-            self.radiance += self.throughput * radiance.as_dvec3();
+            self.brings(Source::Background, self.reflections, radiance.as_dvec3());
         }
     }
 

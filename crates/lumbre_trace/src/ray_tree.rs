@@ -6,9 +6,11 @@ use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::branch::{Branch, Kind};
 use crate::camera_ray::CameraRays;
+use crate::coplanar::nearest_surface;
 use crate::direct_light::{DirectLight, Lighting, direct_light};
 use crate::geometry::SpaceRay;
 use crate::interface::Division;
+use crate::light_terms::{BOUNCED, LightTerms, Source};
 use crate::medium::MediumStack;
 use crate::scene::Scene;
 use crate::surface_point::SurfacePoint;
@@ -33,7 +35,7 @@ pub(crate) struct RayTree<'a> {
 }
 
 /// What a tree found.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
     pub radiance: DVec3,
     /// Sum of the weights of the rays that were cut off: times the radiance that they would have brought, that is the error.
@@ -45,6 +47,8 @@ pub(crate) struct Seen {
     /// The brightest that any ray of the tree could bring, however far it were followed: of every point its own light over what
     /// k_r + k_t leaves of 1. Infinite where a point that passes on all light adds some.
     pub limit: f64,
+    /// What the radiance is the sum of, if that is wanted.
+    pub terms: LightTerms,
 }
 
 impl Seen {
@@ -68,6 +72,8 @@ struct Twig<'m> {
     media: &'m MediumStack,
     weight: DVec3,
     depth: u32,
+    /// Surfaces that reflected or refracted it; sheets and what covers in part do not turn a ray.
+    turns: u32,
     /// It comes straight from the eye.
     first: bool,
 }
@@ -80,10 +86,11 @@ impl RayTree<'_> {
         farthest: f64,
         media: &MediumStack,
         record: Option<&mut Branch>,
+        terms: LightTerms,
     ) -> Seen {
-        let mut seen = Seen::default();
+        let mut seen = Seen { terms, ..Seen::default() };
         let mut left = self.limits.rays;
-        let root = Twig { ray, farthest, media, weight: DVec3::ONE, depth: 0, first: true };
+        let root = Twig { ray, farthest, media, weight: DVec3::ONE, depth: 0, turns: 0, first: true };
         seen.radiance = self.radiance(root, &mut left, &mut seen, record);
         seen
     }
@@ -97,8 +104,9 @@ impl RayTree<'_> {
     ) -> DVec3 {
         seen.rays += 1;
         *left = left.saturating_sub(1);
+        let own_terms = seen.terms.len();
         let scene = self.scene;
-        let found = scene.geometry.closest(&twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
+        let found = nearest_surface(scene, &twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
         let Some(meeting) = found else {
             // Nothing absorbs on the way to infinity but what has no end, and that leaves nothing.
             let background = scene.settings.shown_background().as_dvec3();
@@ -111,6 +119,7 @@ impl RayTree<'_> {
             }
             seen.brightest = seen.brightest.max(radiance.max_element());
             seen.meets(radiance, DVec3::ZERO);
+            seen.terms.add(Source::Background, twig.turns, radiance);
             return radiance;
         };
         let point = SurfacePoint::new(scene, &twig.ray, &meeting);
@@ -122,17 +131,22 @@ impl RayTree<'_> {
 
         let mut radiance = if object.material.unlit {
             seen.meets(point.surface.diffuse, DVec3::ZERO);
+            seen.terms.add(Source::Object(point.object), twig.turns, point.surface.diffuse);
             point.surface.diffuse
         } else {
             self.lit(&twig, &point, clear, left, seen, record.as_deref_mut())
         };
         if let Some(fog) = &scene.settings.fog {
             let distance = if twig.first { self.camera.depth(point.position) } else { point.distance };
-            radiance = apply_fog(fog_weight(&fog.mode, distance), radiance, fog.color.as_dvec3());
-            seen.meets(fog.color.as_dvec3(), DVec3::ZERO);
+            let (weight, color) = (fog_weight(&fog.mode, distance), fog.color.as_dvec3());
+            radiance = apply_fog(weight, radiance, color);
+            seen.meets(color, DVec3::ZERO);
+            seen.terms.scale_since(own_terms, DVec3::splat(weight));
+            seen.terms.add(Source::Background, twig.turns, apply_fog(weight, DVec3::ZERO, color));
         }
         if point.coverage < 1.0 {
             let behind = DVec3::splat(1.0 - point.coverage);
+            seen.terms.scale_since(own_terms, DVec3::splat(point.coverage));
             let ray = SpaceRay::leaving(point.position, twig.ray.direction, point.geometric, point.extent);
             let next = Twig {
                 ray,
@@ -145,6 +159,7 @@ impl RayTree<'_> {
                 + self.branch_off(Kind::Behind, next, behind, left, seen, record.as_deref_mut());
         }
         let radiance = radiance * clear;
+        seen.terms.scale_since(own_terms, clear);
         seen.brightest = seen.brightest.max(radiance.max_element());
         if let Some(branch) = record {
             branch.radiance = radiance;
@@ -178,6 +193,9 @@ impl RayTree<'_> {
         if let Some(branch) = record.as_deref_mut() {
             branch.lit(scene, &light);
         }
+        if seen.terms.are_wanted() {
+            self.add_terms(&mut seen.terms, point, &light, twig.turns);
+        }
         let Some(division) = division else { return radiance };
         let share = point.coverage;
         if division.mirrored != DVec3::ZERO {
@@ -187,6 +205,7 @@ impl RayTree<'_> {
                 media: twig.media,
                 weight: twig.weight * division.mirrored * clear * share,
                 depth: twig.depth + 1,
+                turns: twig.turns + 1,
                 first: false,
             };
             radiance +=
@@ -199,6 +218,7 @@ impl RayTree<'_> {
                 media: &division.behind,
                 weight: twig.weight * division.transmitted * clear * share,
                 depth: twig.depth + 1,
+                turns: twig.turns + u32::from(!object.medium.thin),
                 first: false,
             };
             radiance += self.branch_off(Kind::Transmitted, next, division.transmitted, left, seen, record);
@@ -224,10 +244,31 @@ impl RayTree<'_> {
             }
             return DVec3::ZERO;
         }
-        let Some(branch) = record else { return factor * self.radiance(twig, left, seen, None) };
-        let mut own = Branch::new(kind, &twig.ray, self.scene.origin, twig.weight, factor);
-        let radiance = factor * self.radiance(twig, left, seen, Some(&mut own));
-        branch.branches.push(own);
+        let first = seen.terms.len();
+        let mut own =
+            record.is_some().then(|| Branch::new(kind, &twig.ray, self.scene.origin, twig.weight, factor));
+        let radiance = factor * self.radiance(twig, left, seen, own.as_mut());
+        seen.terms.scale_since(first, factor);
+        if let Some((branch, own)) = record.zip(own) {
+            branch.branches.push(own);
+        }
         radiance
+    }
+
+    /// The terms of the light at a point, each with its source.
+    fn add_terms(&self, terms: &mut LightTerms, point: &SurfacePoint, light: &DirectLight, turns: u32) {
+        let lights = self.scene.lights.len();
+        for term in &light.lights {
+            let source = match term.light.checked_sub(lights) {
+                None => Source::Light(term.light),
+                Some(polygon) => Source::Object(self.scene.polygons[polygon].emitter),
+            };
+            terms.add(source, turns + 1, term.diffuse + term.specular + term.transmitted);
+            terms.add(source, turns + BOUNCED, term.ambient);
+        }
+        terms.add(Source::Object(point.object), turns, light.emission);
+        let ambient = if point.from_volume.is_some() { Source::Baked } else { Source::Ambient };
+        terms.add(ambient, turns + BOUNCED, light.ambient_of_scene);
+        terms.add(Source::Baked, turns + BOUNCED, light.baked);
     }
 }

@@ -1,6 +1,8 @@
 //! Shadow rays: how much of a light comes through to a point, S_i between 0 and 1 per channel. Glass lets through k_t at every surface, what
 //! covers in part the rest of that; neither bends the ray, so that no light is focused. Not the light itself.
 
+use std::cell::Cell;
+
 use glam::DVec3;
 
 use crate::geometry::SpaceRay;
@@ -20,8 +22,9 @@ pub(crate) enum Glass {
 
 /// After so many surfaces nothing is left, or the scene is a mistake.
 const MOST_SURFACES: usize = 1024;
-/// The part of the light that arrives along a ray, from a distance that may be infinite. `media` is where the ray starts; `bulbs` are objects that do not count. The second value counts the rays that were
-/// traced for it.
+
+/// The part of the light that arrives along a ray, from a distance that may be infinite. `media` is where the ray starts; `bulbs` are objects
+/// that do not count. The second value counts the rays that were traced for it.
 pub(crate) fn transmittance(
     scene: &Scene,
     ray: &SpaceRay,
@@ -29,24 +32,28 @@ pub(crate) fn transmittance(
     media: &MediumStack,
     (glass, bulbs): (Glass, &[usize]),
 ) -> (DVec3, u32) {
-    let open = |object: usize| {
-        let object = &scene.objects[object];
-        match object.passage() {
-            Passage::Covering => true,
-            Passage::Clear => glass == Glass::LetsThrough || object.medium.thin,
-            Passage::Closed | Passage::Cut => false,
-        }
-    };
+    if bulbs.is_empty() && !scene.see_through && !scene.holes {
+        let hidden = scene.geometry.anything_between(ray, distance);
+        return (if hidden { DVec3::ZERO } else { media.transmittance(distance) }, 1);
+    }
+    let open = |object: usize| scene.see_through && scene.is_open(object, glass == Glass::LetsThrough);
+    // A ray that nothing hides has seen all that lies on its way.
+    let through = Cell::new(false);
     let hidden = scene.geometry.any_between(ray, distance, |crossing| {
-        (!scene.see_through || !open(crossing.object))
-            && !bulbs.contains(&crossing.object)
-            && scene.blocks(crossing)
+        if bulbs.contains(&crossing.object) {
+            return false;
+        }
+        if open(crossing.object) {
+            through.set(true);
+            return false;
+        }
+        scene.blocks(crossing)
     });
     if hidden {
         return (DVec3::ZERO, 1);
     }
-    if !scene.see_through {
-        return (DVec3::ONE, 1);
+    if !through.get() {
+        return (media.transmittance(distance), 1);
     }
     let (mut left, mut rays) = (DVec3::ONE, 1);
     let (mut ray, mut travelled, mut media) = (*ray, 0.0, media.clone());
@@ -61,7 +68,7 @@ pub(crate) fn transmittance(
         let point = SurfacePoint::new(scene, &ray, &meeting);
         let object = &scene.objects[point.object];
         let front = meeting.crossing.front;
-        let solid = object.is_solid();
+        let solid = scene.is_solid(point.object);
         let here = if solid { media.before(point.object, object, front) } else { media.clone() };
         left *= here.transmittance(point.distance);
         media = if solid { here.across(point.object, object, front) } else { here };

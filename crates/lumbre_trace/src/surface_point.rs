@@ -37,7 +37,8 @@ pub(crate) struct SurfacePoint {
     pub triangle: Option<u32>,
 }
 
-/// A point found in f64 may be apart from the one that the f32 hierarchy found by this part of its distance, where rays graze.
+/// A point found in f64 may be apart from the one that the f32 hierarchy found by this part of its distance, where rays graze, and by what
+/// the ray was set off by.
 const TRUSTED: f64 = 1e-3;
 
 impl SurfacePoint {
@@ -210,7 +211,8 @@ fn towards(normal: DVec3, ray: &SpaceRay) -> DVec3 {
 fn refined(ray: &SpaceRay, [a, b, c]: [DVec3; 3], cross: DVec3, near: f64) -> Option<(f64, [f64; 2])> {
     let along = ray.direction.dot(cross);
     let distance = (a - ray.origin).dot(cross) / along;
-    let fits = (distance - near).abs() <= TRUSTED * near.max(1e-6) && distance > 0.0;
+    let set_off = ray.set_off() * cross.length() / along.abs();
+    let fits = (distance - near).abs() <= TRUSTED * near.max(1e-6) + set_off && distance > 0.0;
     if !fits {
         return None;
     }

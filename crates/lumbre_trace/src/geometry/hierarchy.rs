@@ -1,7 +1,7 @@
 //! All surfaces of a scene, and the questions that rays ask of them: what is met first, and whether anything is. Not what happens there.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use lumbre_rays::Bvh;
+use lumbre_rays::{Bvh, Ray};
 use lumbre_scene::Quadric;
 
 use super::quadric::{QuadricHit, QuadricSurface};
@@ -11,11 +11,18 @@ use super::ray::SpaceRay;
 #[derive(Debug)]
 pub(crate) struct Geometry {
     bvh: Bvh,
-    /// Of every triangle: its object, its number there.
-    triangles: Vec<(u32, u32)>,
-    /// Of every triangle, to its front; of any length.
-    fronts: Vec<Vec3>,
+    triangles: Vec<Facet>,
     quadrics: Vec<PlacedQuadric>,
+}
+
+/// What there is to know of a triangle that a ray meets, together in memory.
+#[derive(Debug)]
+struct Facet {
+    object: u32,
+    /// In its object.
+    number: u32,
+    /// To its front, unit.
+    front: Vec3,
 }
 
 #[derive(Debug)]
@@ -79,8 +86,14 @@ impl Geometry {
         };
         Self {
             bvh: Bvh::build(&corners),
-            fronts: corners.iter().map(front).collect(),
-            triangles: triangles.into_iter().map(|(_, owner)| owner).collect(),
+            triangles: triangles
+                .iter()
+                .map(|(corners, (object, number))| Facet {
+                    object: *object,
+                    number: *number,
+                    front: front(corners),
+                })
+                .collect(),
             quadrics: quadrics.iter().map(placed).collect(),
         }
     }
@@ -93,8 +106,15 @@ impl Geometry {
         accept: impl Fn(&Crossing) -> bool,
     ) -> Option<Meeting> {
         let short = ray.for_triangles(farthest);
-        let found = self.bvh.closest_hit_filtered(&short, |triangle, u, v| {
-            accept(&self.crossing(short.direction, triangle, u, v))
+        let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
+        // The nearest of all is nearly always accepted: only then the others are asked too.
+        let found = self.bvh.closest_hit(&short).and_then(|hit| {
+            let (u, v) = hit.barycentric;
+            if accepted(hit.triangle, u, v) {
+                Some(hit)
+            } else {
+                self.bvh.closest_hit_filtered(&short, accepted)
+            }
         });
         let mut nearest = found.map(|hit| Meeting {
             crossing: self.crossing(short.direction, hit.triangle, hit.barycentric.0, hit.barycentric.1),
@@ -112,18 +132,35 @@ impl Geometry {
 
     /// Whether a surface for which `accept` holds lies between the ray's start and the point at a distance, which may be infinite.
     pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
-        let finite = distance.is_finite();
-        let short = if finite { ray.between_triangles(distance) } else { ray.for_triangles(distance) };
-        let farthest = if finite { distance * EXACTLY_SHORT } else { distance };
-        self.bvh.any_hit_filtered(&short, |triangle, u, v| {
-            accept(&self.crossing(short.direction, triangle, u, v))
-        }) || self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, &accept).is_some())
+        let short = short_of_end(ray, distance);
+        let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
+        self.bvh.any_hit_filtered(&short, accepted) || self.any_exact_between(ray, distance, &accept)
+    }
+
+    /// The same where every surface counts.
+    pub fn anything_between(&self, ray: &SpaceRay, distance: f64) -> bool {
+        self.bvh.any_hit(&short_of_end(ray, distance)) || self.any_exact_between(ray, distance, &|_| true)
+    }
+
+    fn any_exact_between(&self, ray: &SpaceRay, distance: f64, accept: &impl Fn(&Crossing) -> bool) -> bool {
+        let farthest = if distance.is_finite() { distance * EXACTLY_SHORT } else { distance };
+        self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, accept).is_some())
     }
 
     /// The object and the number there of a triangle of the scene.
     pub fn owner(&self, triangle: u32) -> (usize, u32) {
-        let (object, number) = self.triangles[triangle as usize];
-        (object as usize, number)
+        let facet = &self.triangles[triangle as usize];
+        (facet.object as usize, facet.number)
+    }
+
+    /// What there is beside triangles, as it says of itself.
+    pub fn exact_surfaces(&self) -> &impl std::fmt::Debug {
+        &self.quadrics
+    }
+
+    /// The triangles alone.
+    pub fn hierarchy(&self) -> &Bvh {
+        &self.bvh
     }
 
     /// How many triangles there are.
@@ -133,13 +170,18 @@ impl Geometry {
 
     #[inline]
     fn crossing(&self, direction: Vec3, triangle: u32, u: f32, v: f32) -> Crossing {
-        let (object, number) = self.triangles[triangle as usize];
+        let facet = &self.triangles[triangle as usize];
         Crossing {
-            object: object as usize,
-            front: direction.dot(self.fronts[triangle as usize]) < 0.0,
-            place: Place::Triangle { triangle: number, weights: [f64::from(u), f64::from(v)] },
+            object: facet.object as usize,
+            front: direction.dot(facet.front) < 0.0,
+            place: Place::Triangle { triangle: facet.number, weights: [f64::from(u), f64::from(v)] },
         }
     }
+}
+
+/// Not as far as the surface that a ray's end lies on.
+fn short_of_end(ray: &SpaceRay, distance: f64) -> Ray {
+    if distance.is_finite() { ray.between_triangles(distance) } else { ray.for_triangles(distance) }
 }
 
 impl PlacedQuadric {

@@ -48,23 +48,32 @@ impl SpaceRay {
     }
 
     /// For triangles, whose corners are f32.
+    #[inline]
     pub fn for_triangles(&self, farthest: f64) -> Ray {
         let direction: Vec3 = self.direction.as_vec3();
         Ray { origin: self.start_off_triangles(), direction, t_min: 0.0, t_max: farthest as f32 }
     }
 
-    /// The same up to a point at a distance, or short of it by the rounding of its coordinates: what lies in that point's own surface is not
-    /// between. Seen from where the ray is set off to, the point lies in a slightly other direction.
-    pub fn between_triangles(&self, distance: f64) -> Ray {
-        let origin = self.start_off_triangles();
-        let target = self.at(distance);
-        let to = target - origin.as_dvec3();
-        let length = to.length();
-        let size = target.abs().max_element().max(length);
-        let t_max = (length - ROUNDING * size).max(0.0) as f32;
-        Ray { origin, direction: (to / length).as_vec3(), t_min: 0.0, t_max }
+    /// Metres that its start is off the surface at most where it meets triangles.
+    pub fn set_off(&self) -> f64 {
+        let size = |departure: Departure| departure.extent.max(self.origin.abs().max_element());
+        self.departure.map_or(0.0, |departure| ROUNDING * size(departure))
     }
 
+    /// The same up to a point at a distance, or short of it by the rounding of its coordinates: what lies in that point's own surface is not
+    /// between. Seen from where the ray is set off to, the point lies in a slightly other direction.
+    #[inline]
+    pub fn between_triangles(&self, distance: f64) -> Ray {
+        let origin = self.start_off_triangles();
+        let distance = distance as f32;
+        // By as much as the start is off. A direction need not be unit: at the distance it is at the point, to the rounding of f32.
+        let aside = (self.origin - origin.as_dvec3()).as_vec3() / distance;
+        let direction = self.direction.as_vec3() + aside;
+        let size = (origin + direction * distance).abs().max_element().max(distance);
+        Ray { origin, direction, t_min: 0.0, t_max: (distance - ROUNDING as f32 * size).max(0.0) }
+    }
+
+    #[inline]
     fn start_off_triangles(&self) -> Vec3 {
         let origin = self.origin.as_vec3();
         self.departure.map_or(origin, |Departure { side, extent }| {

@@ -11,6 +11,7 @@ use lumbre_optics::{AlphaMode, ReflectionModel};
 use lumbre_scene::SceneSettings;
 
 use crate::TraceError;
+use crate::fingerprint::{Fingerprint, of_debug};
 use crate::geometry::{Crossing, Geometry, Place};
 
 pub(crate) use collect::PlacedLight;
@@ -29,12 +30,25 @@ pub(crate) struct Scene {
     /// Faces that light others in a frame.
     pub polygons: Vec<EmissivePolygon>,
     pub geometry: Geometry,
+    /// Of every object, what rays ask of all that they meet.
+    passable: Vec<Passable>,
     /// Some objects let light past in part.
     pub see_through: bool,
+    /// Some objects have holes by their texture.
+    pub holes: bool,
     /// Some objects have an inside that light is refracted into.
     pub solids: bool,
     /// What was left out, and why.
     pub notes: Vec<String>,
+}
+
+/// What becomes of a ray at an object, in few bytes: rays ask it of thousands of triangles a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Passable {
+    passage: Passage,
+    shows_back: bool,
+    thin: bool,
+    solid: bool,
 }
 
 /// From so many metres off the world's origin on, the tracer has an origin of its own, as a frame has.
@@ -72,10 +86,13 @@ impl Scene {
                 (*index, quadric.clone(), object.place, object.normals)
             })
             .collect();
-        let passages = || collected.objects.iter().map(Object::passage);
+        let passable: Vec<Passable> = collected.objects.iter().map(Passable::of).collect();
+        let is_open = |found: &Passable| matches!(found.passage, Passage::Clear | Passage::Covering);
         Ok(Self {
-            see_through: passages().any(|passage| matches!(passage, Passage::Clear | Passage::Covering)),
-            solids: collected.objects.iter().any(Object::is_solid),
+            see_through: passable.iter().any(is_open),
+            holes: passable.iter().any(|found| found.passage == Passage::Cut),
+            solids: passable.iter().any(|found| found.solid),
+            passable,
             geometry: Geometry::build(triangles, &quadrics),
             settings: collected.settings,
             origin,
@@ -88,19 +105,60 @@ impl Scene {
 
     /// Whether a ray that looks sees a surface there: not the back of what has none, nor a hole in a texture.
     pub fn is_seen(&self, crossing: &Crossing) -> bool {
-        let object = &self.objects[crossing.object];
-        (crossing.front || object.shows_back()) && !self.is_hole(object, crossing)
+        (crossing.front || self.passable[crossing.object].shows_back) && self.blocks(crossing)
     }
 
     /// Whether a surface stands in the light's way there, wholly or in part: both sides do.
     pub fn blocks(&self, crossing: &Crossing) -> bool {
-        !self.is_hole(&self.objects[crossing.object], crossing)
+        self.passable[crossing.object].passage != Passage::Cut || !self.is_hole(crossing)
     }
 
-    fn is_hole(&self, object: &Object, crossing: &Crossing) -> bool {
+    /// How rays get past an object.
+    pub fn passage(&self, object: usize) -> Passage {
+        self.passable[object].passage
+    }
+
+    /// Whether an object has an inside that light is refracted into.
+    pub fn is_solid(&self, object: usize) -> bool {
+        self.passable[object].solid
+    }
+
+    /// Whether light gets past an object there in part, straight on, and solids that refract count too or not.
+    pub fn is_open(&self, object: usize, with_solids: bool) -> bool {
+        let object = self.passable[object];
+        match object.passage {
+            Passage::Covering => true,
+            Passage::Clear => with_solids || object.thin,
+            Passage::Closed | Passage::Cut => false,
+        }
+    }
+
+    /// A hash of all that rays can tell of it.
+    pub fn fingerprint(&self) -> Fingerprint {
+        of_debug(&(&self.settings, self.origin, &self.objects, &self.lights, self.geometry.exact_surfaces()))
+    }
+
+    /// Whether some objects are lit by lightmaps or irradiance volumes.
+    pub fn has_baked_light(&self) -> bool {
+        self.objects.iter().any(|object| object.lightmap.is_some() || object.volume.is_some())
+    }
+
+    fn is_hole(&self, crossing: &Crossing) -> bool {
+        let object = &self.objects[crossing.object];
         match object.material.alpha_mode {
             AlphaMode::Mask { cutoff } => object.alpha(&crossing.place) < f64::from(cutoff),
             AlphaMode::Opaque | AlphaMode::Blend => false,
+        }
+    }
+}
+
+impl Passable {
+    fn of(object: &Object) -> Self {
+        Self {
+            passage: object.passage(),
+            shows_back: object.shows_back(),
+            thin: object.medium.thin,
+            solid: object.is_solid(),
         }
     }
 }

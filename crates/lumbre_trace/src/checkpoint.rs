@@ -1,0 +1,222 @@
+//! What a path-traced picture has so far, as bytes, so that it goes on from there and ends with the same bits. Not the files that keep them.
+//!
+//! ```text
+//!   magic      8 bytes   "LUMBRETR"
+//!   version    u32       VERSION; everything is little endian
+//!   identity  96 bytes   BLAKE3 of the program's version, of the scene, of the view and the options
+//!   checksum  32 bytes   BLAKE3 of all that follows
+//!   round      u32       rounds that are complete
+//!   shares     u8        whether samples are distributed by noise already
+//!   pixels               of each: sum, means and squares of its passes (3 f64 each), the brightest sample (f64), passes, samples, rays (u32)
+//!   light                of each auxiliary picture of light: of each pixel its sum (3 f64)
+//!   shares               f64 of each pixel, if there are any
+//! ```
+//!
+//! A pass of a pixel depends on the pixel and the pass alone, so that the passes of every pixel and the rounds are all the state there is.
+
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use glam::DVec3;
+
+use crate::error::CheckpointError;
+use crate::film::{Film, FilmPixel};
+use crate::fingerprint::{Fingerprint, of_debug};
+use crate::light_aovs::LightAovs;
+use crate::options::Ended;
+use crate::sample_distribution::SampleDistribution;
+use crate::view::View;
+
+/// A picture of paths between two passes, or within one.
+#[derive(Debug)]
+pub(crate) struct PathState {
+    /// Rounds that are complete; some pixels may have passes of the next.
+    pub round: u32,
+    pub film: Film,
+    pub distribution: Option<SampleDistribution>,
+}
+
+/// Takes the bytes of a checkpoint, to keep them somewhere.
+pub type Keep<'a> = dyn Fn(&[u8]) + Sync + 'a;
+
+/// How a picture is continued: from what, and what becomes of its samples. Only paths are; a ray tree begins anew.
+#[derive(Clone, Copy, Default)]
+pub struct Continuation<'a> {
+    /// What an earlier run of the same picture has kept.
+    pub from: Option<&'a [u8]>,
+    /// Is given what the picture has: whenever `interval` is over, and where the picture was interrupted.
+    pub keep: Option<&'a Keep<'a>>,
+    /// Is given it where the picture ended as it was asked to, too, so that a later run can go on with more samples.
+    pub keep_complete: bool,
+    /// Time between two.
+    pub interval: Duration,
+}
+
+/// Gives away what a picture has, and takes it back.
+pub(crate) struct Keeper<'a> {
+    view: &'a View,
+    aovs: &'a LightAovs,
+    continuation: Continuation<'a>,
+    /// Found when it is first needed: a scene with large textures takes a while.
+    identity: OnceLock<[Fingerprint; 3]>,
+}
+
+impl<'a> Keeper<'a> {
+    pub fn new(view: &'a View, aovs: &'a LightAovs, continuation: &Continuation<'a>) -> Self {
+        Self { view, aovs, continuation: *continuation, identity: OnceLock::new() }
+    }
+
+    /// What an earlier run has kept.
+    ///
+    /// # Errors
+    /// [`CheckpointError`].
+    pub fn kept(&self) -> Result<Option<PathState>, CheckpointError> {
+        let from = self.continuation.from;
+        from.map(|bytes| from_bytes(bytes, self.view, self.aovs, self.identity())).transpose()
+    }
+
+    /// Time between two.
+    pub fn interval(&self) -> Duration {
+        self.continuation.interval
+    }
+
+    pub fn keep(&self, state: &PathState) {
+        if let Some(keep) = self.continuation.keep {
+            keep(&bytes(state, self.identity()));
+        }
+    }
+
+    pub fn keep_at_end(&self, state: &PathState, ended: Ended) {
+        if self.continuation.keep_complete || ended == Ended::Interrupted {
+            self.keep(state);
+        }
+    }
+
+    fn identity(&self) -> &[Fingerprint; 3] {
+        self.identity.get_or_init(|| identity(self.view, self.aovs))
+    }
+}
+
+const MAGIC: &[u8; 8] = b"LUMBRETR";
+/// Of the format, and of what the samples are: raised when the same options take others.
+const VERSION: u32 = 1;
+const HEADER: usize = 8 + 4 + 96 + 32;
+/// Bytes of a pixel.
+const PIXEL: usize = 10 * 8 + 3 * 4;
+
+/// What samples depend on: the program, the scene, the view of it.
+fn identity(view: &View, aovs: &LightAovs) -> [Fingerprint; 3] {
+    let options = &view.options;
+    let asked = (options.size, options.integrator, options.depth, options.shadows, options.filter);
+    let view_and_options = (&view.camera, asked, options.sample_by_noise, &aovs.aovs);
+    [of_debug(&env!("CARGO_PKG_VERSION")), view.scene.fingerprint(), of_debug(&view_and_options)]
+}
+
+fn bytes(state: &PathState, identity: &[Fingerprint; 3]) -> Vec<u8> {
+    let mut body = Vec::with_capacity(5 + state.film.pixels.len() * PIXEL);
+    let color = |body: &mut Vec<u8>, color: DVec3| {
+        color.to_array().iter().for_each(|value| body.extend(value.to_le_bytes()));
+    };
+    body.extend(state.round.to_le_bytes());
+    body.push(u8::from(state.distribution.is_some()));
+    for pixel in &state.film.pixels {
+        [pixel.sum, pixel.means, pixel.squares].into_iter().for_each(|value| color(&mut body, value));
+        body.extend(pixel.brightest.to_le_bytes());
+        [pixel.passes, pixel.samples, pixel.rays].iter().for_each(|count| body.extend(count.to_le_bytes()));
+    }
+    for sums in &state.film.light {
+        sums.iter().for_each(|sum| color(&mut body, *sum));
+    }
+    for share in state.distribution.iter().flat_map(|found| found.shares()) {
+        body.extend(share.to_le_bytes());
+    }
+    let mut file = Vec::with_capacity(HEADER + body.len());
+    file.extend(MAGIC);
+    file.extend(VERSION.to_le_bytes());
+    identity.iter().for_each(|part| file.extend(part));
+    file.extend(blake3::hash(&body).as_bytes());
+    file.extend(body);
+    file
+}
+
+/// What was kept, if it is of this picture.
+fn from_bytes(
+    file: &[u8],
+    view: &View,
+    aovs: &LightAovs,
+    [program, scene, options]: &[Fingerprint; 3],
+) -> Result<PathState, CheckpointError> {
+    let mut left = Left(file);
+    let magic = left.take(8).ok_or(CheckpointError::NotSamples)?;
+    if magic != MAGIC {
+        return Err(CheckpointError::NotSamples);
+    }
+    let version = left.number32().ok_or(CheckpointError::Damaged)?;
+    let parts = [(); 3].map(|()| left.take(32));
+    let checksum = left.take(32).ok_or(CheckpointError::Damaged)?;
+    if version != VERSION || parts[0] != Some(&program[..]) {
+        return Err(CheckpointError::Version);
+    }
+    if blake3::hash(left.0).as_bytes()[..] != *checksum {
+        return Err(CheckpointError::Damaged);
+    }
+    if parts[1] != Some(&scene[..]) {
+        return Err(CheckpointError::Scene);
+    }
+    if parts[2] != Some(&options[..]) {
+        return Err(CheckpointError::Options);
+    }
+    state(left, view, aovs).ok_or(CheckpointError::Damaged)
+}
+
+fn state(mut left: Left<'_>, view: &View, aovs: &LightAovs) -> Option<PathState> {
+    let mut film = Film::new(view.size(), aovs.aovs.len());
+    let round = left.number32()?;
+    let distributed = left.take(1)? == [1];
+    for pixel in &mut film.pixels {
+        *pixel = FilmPixel {
+            sum: left.color()?,
+            means: left.color()?,
+            squares: left.color()?,
+            brightest: left.number64()?,
+            passes: left.number32()?,
+            samples: left.number32()?,
+            rays: left.number32()?,
+            ..FilmPixel::default()
+        };
+    }
+    for sums in &mut film.light {
+        for sum in sums {
+            *sum = left.color()?;
+        }
+    }
+    let mut distribution = None;
+    if distributed {
+        let shares = (0..film.pixels.len()).map(|_| left.number64()).collect::<Option<Vec<f64>>>()?;
+        distribution = Some(SampleDistribution::from_shares(shares));
+    }
+    left.0.is_empty().then_some(PathState { round, film, distribution })
+}
+
+/// Bytes that were not read yet.
+struct Left<'a>(&'a [u8]);
+
+impl<'a> Left<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, left) = self.0.split_at_checked(count)?;
+        self.0 = left;
+        Some(taken)
+    }
+
+    fn number32(&mut self) -> Option<u32> {
+        self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
+    }
+
+    fn number64(&mut self) -> Option<f64> {
+        self.take(8).and_then(|bytes| bytes.try_into().ok()).map(f64::from_le_bytes)
+    }
+
+    fn color(&mut self) -> Option<DVec3> {
+        Some(DVec3::new(self.number64()?, self.number64()?, self.number64()?))
+    }
+}

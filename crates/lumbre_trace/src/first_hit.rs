@@ -1,0 +1,95 @@
+//! What is seen first: the surface through a place of the picture, and auxiliary pictures of all of them. Not the light on it.
+
+use glam::{DVec2, DVec3};
+
+use crate::coplanar::nearest_surface;
+use crate::geometry::Crossing;
+use crate::surface_point::SurfacePoint;
+use crate::tiles::for_every_pixel;
+use crate::view::{View, pixel_middle};
+
+/// What is seen through a place of the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstHit {
+    /// What people call the object.
+    pub object: String,
+    /// In the world, metres.
+    pub position: DVec3,
+    /// Unit normal that is lit.
+    pub normal: DVec3,
+    /// Metres along the line of sight.
+    pub depth: f64,
+    /// k_d with its textures, linear RGB.
+    pub albedo: DVec3,
+    /// Radiance that the surface sends by itself.
+    pub emission: DVec3,
+}
+
+impl FirstHit {
+    /// Through a place in pixels from the upper left corner; nothing where the background is.
+    pub(crate) fn through(view: &View, place: DVec2) -> Option<Self> {
+        let point = first_point(view, place)?;
+        Some(Self {
+            object: view.scene.objects[point.object].name.clone(),
+            position: point.position + view.scene.origin,
+            normal: point.normal,
+            depth: view.camera.depth(point.position),
+            albedo: point.surface.diffuse,
+            emission: point.emission,
+        })
+    }
+}
+
+/// What is seen first through every pixel.
+#[derive(Clone, Debug)]
+pub(crate) struct FirstHits {
+    /// k_d and unit normal, averaged over samples, 0 where they see the background.
+    pub albedo: Vec<DVec3>,
+    pub normals: Vec<DVec3>,
+    /// Metres along the line of sight through the middle; infinite where that sees the background.
+    pub depths: Vec<f64>,
+}
+
+/// Samples of a pixel at most: edges are smooth enough by then.
+const MOST_SAMPLES: u32 = 16;
+
+impl FirstHits {
+    /// By the places of the picture's own first samples.
+    pub fn of(view: &View) -> Self {
+        let samples = view.options.samples.unwrap_or(MOST_SAMPLES).min(MOST_SAMPLES);
+        let (width, height) = view.size();
+        let pixel = |x: usize, y: usize| {
+            let (mut albedo, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+            for index in 0..samples {
+                let (_, place, sign) = view.sample_place((x, y), 0, index);
+                weight += sign;
+                if let Some(point) = first_point(view, place) {
+                    albedo += point.surface.diffuse * sign;
+                    normal += point.normal * sign;
+                }
+            }
+            let middle = first_point(view, pixel_middle(x, y));
+            let depth = middle.map_or(f64::INFINITY, |point| view.camera.depth(point.position));
+            // Samples whose signs cancel say nothing of the pixel.
+            let mean = |sum: DVec3| if weight.abs() > 1e-6 { sum / weight } else { DVec3::ZERO };
+            (mean(albedo), mean(normal), depth)
+        };
+        let count = width * height;
+        let (mut albedo, mut normals) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
+        let mut depths = vec![f64::INFINITY; count];
+        for (square, values) in for_every_pixel((width, height), pixel, || false, |_| {}) {
+            for ((x, y), found) in square.pixels().zip(values.into_iter().flatten()) {
+                let at = y * width + x;
+                (albedo[at], normals[at], depths[at]) = found;
+            }
+        }
+        Self { albedo, normals, depths }
+    }
+}
+
+fn first_point(view: &View, place: DVec2) -> Option<SurfacePoint> {
+    let (camera, scene) = (view.camera.through(place), &view.scene);
+    let seen = |crossing: &Crossing| scene.is_seen(crossing);
+    let meeting = nearest_surface(scene, &camera.ray, camera.farthest, seen)?;
+    Some(SurfacePoint::new(scene, &camera.ray, &meeting))
+}

@@ -1,0 +1,103 @@
+//! How light falls to auxiliary pictures: which terms of a sample each of them takes, and what the sources are called. Not the pictures.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use crate::TraceError;
+use crate::aov::{Aov, LightPart};
+use crate::light_terms::{Source, Term};
+use crate::options::Integrator;
+use crate::scene::{Object, Scene};
+
+/// Names of sources that are neither lights nor objects.
+const BACKGROUND: &str = "background";
+const AMBIENT: &str = "ambient";
+const BAKED: &str = "baked";
+/// The pictures of light that are asked for: which terms of a sample fall to each.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LightAovs {
+    pub aovs: Vec<Aov>,
+    /// Of each, its part and its sources, all without a list.
+    taken: Vec<(Option<LightPart>, Option<Vec<Source>>)>,
+}
+
+impl LightAovs {
+    /// Those of `asked`, with every source by its name.
+    ///
+    /// # Errors
+    /// [`TraceError::NoSuchSource`].
+    pub fn new(asked: &[Aov], scene: &Scene, integrator: Integrator) -> Result<Self, TraceError> {
+        let named = named_sources(scene, integrator);
+        let mut found = Self::default();
+        for aov in asked {
+            match aov {
+                Aov::Light(part) => found.take(aov.clone(), Some(*part), None),
+                Aov::Source { name, part } => {
+                    let sources = sources_of(&named, name);
+                    if sources.is_empty() {
+                        let known: BTreeSet<&str> = named.iter().map(|(name, _)| name.as_str()).collect();
+                        let known = known.into_iter().map(|name| format!("\"{name}\""));
+                        let known = known.collect::<Vec<_>>().join(", ");
+                        return Err(TraceError::NoSuchSource { name: name.clone(), known });
+                    }
+                    found.take(aov.clone(), *part, Some(sources));
+                }
+                Aov::EverySource { part } => {
+                    let mut told = BTreeSet::new();
+                    for (name, _) in named.iter().filter(|(name, _)| told.insert(name.clone())) {
+                        let own = Aov::Source { name: name.clone(), part: *part };
+                        found.take(own, *part, Some(sources_of(&named, name)));
+                    }
+                }
+                Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Rays => {}
+            }
+        }
+        Ok(found)
+    }
+
+    fn take(&mut self, aov: Aov, part: Option<LightPart>, sources: Option<Vec<Source>>) {
+        if !self.aovs.contains(&aov) {
+            self.aovs.push(aov);
+            self.taken.push((part, sources));
+        }
+    }
+
+    pub fn are_wanted(&self) -> bool {
+        !self.aovs.is_empty()
+    }
+
+    /// Adds the terms of a sample to what each picture has of a pixel, times the sample's weight.
+    pub fn add<'t>(&self, sums: &mut Vec<DVec3>, terms: impl Iterator<Item = &'t Term>, weight: f64) {
+        sums.resize(self.aovs.len(), DVec3::ZERO);
+        for term in terms {
+            for (sum, (part, sources)) in sums.iter_mut().zip(&self.taken) {
+                let of_part = part.is_none_or(|part| part.holds(term.turns));
+                if of_part && sources.as_ref().is_none_or(|sources| sources.contains(&term.source)) {
+                    *sum += term.radiance * weight;
+                }
+            }
+        }
+    }
+}
+
+/// Every source that a picture may have light of, by its name; several may have the same.
+fn named_sources(scene: &Scene, integrator: Integrator) -> Vec<(String, Source)> {
+    let lights =
+        scene.lights.iter().enumerate().map(|(number, placed)| (placed.name.clone(), Source::Light(number)));
+    let shining = |object: &Object| object.glows() || object.material.unlit;
+    let objects = scene.objects.iter().enumerate().filter(|(_, object)| shining(object));
+    let objects = objects.map(|(number, object)| (object.name.clone(), Source::Object(number)));
+    let others = [
+        (BACKGROUND, Source::Background, true),
+        // Paths find that light themselves.
+        (AMBIENT, Source::Ambient, integrator == Integrator::Whitted),
+        (BAKED, Source::Baked, integrator == Integrator::Whitted && scene.has_baked_light()),
+    ];
+    let others = others.into_iter().filter(|(.., there)| *there);
+    lights.chain(objects).chain(others.map(|(name, source, _)| (name.to_owned(), source))).collect()
+}
+
+fn sources_of(named: &[(String, Source)], wanted: &str) -> Vec<Source> {
+    named.iter().filter(|(name, _)| name == wanted).map(|(_, source)| *source).collect()
+}
