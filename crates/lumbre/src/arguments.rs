@@ -93,6 +93,7 @@ Examples:
     #[command(after_help = "\
 Studies:
   shading        flat, Gouraud and Phong shading
+  need           shading by need over the error allowed
   lamps          many lights, and how they are found
   effects        every effect of a scene, switched off in turn
   bake           the error that a bake is asked for

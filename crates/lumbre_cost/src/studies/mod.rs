@@ -9,6 +9,7 @@ mod precision;
 mod preprocessing;
 mod reflection;
 mod shading;
+mod shading_by_need;
 
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
@@ -29,6 +30,7 @@ pub struct StudyKind {
 /// All studies, in the order of the page.
 pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "shading", about: "flat, Gouraud and Phong shading", run: shading::run },
+    StudyKind { name: "need", about: "shading by need over the error allowed", run: shading_by_need::run },
     StudyKind { name: "lamps", about: "many lights, and how they are found", run: lamps::run },
     StudyKind { name: "effects", about: "every effect of a scene, switched off in turn", run: effects::run },
     StudyKind { name: "bake", about: "the error that a bake is asked for", run: bake::run },

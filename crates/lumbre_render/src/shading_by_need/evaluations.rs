@@ -63,24 +63,24 @@ impl Evaluations {
     }
 }
 
-/// Pixels within the outline of an object's box, at most those of the frame.
+/// Pixels within the bounding rectangle of an object's box, at most those of the frame.
 fn pixels(Place { center, half_size: half, radius }: Place, view: &SizedView) -> f64 {
     let [width, height] = view.size.map(f64::from);
     // Of the box seen from a direction, in square metres: of each pair of faces one is seen.
-    let outline = |direction: DVec3| {
+    let projected = |direction: DVec3| {
         4.0 * DVec3::new(half.y * half.z, half.x * half.z, half.x * half.y).dot(direction.abs())
     };
     let (area, wide, high) = match view.view.volume {
         ViewVolume::Perspective { half_width, half_height, .. } => {
-            let way = center - view.view.eye;
-            let distance = way.length();
+            let to_center = center - view.view.eye;
+            let distance = to_center.length();
             if distance <= radius {
                 return width * height;
             }
-            (outline(way / distance) / (distance * distance), half_width, half_height)
+            (projected(to_center / distance) / (distance * distance), half_width, half_height)
         }
         ViewVolume::Orthographic { half_width, half_height, .. } => {
-            (outline(view.view.basis.z_axis), half_width, half_height)
+            (projected(view.view.basis.z_axis), half_width, half_height)
         }
     };
     (area * (0.25 * width * height / (wide * high)).abs()).min(width * height)

@@ -1,0 +1,136 @@
+//! Shading by need over the error that it is allowed: how many objects take less than Phong shading, what that spares, and how far the picture is then. Not the bounds
+//! themselves: those are the renderer's.
+
+use lumbre_optics::{ErrorBound, Shading};
+use lumbre_render::{FrameOptions, ShadingNeeds};
+
+use super::over_scenes;
+use crate::findings::{is_above_one, ratio_of, rounded, short};
+use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::measured::Measured;
+use crate::scene_file::SceneFile;
+use crate::scenes::Air;
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
+
+/// Errors that are allowed, in displayed light from 0 to 1.
+const BOUNDS: &[f32] = &[0.001, 0.003, 0.01, 0.03, 0.1, 0.3];
+const FEW_BOUNDS: &[f32] = &[0.01, 0.1];
+const SECONDS: f64 = 8.0;
+const BOUND: &str = "error allowed";
+const BY_NEED: &str = "by need";
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    over_scenes(conditions, study(), ("room", Air::Clear), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
+}
+
+fn study() -> Study {
+    Study {
+        name: "need".into(),
+        title: "Shading by need".into(),
+        question: "Each object shaded as rarely as an error allows that is known beforehand: what does it spare, and how far is the picture then?".into(),
+        reference: "the frame with Phong shading throughout; the largest difference is of a pixel and channel".into(),
+        plots: vec![Plot {
+            title: "Error against time".into(),
+            across: Quantity::Milliseconds,
+            up: Quantity::Error,
+            front: true,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    told: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let bounds = conditions.unless_quick(BOUNDS, FEW_BOUNDS).iter().copied().filter_map(ErrorBound::new);
+    let by_need = bounds.map(|max_error| Shading::Auto { max_error });
+    let all: Vec<Shading> =
+        [Shading::Phong, Shading::Gouraud, Shading::Flat].into_iter().chain(by_need).collect();
+    let mut frames = Vec::new();
+    for shading in &all {
+        let options = FrameOptions { shading: Some(*shading), ..FrameOptions::default() };
+        frames.push(Frame::new(scene.open(conditions.aspect())?, options));
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, told)?;
+    let reference = measured.keep_reference(&format!("{} Phong", scene.name), drawn[0].picture.clone());
+    let first = measured.study.points.len();
+    for (shading, frame) in all.iter().zip(&drawn) {
+        let point = point(conditions, scene, *shading, frame);
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    let findings = findings(&scene.name, &measured.study.points[first..], &drawn);
+    measured.study.findings.extend(findings);
+    Ok(())
+}
+
+fn point(conditions: &Conditions<'_>, scene: &SceneFile, shading: Shading, frame: &DrawnFrame) -> Point {
+    let (series, label, bound) = match shading {
+        Shading::Flat => ("flat", "flat".to_owned(), None),
+        Shading::Gouraud => ("Gouraud", "Gouraud".to_owned(), None),
+        Shading::Phong => ("Phong", "Phong".to_owned(), None),
+        Shading::Auto { max_error } => {
+            let bound = f64::from(max_error.get());
+            (BY_NEED, format!("within {}", short(bound)), Some(bound))
+        }
+    };
+    let mut counts = frame.counts();
+    if bound.is_some() {
+        let ShadingNeeds { flat, gouraud, phong, .. } = frame.statistics.shading_by_need;
+        for (name, count) in [("flat", flat), ("Gouraud", gouraud), ("Phong", phong)] {
+            counts.insert(format!("objects with {name} shading"), count as f64);
+        }
+    }
+    Point {
+        series: if conditions.files.len() > 1 {
+            format!("{series}, {}", scene.name)
+        } else {
+            series.to_owned()
+        },
+        label,
+        parameters: bound.map(|bound| (BOUND.to_owned(), bound)).into_iter().collect(),
+        milliseconds: frame.spread(),
+        counts,
+        command: format!(
+            "lumbre render {} -o frame.exr --shading {shading} --size {} --frames 20 --timings times.json",
+            scene.in_commands(),
+            conditions.size_text()
+        ),
+        ..Point::default()
+    }
+}
+
+fn findings(scene: &str, points: &[Point], drawn: &[DrawnFrame]) -> Vec<String> {
+    let Some(phong) = drawn.first() else { return Vec::new() };
+    let mut findings = Vec::new();
+    for (point, frame) in points.iter().zip(drawn) {
+        let Some(bound) = point.parameters.get(BOUND) else { continue };
+        let ShadingNeeds { flat, gouraud, phong: every_fragment, .. } = frame.statistics.shading_by_need;
+        let all = flat + gouraud + every_fragment;
+        let Some(ratio) = ratio_of(&frame.times, &phong.times) else { continue };
+        let decided = match is_above_one(&ratio) {
+            Some(_) => "",
+            None => ", which is not told apart from 1",
+        };
+        let largest = point.error.map_or(0.0, |error| error.largest);
+        findings.push(format!(
+            "Where {} is allowed, {} of {all} objects in view of the {scene} take less than Phong shading: {} of its time ({} to {}){decided}, and {} off at most.",
+            short(*bound),
+            flat + gouraud,
+            rounded(ratio.median),
+            rounded(ratio.lower),
+            rounded(ratio.upper),
+            short(largest)
+        ));
+    }
+    findings
+}
