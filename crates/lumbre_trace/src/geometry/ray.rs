@@ -48,7 +48,6 @@ impl SpaceRay {
     }
 
     /// For triangles, whose corners are f32.
-    #[inline]
     pub fn for_triangles(&self, farthest: f64) -> Ray {
         let direction: Vec3 = self.direction.as_vec3();
         Ray { origin: self.start_off_triangles(), direction, t_min: 0.0, t_max: farthest as f32 }
