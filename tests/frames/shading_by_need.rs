@@ -39,6 +39,7 @@ struct Compared {
 }
 
 /// Draws a scene at all bounds with one renderer, so that what it keeps of predictions is under test too, and compares.
+#[allow(clippy::print_stdout, reason = "what is predicted, beside what is so")]
 fn compared(name: &str, world: &mut World, (width, height): (u32, u32), options: &FrameOptions) -> Compared {
     let mut canvas = Canvas::new(width, height);
     let mut shaded =
