@@ -8,13 +8,11 @@ use std::sync::Mutex;
 use anyhow::bail;
 use lumbre::bake::Progress;
 use lumbre::cost::{CostError, DrawSettings, Goal, PAGE, TuneOptions, Tuned, tune};
-use lumbre::optics::Light;
 use lumbre::render::Gpu;
-use lumbre::scene::{SaveOptions, SceneSettings, save_baked};
+use lumbre::scene::{FileSettings, save_settings};
 
-use crate::arguments::{Reading, Tune};
+use crate::arguments::Tune;
 use crate::interruption::Interruption;
-use crate::loading::{Loaded, load_source};
 use crate::progress::Shown;
 
 /// Width and height of the frames where none is asked for: whole, and quick.
@@ -83,13 +81,8 @@ fn print(tuned: &Tuned, asked: &Tune) -> anyhow::Result<()> {
 
 /// Writes the level again with the settings that a file can hold: the scene's shading, and no light with a shadow where shadows are not worth it.
 fn write(settings: &DrawSettings, asked: &Tune, output: &Path) -> anyhow::Result<()> {
-    let (source, Loaded { mut world, .. }) = load_source(&asked.input, &Reading::default())?;
-    world.get_resource_or_insert_with(SceneSettings::default).shading = settings.shading;
-    if !settings.shadows {
-        let mut lights = world.query::<&mut Light>();
-        lights.iter_mut(&mut world).for_each(|mut light| light.shadow = false);
-    }
-    save_baked(&mut world, &source, output, &SaveOptions::default())?;
+    let DrawSettings { shading, shadows, .. } = *settings;
+    save_settings(&asked.input, output, FileSettings { shading, shadows })?;
     let samples =
         if settings.multisample { "; four samples a pixel are the program's choice (--msaa)" } else { "" };
     eprintln!("lumbre: {} has these settings{samples}", output.display());

@@ -161,6 +161,27 @@ fn a_level_with_the_settings_that_keep_a_time() {
     let shadow = lights.iter(&read).next().unwrap().shadow;
     assert_eq!(shadow, !command.contains("--no-shadows"), "{command}");
 
+    // Everything else is as it was: the buffers, and what any program has put into the JSON.
+    let parts = |path: &Path| {
+        let bytes = std::fs::read(path).unwrap();
+        let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        let json: serde_json::Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+        (json, bytes[20 + length..].to_vec())
+    };
+    let ((mut before, buffers), (mut after, same)) = (parts(&level), parts(&tuned));
+    assert_eq!(buffers, same);
+    for json in [&mut before, &mut after] {
+        json["scenes"][0]["extensions"]["LUMBRE_scene"]["shading"] = "".into();
+        json["extensions"]["KHR_lights_punctual"]["lights"][0]["extensions"]["LUMBRE_lights_phong"]["shadow"] =
+            "".into();
+    }
+    assert_eq!(before, after);
+    let gltf = folder.path().join("tuned.gltf");
+    let output =
+        lumbre(&["tune", text(&level), "--quick", "--size", "48x32", "--error", "1000", "-o", text(&gltf)]);
+    assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
+    assert!(stderr(&output).contains("the same ending"), "{}", stderr(&output));
+
     // Without a goal there is nothing to write.
     let output = lumbre(&["tune", text(&level), "-o", text(&tuned)]);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));

@@ -186,7 +186,9 @@ fn tuning_finds_a_planted_optimum() {
     assert!(cheap.settings.iter().all(|settings| settings.shadows));
     assert_eq!(read_report(&report).unwrap().study("tune"), Some(&cheap.study));
     let exact = tuned(Goal { milliseconds: Some(1e6), error: Some(1e-4) }, None);
-    assert_eq!(exact.settings[exact.chosen.unwrap()].shading, Shading::Phong, "{:?}", exact.study.findings);
+    // By need it may be Phong shading all the same, and is then as good.
+    let shading = exact.settings[exact.chosen.unwrap()].shading;
+    assert!(matches!(shading, Shading::Phong | Shading::Auto { .. }), "{:?}", exact.study.findings);
     let none = tuned(Goal { milliseconds: Some(1e-6), error: None }, None);
     assert!(
         none.chosen.is_none() && none.study.findings[1].contains("Nothing keeps"),
@@ -285,5 +287,5 @@ fn an_interruption_keeps_the_studies_that_are_finished() {
 #[test]
 fn a_study_that_there_is_none_of_is_refused_by_name() {
     let error = studies_named(&["shading".into(), "shadnig".into()]).unwrap_err().to_string();
-    assert!(error.contains("`shadnig`") && error.contains("shading, lamps"), "{error}");
+    assert!(error.contains("`shadnig`") && error.contains("shading, need, lamps"), "{error}");
 }

@@ -66,9 +66,9 @@ pub use components::{
 pub use default_camera::default_camera;
 pub use default_light::{add_default_light, is_without_light};
 pub use gltf::{
-    LightmapFile, LoadError, LoadLimits, LoadOptions, LoadProblem, LoadReport, Note, SUPPORTED_EXTENSIONS,
-    SaveError, SaveOptions, SaveReport, SourceFile, load, load_slice, load_slice_within, load_with, save,
-    save_baked, save_with,
+    FileSettings, LightmapFile, LoadError, LoadLimits, LoadOptions, LoadProblem, LoadReport, Note,
+    SUPPORTED_EXTENSIONS, SaveError, SaveOptions, SaveReport, SourceFile, load, load_slice,
+    load_slice_within, load_with, save, save_baked, save_settings, save_with,
 };
 pub use hidden_cone::{HiddenCone, hidden_cones};
 pub use image::{Image, LightmapEncoding, LightmapImage, Mipmap, Sampler, TextureReference, Wrap};

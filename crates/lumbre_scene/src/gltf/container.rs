@@ -2,7 +2,7 @@
 
 use super::error::{LoadProblem, Notes};
 
-const MAGIC: &[u8; 4] = b"glTF";
+pub(crate) const MAGIC: &[u8; 4] = b"glTF";
 const JSON: u32 = 0x4E4F_534A;
 const BIN: u32 = 0x004E_4942;
 

@@ -15,6 +15,13 @@ pub struct LoadError {
     pub problem: Box<LoadProblem>,
 }
 
+impl LoadError {
+    /// Of a file.
+    pub(crate) fn of(file: &std::path::Path, problem: LoadProblem) -> Self {
+        Self { file: file.display().to_string(), problem: problem.into() }
+    }
+}
+
 /// A problem, which does not name the file again if it is the one that cannot be read.
 fn described(file: &str, problem: &LoadProblem) -> String {
     match problem {

@@ -9,7 +9,7 @@ use lumbre_mesh::MeshError;
 use lumbre_optics::{FogError, LightError, MaterialError};
 use serde_json::{Map, Value, json};
 
-use super::error::Note;
+use super::error::{LoadError, Note};
 use super::export_files::Files;
 use super::export_nodes::Nodes;
 use super::{container, export_scene, uri};
@@ -64,6 +64,21 @@ pub enum SaveError {
     #[error("{} ends in neither .glb nor .gltf; name the output with one of them", path.display())]
     Extension {
         /// The name.
+        path: PathBuf,
+    },
+    /// A .glb is to become a .gltf, or the other way round, where everything is to stay as it is.
+    #[error("{} is of the other kind than its source; give it the same ending, .glb or .gltf", path.display())]
+    Container {
+        /// The output.
+        path: PathBuf,
+    },
+    /// The file that is to be written again cannot be read.
+    #[error(transparent)]
+    Source(LoadError),
+    /// A file without a scene has no place for settings.
+    #[error("{} has no scene that could hold the settings; give it one", path.display())]
+    NoScene {
+        /// The file.
         path: PathBuf,
     },
     /// A file cannot be written.

@@ -35,7 +35,7 @@ use crate::{IrradianceVolume, Lightmap, LightmapImage, Mesh, Name, Primitive, Sc
 ///   that share a mesh and need different coordinates get meshes of their own.
 /// - `"bake": "static"` of lights whose light is in the maps.
 /// - `LUMBRE_irradiance_volume` of nodes, and new nodes for volumes that had none.
-/// - `LUMBRE_scene.sky` and `.shading`, and a light's `shadow`, where the World's are others.
+/// - `LUMBRE_scene.sky`, if the World's is another.
 /// - `extensionsUsed`.
 ///
 /// New data lie behind the old, so that indices of the file stay valid. Nothing else of the World is written. A .gltf keeps its buffers
@@ -69,8 +69,7 @@ pub fn save_baked(
     baked.meshes(world)?;
     baked.lights(world);
     baked.volumes(world)?;
-    baked.shadows(world);
-    baked.scene_settings(world)?;
+    baked.sky(world)?;
     baked.extensions_used();
     let Baked { mut patch, lightmaps, primitives, .. } = baked;
     let (data, mut notes) = (primitives.data, primitives.notes);
@@ -340,59 +339,21 @@ impl Baked<'_> {
         self.document().scene.unwrap_or(0)
     }
 
-    /// Whether lights cast shadows in frames, where that was changed since the file was loaded.
-    fn shadows(&mut self, world: &World) {
-        for (node, entity) in self.entities(world) {
-            let Some(light) = world.get::<Light>(entity) else { continue };
-            let of = &self.document().nodes[node].extensions;
-            let Ok(Some(LightReference { light: index })) =
-                extension::<LightReference>(of, "KHR_lights_punctual", "")
-            else {
-                continue;
-            };
-            let at = place![
-                "extensions",
-                "KHR_lights_punctual",
-                "lights",
-                index,
-                "extensions",
-                "LUMBRE_lights_phong"
-            ];
-            let shadow = [&at[..], &place!["shadow"]].concat();
-            let own = self.patch.get(&shadow).and_then(Value::as_bool).unwrap_or(false);
-            if own == light.shadow {
-                continue;
-            }
-            if self.patch.get(&at).is_some() {
-                self.patch.set(&shadow, light.shadow.into());
-            } else if let Ok(written) = serde_json::to_value(phong(light, light.spot)) {
-                self.patch.set(&at, written);
-            }
-            self.used.insert("LUMBRE_lights_phong");
-        }
-    }
-
-    /// The sky and the shading of objects that choose none, where they were changed since the file was loaded.
-    fn scene_settings(&mut self, world: &World) -> Result<(), SaveError> {
+    /// The sky, if it was changed since the file was loaded.
+    fn sky(&mut self, world: &World) -> Result<(), SaveError> {
         let Some(settings) = world.get_resource::<SceneSettings>() else { return Ok(()) };
         let scene = self.document().scene.unwrap_or(0);
-        let own = import_scene::settings(self.document(), scene).ok();
-        let mut changed: Vec<(&str, Value)> = Vec::new();
-        if own.as_ref().is_none_or(|own| own.sky != settings.sky) {
-            if !settings.sky.is_finite() {
-                let (place, field) = ("scene".to_owned(), "sky".to_owned());
-                return Err(SaveError::NotFinite { place, field });
-            }
-            changed.push(("sky", json!(super::export_material::color(settings.sky))));
+        if import_scene::settings(self.document(), scene).is_ok_and(|own| own.sky == settings.sky) {
+            return Ok(());
         }
-        if own.as_ref().is_none_or(|own| own.shading != settings.shading) {
-            changed.push(("shading", settings.shading.to_string().into()));
+        if !settings.sky.is_finite() {
+            let (place, field) = ("scene".to_owned(), "sky".to_owned());
+            return Err(SaveError::NotFinite { place, field });
         }
-        for (field, value) in changed {
-            let scene = self.scene();
-            self.patch.set(&place!["scenes", scene, "extensions", "LUMBRE_scene", field], value);
-            self.used.insert("LUMBRE_scene");
-        }
+        let scene = self.scene();
+        let sky = super::export_material::color(settings.sky);
+        self.patch.set(&place!["scenes", scene, "extensions", "LUMBRE_scene", "sky"], json!(sky));
+        self.used.insert("LUMBRE_scene");
         Ok(())
     }
 

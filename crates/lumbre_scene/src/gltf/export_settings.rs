@@ -1,0 +1,89 @@
+//! A file with other settings, and everything else as it was, byte for byte: baked light, animations, what Lumbre does not know. Not a World that is saved.
+
+use std::path::Path;
+
+use lumbre_optics::Shading;
+use serde_json::{Map, Value, json};
+
+use super::error::{LoadError, LoadProblem, Notes};
+use super::export::{SaveError, SaveReport, is_glb};
+use super::export_files::Files;
+use super::{beside, container, document, uri};
+
+/// What [`save_settings`] changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FileSettings {
+    /// Of objects that choose none (`LUMBRE_scene.shading`).
+    pub shading: Shading,
+    /// Whether lights that cast shadows in frames go on to do so (`LUMBRE_lights_phong.shadow`).
+    pub shadows: bool,
+}
+
+/// Writes a .glb or .gltf again with these settings. In another folder the files that it names are copied beside it.
+///
+/// # Errors
+/// [`SaveError::Source`] where the file cannot be read, [`SaveError::Container`] where a .glb would have to become a .gltf or the other way round,
+/// [`SaveError::NoScene`] where there is nothing that holds the settings; or as [`save`](super::save()). Nothing half-written is left behind.
+pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Result<SaveReport, SaveError> {
+    let unread = |problem: LoadProblem| SaveError::Source(LoadError::of(source, problem));
+    let mut notes = Notes::default();
+    let bytes = uri::read(source).map_err(unread)?;
+    let parts = container::split(&bytes, &mut notes).map_err(unread)?;
+    let mut root = Value::Object(document::parse(parts.json).map_err(unread)?);
+    let binary = is_glb(path)?;
+    if binary != bytes.starts_with(container::MAGIC) {
+        return Err(SaveError::Container { path: path.to_owned() });
+    }
+    set_shading(&mut root, settings.shading).ok_or_else(|| SaveError::NoScene { path: source.to_owned() })?;
+    if !settings.shadows {
+        without_shadows(&mut root);
+    }
+    let mut files = Files::default();
+    let base = uri::Base { folder: Some(source.parent().unwrap_or(Path::new(""))), root: None };
+    let copied = beside::copy(&mut root, base, path, &mut files)?;
+    notes.list.extend(copied.notes.list);
+    let failed = |source| SaveError::Json { source };
+    let file = match binary {
+        true => {
+            let others: Vec<(u32, Vec<u8>)> =
+                parts.others.iter().map(|(kind, bytes)| (*kind, bytes.to_vec())).collect();
+            let text = serde_json::to_vec(&root).map_err(failed)?;
+            container::join(&text, parts.binary.unwrap_or_default(), &others)
+                .ok_or_else(|| SaveError::TooLarge { path: path.to_owned() })?
+        }
+        false => {
+            let mut text = serde_json::to_vec_pretty(&root).map_err(failed)?;
+            text.push(b'\n');
+            text
+        }
+    };
+    files.write(path, &file)?;
+    let bytes = file.len() as u64;
+    Ok(SaveReport { files: files.commit()?, bytes, lightmaps: Vec::new(), notes: notes.list })
+}
+
+/// In the scene that is shown; nothing where there is none.
+fn set_shading(root: &mut Value, shading: Shading) -> Option<()> {
+    let shown = root.get("scene").and_then(Value::as_u64).unwrap_or(0);
+    let scene = root.pointer_mut(&format!("/scenes/{shown}"))?.as_object_mut()?;
+    let extension = object_in(object_in(scene, "extensions")?, "LUMBRE_scene")?;
+    extension.insert("shading".to_owned(), shading.to_string().into());
+    let used = root.as_object_mut()?.entry("extensionsUsed").or_insert_with(|| json!([])).as_array_mut()?;
+    if !used.iter().any(|name| name == "LUMBRE_scene") {
+        used.push("LUMBRE_scene".into());
+    }
+    Some(())
+}
+
+fn object_in<'a>(parent: &'a mut Map<String, Value>, name: &str) -> Option<&'a mut Map<String, Value>> {
+    parent.entry(name).or_insert_with(|| json!({})).as_object_mut()
+}
+
+fn without_shadows(root: &mut Value) {
+    let lights = root.pointer_mut("/extensions/KHR_lights_punctual/lights").and_then(Value::as_array_mut);
+    for light in lights.into_iter().flatten() {
+        if let Some(shadow) = light.pointer_mut("/extensions/LUMBRE_lights_phong/shadow") {
+            *shadow = false.into();
+        }
+    }
+}
