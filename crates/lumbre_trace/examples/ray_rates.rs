@@ -1,6 +1,8 @@
 //! How fast the tracer finds the rays of a picture, beside the bare hierarchy: `cargo run --release -p lumbre_trace --example ray_rates -- FILE
 //! [CAMERA]`.
 
+#![allow(clippy::print_stdout, reason = "the rates are what it is for")]
+
 use std::process::ExitCode;
 
 use bevy_ecs::prelude::*;
