@@ -396,7 +396,7 @@ mod tests {
     #[test]
     fn a_planted_optimum_is_chosen() {
         let points =
-            [point(40.0, 0.0), point(20.0, 0.01), point(19.0, 0.2), point(5.0, 0.4), point(21.0, 0.01)];
+            [point(40.0, 0.0), point(20.0, 0.01), point(19.0, 0.2), point(5.0, 0.4), point(20.2, 0.01)];
         let within = |milliseconds, error| choose(&points, Goal { milliseconds, error });
         assert_eq!(within(Some(100.0), None), Some(0));
         assert_eq!(within(Some(30.0), None), Some(1), "of two with the same error the cheaper");

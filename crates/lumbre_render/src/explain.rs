@@ -19,7 +19,8 @@ use crate::frame_bindings::FrameBindings;
 use crate::frame_graph::{Last, declare};
 use crate::frame_plan::{Ending, FramePlan};
 use crate::shader::Feature;
-use crate::shading_by_need::{Conditions, ShadingNeed, WorldNeeds, is_shaded_by_need};
+use crate::shading_by_need::{Conditions, WorldNeeds, is_shaded_by_need};
+use crate::shading_need::ShadingNeed;
 use crate::{FrameOptions, RenderError, Renderer};
 
 /// A scene's frame, explained.

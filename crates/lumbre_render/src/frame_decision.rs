@@ -15,7 +15,7 @@ use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
 use crate::shader::Feature;
-use crate::shading_by_need::ShadingNeeds;
+use crate::shading_need::ShadingNeeds;
 use crate::{
     FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics, Viewport,
 };

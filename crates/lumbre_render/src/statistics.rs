@@ -2,7 +2,7 @@
 
 use lumbre_graph::ExecutionStages;
 
-use crate::shading_by_need::ShadingNeeds;
+use crate::shading_need::ShadingNeeds;
 
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]

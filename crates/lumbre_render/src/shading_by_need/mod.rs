@@ -10,7 +10,6 @@
 //! ```
 
 mod evaluations;
-mod need;
 mod prediction;
 mod surface;
 mod world_needs;
@@ -23,10 +22,8 @@ use crate::FrameOptions;
 use crate::extract::{CameraView, Lamp, Object, Objects};
 use crate::features::FrameFeatures;
 use crate::mesh_buffers::GpuMesh;
+use crate::shading_need::{Chosen, Reason};
 use evaluations::Evaluations;
-pub(crate) use need::Chosen;
-use need::Reason;
-pub use need::{ShadingNeed, ShadingNeeds};
 use prediction::Prediction;
 use surface::LitSurface;
 pub(crate) use world_needs::WorldNeeds;

@@ -9,10 +9,10 @@ use lumbre_optics::{
 };
 
 use super::Conditions;
-use super::need::Reason;
 use super::surface::{LitSurface, WorldPatch};
 use crate::extract::{CameraView, Lamp, ViewVolume};
 use crate::shader::Feature;
+use crate::shading_need::Reason;
 use crate::texture_sets;
 
 /// A prediction is made for all eyes within this part of the distance to the object: a camera that moves seldom asks for another.

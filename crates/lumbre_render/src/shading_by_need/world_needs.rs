@@ -10,9 +10,10 @@ use lumbre_scene::{GlobalTransform, Mesh, ObjectComponents, ObjectTraits, hidden
 
 use super::evaluations::{Evaluations, MeshSize, Place};
 use super::prediction::Prediction;
-use super::{Chosen, Conditions, LitSurface, ShadingNeed, SizedView, chosen};
+use super::{Conditions, LitSurface, SizedView, chosen};
 use crate::extract::{CameraView, Lamp, Reflectance, find_camera, world_box};
 use crate::mesh_buffers::mesh_box;
+use crate::shading_need::{Chosen, ShadingNeed};
 use crate::{FrameOptions, RenderError};
 
 /// What the objects of a World take, each when it is asked for.

@@ -74,7 +74,7 @@ pub enum SaveError {
     },
     /// The file that is to be written again cannot be read.
     #[error(transparent)]
-    Source(LoadError),
+    Unreadable(LoadError),
     /// A file without a scene has no place for settings.
     #[error("{} has no scene that could hold the settings; give it one", path.display())]
     NoScene {

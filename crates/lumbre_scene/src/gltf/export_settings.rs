@@ -22,10 +22,10 @@ pub struct FileSettings {
 /// Writes a .glb or .gltf again with these settings. In another folder the files that it names are copied beside it.
 ///
 /// # Errors
-/// [`SaveError::Source`] where the file cannot be read, [`SaveError::Container`] where a .glb would have to become a .gltf or the other way round,
+/// [`SaveError::Unreadable`] where the file cannot be read, [`SaveError::Container`] where a .glb would have to become a .gltf or the other way round,
 /// [`SaveError::NoScene`] where there is nothing that holds the settings; or as [`save`](super::save()). Nothing half-written is left behind.
 pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Result<SaveReport, SaveError> {
-    let unread = |problem: LoadProblem| SaveError::Source(LoadError::of(source, problem));
+    let unread = |problem: LoadProblem| SaveError::Unreadable(LoadError::of(source, problem));
     let mut notes = Notes::default();
     let bytes = uri::read(source).map_err(unread)?;
     let parts = container::split(&bytes, &mut notes).map_err(unread)?;

@@ -1,4 +1,4 @@
-//! What was chosen, and why, object by object and grouped for people.
+//! What shading by need chose, and why, object by object and grouped for people: plain data. Not the choice, which is `shading_by_need`.
 
 use std::collections::BTreeMap;
 
