@@ -170,7 +170,10 @@ fn a_level_with_the_settings_that_keep_a_time() {
     };
     let ((mut before, buffers), (mut after, same)) = (parts(&level), parts(&tuned));
     assert_eq!(buffers, same);
+    let used = after["extensionsUsed"].as_array().unwrap();
+    assert!(used.iter().any(|name| name == "LUMBRE_scene"), "{used:?}");
     for json in [&mut before, &mut after] {
+        json["extensionsUsed"] = "".into();
         json["scenes"][0]["extensions"]["LUMBRE_scene"]["shading"] = "".into();
         json["extensions"]["KHR_lights_punctual"]["lights"][0]["extensions"]["LUMBRE_lights_phong"]["shadow"] =
             "".into();
