@@ -29,9 +29,29 @@ pub(crate) fn copy(
     output: &Path,
     files: &mut Files,
 ) -> Result<Copied, SaveError> {
+    copy_named(root, base, output, files, false)
+}
+
+/// As [`copy`], with the images of baked light: for an output that keeps it.
+pub(crate) fn copy_with_light(
+    root: &mut Value,
+    base: Base<'_>,
+    output: &Path,
+    files: &mut Files,
+) -> Result<Copied, SaveError> {
+    copy_named(root, base, output, files, true)
+}
+
+fn copy_named(
+    root: &mut Value,
+    base: Base<'_>,
+    output: &Path,
+    files: &mut Files,
+    with_light: bool,
+) -> Result<Copied, SaveError> {
     let beside = output.parent().unwrap_or(Path::new(""));
     let mut copies =
-        Copies { base, output, beside, files, former: former(output), copied: Copied::default() };
+        Copies { base, output, beside, files, with_light, former: former(output), copied: Copied::default() };
     let real =
         |folder: &Path| fs::canonicalize(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
     match (real(base.folder.unwrap_or(Path::new(""))), real(beside)) {
@@ -51,11 +71,16 @@ fn former(output: &Path) -> HashSet<String> {
     read().unwrap_or_default().into_iter().collect()
 }
 
+/// Extensions whose `image` is baked light.
+const LIGHT: [&str; 2] = ["LUMBRE_lightmap", "LUMBRE_irradiance_volume"];
+
 struct Copies<'a> {
     base: Base<'a>,
     output: &'a Path,
     beside: &'a Path,
     files: &'a mut Files,
+    /// Images of lightmaps and irradiance volumes, too.
+    with_light: bool,
     former: HashSet<String>,
     copied: Copied,
 }
@@ -71,6 +96,12 @@ impl Copies<'_> {
                         Value::String(text) if key == "uri" && !text.starts_with("data:") => {
                             *text = self.copy(text)?;
                         }
+                        Value::Object(light) if self.with_light && LIGHT.contains(&key.as_str()) => {
+                            if let Some(Value::String(image)) = light.get_mut("image") {
+                                self.copy_packed(image)?;
+                                *image = self.copy(image)?;
+                            }
+                        }
                         _ => self.walk(member)?,
                     }
                 }
@@ -79,6 +110,17 @@ impl Copies<'_> {
             Value::Array(list) => list.iter_mut().try_for_each(|element| self.walk(element)),
             _ => Ok(()),
         }
+    }
+
+    /// Copies the KTX2 image that lies beside a lightmap for other programs, if there is one.
+    fn copy_packed(&mut self, image: &str) -> Result<(), SaveError> {
+        let Some(packed) = image.strip_suffix(".exr").map(|stem| format!("{stem}.ktx2")) else {
+            return Ok(());
+        };
+        if self.base.file(&packed, "").is_ok_and(|file| file.is_file()) {
+            self.copy(&packed)?;
+        }
+        Ok(())
     }
 
     /// Copies what a URI names; the URI of the copy.

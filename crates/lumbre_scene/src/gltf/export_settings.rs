@@ -40,7 +40,7 @@ pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Resu
     }
     let mut files = Files::default();
     let base = uri::Base { folder: Some(source.parent().unwrap_or(Path::new(""))), root: None };
-    let copied = beside::copy(&mut root, base, path, &mut files)?;
+    let copied = beside::copy_with_light(&mut root, base, path, &mut files)?;
     notes.list.extend(copied.notes.list);
     let failed = |source| SaveError::Json { source };
     let file = match binary {

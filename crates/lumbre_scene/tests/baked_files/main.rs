@@ -22,6 +22,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_mesh::{TriangleMesh, UnwrapOptions, unwrap};
+use lumbre_optics::Shading;
 use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::{File, png};
@@ -240,6 +241,53 @@ fn volumes_lights_and_the_sky_are_written_and_taken_back() {
     assert!(report.notes.iter().any(|note| note.place == "LUMBRE_bake"), "{:?}", report.notes);
     save_baked(&mut pristine, &source, &place.path().join("c.glb"), &SaveOptions::default()).unwrap();
     assert_eq!(read(&place.path().join("c.glb")).root, read(&input).root);
+}
+
+#[test]
+fn settings_change_and_baked_light_stays_in_any_folder() {
+    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (input, output) = (folder.path().join("room.glb"), folder.path().join("room.baked.glb"));
+    let mut file = File::new();
+    cube(&mut file, |_, _| {});
+    fs::write(&input, file.glb()).unwrap();
+    let mut world = World::new();
+    let mut source = SourceFile::read(&input, &LoadOptions::default()).unwrap();
+    source.load_into(&mut world).unwrap();
+    bake(&mut world);
+    let options = SaveOptions { ktx2: Some(PackedFormat::Rgb9E5), ..SaveOptions::default() };
+    save_baked(&mut world, &source, &output, &options).unwrap();
+
+    let light = |path: &Path| {
+        let mut world = World::new();
+        load(&mut world, path).unwrap();
+        let shading = world.resource::<SceneSettings>().shading;
+        let maps: Vec<Vec<Vec3>> =
+            world.query::<&Lightmap>().iter(&world).map(|map| map.image.texels.clone()).collect();
+        (shading, maps)
+    };
+    let (_, maps) = light(&output);
+    assert!(!maps.is_empty());
+    let settings = FileSettings { shading: Shading::Gouraud, shadows: false };
+    for folder in [folder.path(), other.path()] {
+        let tuned = folder.join("tuned.glb");
+        save_settings(&output, &tuned, settings).unwrap();
+        assert_eq!(light(&tuned), (Shading::Gouraud, maps.clone()));
+    }
+    let packed = |folder: &Path| fs::read_dir(folder.join("room.baked.lightmaps")).unwrap().count();
+    assert_eq!(
+        packed(other.path()),
+        packed(folder.path()),
+        "what lies beside the maps for others goes along"
+    );
+
+    let refused = save_settings(&output, &other.path().join("tuned.gltf"), settings);
+    assert!(matches!(refused, Err(SaveError::Container { .. })), "{refused:?}");
+    fs::write(&input, r#"{"asset": {"version": "2.0"}}"#).unwrap();
+    let refused = save_settings(&input, &other.path().join("none.gltf"), settings);
+    assert!(matches!(refused, Err(SaveError::NoScene { .. })), "{refused:?}");
+    let refused = save_settings(&folder.path().join("missing.glb"), &other.path().join("none.glb"), settings);
+    assert!(matches!(refused, Err(SaveError::Unreadable(_))), "{refused:?}");
+    assert!(!other.path().join("none.gltf").exists() && !other.path().join("none.glb").exists());
 }
 
 #[test]
