@@ -419,7 +419,7 @@ pub struct Cost {
     /// Where the report goes: index.html, cost.json, cost.csv, pictures, scenes.
     #[arg(short, long, value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
     pub output: Option<PathBuf>,
-    /// Fewer points and rounds: about a minute on two cores, instead of five.
+    /// Fewer points and rounds: about two minutes on two cores, instead of six.
     #[arg(long)]
     pub quick: bool,
     /// Only this study; may be given several times.

@@ -77,6 +77,11 @@ impl SceneFile {
         Ok(world)
     }
 
+    /// What a series is called of this scene: with the scene's name where there are several.
+    pub fn series(&self, conditions: &Conditions<'_>, name: &str) -> String {
+        if conditions.files.len() > 1 { format!("{name}, {}", self.name) } else { name.to_owned() }
+    }
+
     /// Its path in commands that are run in the report's folder.
     pub fn in_commands(&self) -> &str {
         &self.in_commands

@@ -354,29 +354,29 @@ fn findings(
     goal: Goal,
     cameras: usize,
 ) -> Vec<String> {
-    let mut findings = vec![format!(
-        "{} ways to draw it at {cameras} {}; {} of them are beaten by none.",
-        points.len(),
-        if cameras == 1 { "camera" } else { "cameras" },
-        front.len()
-    )];
     let within = [
         goal.milliseconds.map(|most| format!("{} ms", short(most))),
         goal.error.map(|most| format!("{} of error", percent(most))),
     ];
     let within = within.into_iter().flatten().collect::<Vec<_>>().join(" and ");
     let told = |place: &usize| format!("{} ({})", points[*place].label, cost_of(&points[*place]));
-    match (chosen, front.first(), front.last()) {
-        _ if within.is_empty() => {}
-        (Some(place), ..) => findings.push(format!("Within {within}: {}.", told(&place))),
-        (None, Some(cheapest), Some(best)) => findings.push(format!(
+    let choice = match (chosen, front.first(), front.last()) {
+        _ if within.is_empty() => None,
+        (Some(place), ..) => Some(format!("Within {within}: {}.", told(&place))),
+        (None, Some(cheapest), Some(best)) => Some(format!(
             "Nothing keeps within {within}; the cheapest is {}, the most accurate {}.",
             told(cheapest),
             told(best)
         )),
-        _ => {}
-    }
-    findings
+        _ => None,
+    };
+    let ways = format!(
+        "{} ways to draw it at {cameras} {}; {} of them are beaten by none.",
+        points.len(),
+        if cameras == 1 { "camera" } else { "cameras" },
+        front.len()
+    );
+    choice.into_iter().chain([ways]).collect()
 }
 
 #[cfg(test)]

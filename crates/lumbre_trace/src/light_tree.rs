@@ -45,7 +45,7 @@ enum Inside {
     Lamps(Range<usize>),
 }
 
-/// So many lamps are weighed one by one: in a leaf, and of a scene that has no more.
+/// The most lamps of a leaf, which are weighed one by one.
 const FEW: usize = 8;
 /// A part of a box's light that counts for it below the horizon too, where a lamp in it has a size.
 const BELOW_HORIZON: f64 = 0.1;

@@ -145,7 +145,7 @@ fn of_scene(
             ("form factors", report.form_factors as f64),
         ];
         let point = Point {
-            series: named(conditions, scene, asked.series),
+            series: scene.series(conditions, asked.series),
             label: asked.label.clone(),
             parameters: [(ASKED.to_owned(), 100.0 * asked.options.error)].into(),
             milliseconds: Spread::of(times),
@@ -161,11 +161,6 @@ fn of_scene(
     let findings = findings(scene, &points);
     measured.study.findings.extend(findings);
     Ok(())
-}
-
-/// A series of one scene among several.
-fn named(conditions: &Conditions<'_>, scene: &SceneFile, series: &str) -> String {
-    if conditions.files.len() > 1 { format!("{series}, {}", scene.name) } else { series.to_owned() }
 }
 
 fn command(scene: &SceneFile, asked: &Asked) -> String {

@@ -68,10 +68,7 @@ fn of_scene(
     measured: &mut Measured,
 ) -> Result<(), CostError> {
     let part = |share: f64| before + share * (after - before);
-    let series = |name: &str| match conditions.files.len() {
-        0 | 1 => name.to_owned(),
-        _ => format!("{name}, {}", scene.name),
-    };
+    let series = |name: &str| scene.series(conditions, name);
     let size = conditions.size_text();
     let paths = |samples| TraceOptions {
         size: conditions.size,

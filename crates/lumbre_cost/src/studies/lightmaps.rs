@@ -191,10 +191,7 @@ fn in_format(
 
 fn point(conditions: &Conditions<'_>, scene: &SceneFile, maps: &Maps, format: Format, sizes: Sizes) -> Point {
     let counts = [(BYTES, sizes.textures), ("bytes of the files", sizes.files), ("texels", sizes.texels)];
-    let series = match conditions.files.len() {
-        0 | 1 => format.name().to_owned(),
-        _ => format!("{}, {}", format.name(), scene.name),
-    };
+    let series = scene.series(conditions, format.name());
     // Frames read the half floats that stand beside a packed file.
     let command = match format {
         Format::Halves => format!(

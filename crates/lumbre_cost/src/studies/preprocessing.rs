@@ -126,7 +126,7 @@ fn of_scene(
     for ((mut baked, label), times) in last.into_iter().flatten().zip(labels).zip([&whole, &kept]) {
         let error = texel_error(&maps_of(&mut baked.world), &truth);
         measured.study.points.push(Point {
-            series: named(conditions, scene, BAKE),
+            series: scene.series(conditions, BAKE),
             label,
             milliseconds: Spread::of(times),
             error,
@@ -142,11 +142,6 @@ fn of_scene(
     let finding = finding_of_change(&moved, &measured.study.points[first..], &whole, &kept);
     measured.study.findings.extend(finding);
     Ok(())
-}
-
-/// A series of one scene among several.
-fn named(conditions: &Conditions<'_>, scene: &SceneFile, series: &str) -> String {
-    if conditions.files.len() > 1 { format!("{series}, {}", scene.name) } else { series.to_owned() }
 }
 
 /// Three frames: by lamps alone, with the constant ambient light that comes nearest to the reference, and with lightmaps.
@@ -194,7 +189,7 @@ fn frames(
             false => "lumbre cost -o again --study preprocessing".into(),
         };
         let mut point = Point {
-            series: named(conditions, scene, FRAME),
+            series: scene.series(conditions, FRAME),
             label: label.to_owned(),
             milliseconds: frame.spread(),
             counts: frame.counts(),

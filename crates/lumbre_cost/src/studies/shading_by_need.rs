@@ -59,7 +59,7 @@ fn of_scene(
     let mut frames = Vec::new();
     for shading in &all {
         let options = FrameOptions { shading: Some(*shading), ..FrameOptions::default() };
-        frames.push(Frame::new(scene.open(conditions.aspect())?, options));
+        frames.push(Frame::new(scene.open(conditions.aspect())?, options).sharing("need"));
     }
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let reference = measured.keep_reference(&format!("{} Phong", scene.name), drawn[0].picture.clone());
@@ -91,11 +91,7 @@ fn point(conditions: &Conditions<'_>, scene: &SceneFile, shading: Shading, frame
         }
     }
     Point {
-        series: if conditions.files.len() > 1 {
-            format!("{series}, {}", scene.name)
-        } else {
-            series.to_owned()
-        },
+        series: scene.series(conditions, series),
         label,
         parameters: bound.map(|bound| (BOUND.to_owned(), bound)).into_iter().collect(),
         milliseconds: frame.spread(),

@@ -204,12 +204,12 @@ impl LitPatch<'_> {
         let Self { surface, sides, model, .. } = *self;
         let light = &lamp.light;
         let directional = light.kind == LightKind::Directional;
-        let way = lamp.position - patch.center;
+        let to_light = lamp.position - patch.center;
         let (distances, direction, half_angle) = match directional {
             true => ([f64::INFINITY; 2], -lamp.axis, 0.0),
             false => {
-                let direction = way.try_normalize().unwrap_or(DVec3::Y);
-                (patch.distances(lamp.position), direction, patch.half_angle(way.length(), 0.0))
+                let direction = to_light.try_normalize().unwrap_or(DVec3::Y);
+                (patch.distances(lamp.position), direction, patch.half_angle(to_light.length(), 0.0))
             }
         };
         if !directional && distances[0] >= f64::from(light.attenuation.range) {
@@ -275,10 +275,10 @@ impl LitPatch<'_> {
         if !self.conditions.settings.local_viewer {
             return (self.view.basis.z_axis, 0.0, f64::INFINITY);
         }
-        let way = self.view.eye - patch.center;
+        let to_eye = self.view.eye - patch.center;
         let distance = (patch.distances(self.view.eye)[0] - self.room).max(0.0);
-        let direction = way.try_normalize().unwrap_or(DVec3::Y);
-        (direction, patch.half_angle(way.length(), self.room), distance)
+        let direction = to_eye.try_normalize().unwrap_or(DVec3::Y);
+        (direction, patch.half_angle(to_eye.length(), self.room), distance)
     }
 }
 

@@ -76,30 +76,36 @@ fn tilted(size: f64, place: DVec3) -> Transform {
         .with_scale(DVec3::splat(size))
 }
 
-fn a_mirror_of_triangles_does_not_see_itself() -> Outcome {
+/// What is seen of something under a sky of 1, from its own frame's `eye`, that has to show one value everywhere.
+fn in_a_furnace(
+    add: impl Fn(&mut World, Transform),
+    (eye, angle): (DVec3, f64),
+    expected: f64,
+    tells: &'static str,
+) -> Outcome {
     let make = |world: &mut World, size: f64, place: DVec3| {
-        world.spawn((Mesh(Arc::new(shapes::uv_sphere(1.0, 48, 24))), half_mirror(), tilted(size, place)));
+        add(world, tilted(size, place));
         furnace(world, 1.0);
-        camera(world, place + DVec3::Z * (3.0 * size), place, 0.35);
+        camera(world, place + eye * size, place, angle);
     };
-    Outcome::worst(
-        pixels(make, 0.5, &options(48)),
-        0.0,
-        "k_r of a sky of 1: who meets the ball again has 1/4",
-    )
+    Outcome::worst(pixels(make, expected, &options(48)), 0.0, tells)
+}
+
+/// Before a ball of radius 1.
+const BEFORE: (DVec3, f64) = (DVec3::new(0.0, 0.0, 3.0), 0.35);
+
+fn a_mirror_of_triangles_does_not_see_itself() -> Outcome {
+    let ball = |world: &mut World, place: Transform| {
+        world.spawn((Mesh(Arc::new(shapes::uv_sphere(1.0, 48, 24))), half_mirror(), place));
+    };
+    in_a_furnace(ball, BEFORE, 0.5, "k_r of a sky of 1: who meets the ball again has 1/4")
 }
 
 fn an_exact_mirror_does_not_see_itself() -> Outcome {
-    let make = |world: &mut World, size: f64, place: DVec3| {
-        exact(world, Quadric::sphere(1.0), half_mirror(), tilted(size, place));
-        furnace(world, 1.0);
-        camera(world, place + DVec3::Z * (3.0 * size), place, 0.35);
+    let ball = |world: &mut World, place: Transform| {
+        exact(world, Quadric::sphere(1.0), half_mirror(), place);
     };
-    Outcome::worst(
-        pixels(make, 0.5, &options(48)),
-        0.0,
-        "k_r of a sky of 1: who meets the ball again has 1/4",
-    )
+    in_a_furnace(ball, BEFORE, 0.5, "k_r of a sky of 1: who meets the ball again has 1/4")
 }
 
 fn half_glass() -> Material {
@@ -107,30 +113,19 @@ fn half_glass() -> Material {
 }
 
 fn glass_of_triangles_is_entered_and_left_once() -> Outcome {
-    let make = |world: &mut World, size: f64, place: DVec3| {
-        let slab = Mesh(Arc::new(shapes::cuboid(Vec3::new(8.0, 1.0, 8.0), 1)));
-        world.spawn((slab, half_glass(), tilted(size, place)));
-        furnace(world, 1.0);
-        camera(world, place + DVec3::new(0.5, 2.0, 0.0) * size, place, 0.9);
+    let slab = |world: &mut World, place: Transform| {
+        let mesh = Mesh(Arc::new(shapes::cuboid(Vec3::new(8.0, 1.0, 8.0), 1)));
+        world.spawn((mesh, half_glass(), place));
     };
-    Outcome::worst(
-        pixels(make, 0.25, &options(48)),
-        0.0,
-        "k_t² of a sky of 1: who meets a face twice has 1/8 or less",
-    )
+    let above = (DVec3::new(0.5, 2.0, 0.0), 0.9);
+    in_a_furnace(slab, above, 0.25, "k_t² of a sky of 1: who meets a face twice has 1/8 or less")
 }
 
 fn exact_glass_is_entered_and_left_once() -> Outcome {
-    let make = |world: &mut World, size: f64, place: DVec3| {
-        exact(world, Quadric::sphere(1.0), half_glass(), tilted(size, place));
-        furnace(world, 1.0);
-        camera(world, place + DVec3::Z * (3.0 * size), place, 0.35);
+    let ball = |world: &mut World, place: Transform| {
+        exact(world, Quadric::sphere(1.0), half_glass(), place);
     };
-    Outcome::worst(
-        pixels(make, 0.25, &options(48)),
-        0.0,
-        "k_t² of a sky of 1: who meets the ball's face twice has 1/8 or less",
-    )
+    in_a_furnace(ball, BEFORE, 0.25, "k_t² of a sky of 1: who meets the ball's face twice has 1/8 or less")
 }
 
 fn a_path_does_not_shade_the_face_it_left() -> Outcome {
