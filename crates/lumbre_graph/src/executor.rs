@@ -232,6 +232,7 @@ impl Executor {
         device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|error| RunError::Wait(error.to_string()))?;
+        self.ring.wait();
         self.collect(device, queue);
         Ok(self.report.as_ref())
     }

@@ -71,6 +71,7 @@ pub use run::context::{
 };
 pub use run::error::RunError;
 pub use run::imports::Imports;
+pub use run::map_request::{MapRequest, MapState};
 pub use run::pool::{KEEP_RETAINED_FRAMES, KEEP_TRANSIENT_FRAMES, PoolStatistics};
 pub use run::probe::FiniteProbe;
 pub use run::report::{

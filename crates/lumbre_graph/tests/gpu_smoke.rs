@@ -286,6 +286,42 @@ fn the_probe_finds_the_first_pass_and_texel() {
     }
 }
 
+/// The device is everybody's: a thread that polls it takes the answers for all, and may stand still before it hands them out.
+#[test]
+fn measurements_arrive_through_another_threads_hands() {
+    let gpu = gpu(TIMES | Features::FLOAT32_BLENDABLE);
+    let draw = pipeline(&gpu.device, "return vec4(1.0);", FORMAT, 1);
+    let buffer = readback(&gpu.device);
+    let imports = Imports::new().buffer("result", &buffer);
+    let mut executor = Executor::new();
+    executor.set_measure(Measurements::ALL);
+    let slow = [readback(&gpu.device), readback(&gpu.device)];
+    let (polled, taken) = std::sync::mpsc::channel();
+    for number in 1..=4 {
+        let mut ran = Vec::new();
+        // A frame that waits for its turn on the GPU, so that the answers come together.
+        executor
+            .execute_with(&gpu.device, &gpu.queue, adding(&draw, &draw), &imports, &mut ran)
+            .expect("the frame runs");
+        for buffer in &slow {
+            let polled = polled.clone();
+            buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+                result.expect("mapped");
+                polled.send(()).expect("the test listens");
+                std::thread::sleep(std::time::Duration::from_millis(200));
+            });
+        }
+        std::thread::scope(|threads| {
+            threads.spawn(|| gpu.device.poll(wgpu::PollType::wait_indefinitely()).expect("the GPU finishes"));
+            taken.recv().expect("the other thread has the answers");
+            let report = executor.timings_blocking(&gpu.device, &gpu.queue).expect("not lost");
+            assert_eq!(report.map(|report| report.frame), Some(number));
+        });
+        taken.recv().expect("both were mapped");
+        slow.iter().for_each(wgpu::Buffer::unmap);
+    }
+}
+
 #[test]
 fn retained_content_is_kept_and_not_drawn_again() {
     let gpu = gpu(Features::FLOAT32_BLENDABLE);

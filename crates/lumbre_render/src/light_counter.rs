@@ -1,8 +1,7 @@
 //! Counts of lights that passes make while they draw, and their way back to memory: for frames that are measured so ([`Measure::Lights`](crate::Measure)), and for no others. What is counted is
 //! `shaders/light_counts.wesl`'s.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use lumbre_graph::{MapRequest, MapState};
 
 use crate::Gpu;
 use crate::accounting::LightCount;
@@ -16,10 +15,6 @@ const WORDS: usize = 4;
 const MOST_ON_THE_WAY: usize = 4;
 /// Storage buffers that a variant with every feature reads; one more counts.
 const OTHER_STORAGE_BUFFERS: u32 = 8;
-
-const WAITING: u8 = 0;
-const ARRIVED: u8 = 1;
-const FAILED: u8 = 2;
 
 /// The shader stages in which lights are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,7 +41,7 @@ pub(crate) struct LightCounter {
 struct Copied {
     frame: u64,
     buffer: wgpu::Buffer,
-    state: Arc<AtomicU8>,
+    request: MapRequest,
 }
 
 impl CountedStages {
@@ -129,22 +124,27 @@ impl LightCounter {
 
     /// After a frame was submitted: asks for the copy of its counts.
     pub fn send_for(&mut self, frame: u64, copy: wgpu::Buffer) {
-        let state = Arc::new(AtomicU8::new(WAITING));
-        let arrived = Arc::clone(&state);
-        copy.map_async(wgpu::MapMode::Read, .., move |result| {
-            arrived.store(if result.is_ok() { ARRIVED } else { FAILED }, Ordering::Release);
-        });
-        self.on_the_way.push(Copied { frame, buffer: copy, state });
+        let request = MapRequest::new(&copy);
+        self.on_the_way.push(Copied { frame, buffer: copy, request });
+    }
+
+    /// Waits for the answers to all that was sent for, after the device was polled to the end.
+    pub fn wait(&self) {
+        for copied in &self.on_the_way {
+            if copied.request.wait() == MapState::Waiting {
+                return;
+            }
+        }
     }
 
     /// The counts that have arrived, each with its frame's number. The device has to be polled before, as the graph does.
     pub fn arrived(&mut self) -> Vec<(u64, PassCounts)> {
         let mut arrived = Vec::new();
         while let Some(first) = self.on_the_way.first()
-            && first.state.load(Ordering::Acquire) != WAITING
+            && first.request.state() != MapState::Waiting
         {
             let copied = self.on_the_way.remove(0);
-            if copied.state.load(Ordering::Acquire) == FAILED {
+            if copied.request.state() == MapState::Failed {
                 continue;
             }
             if let Ok(bytes) = copied.buffer.get_mapped_range(..) {

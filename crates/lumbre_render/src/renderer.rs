@@ -202,6 +202,7 @@ impl Renderer {
         let since = Instant::now();
         self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?;
         self.gpu.check()?;
+        self.light_counter.wait();
         self.settle(Some(since));
         Ok(self.executor.latest_report())
     }

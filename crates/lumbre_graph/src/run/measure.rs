@@ -1,9 +1,7 @@
 //! Queries and their way back. Results arrive some frames later through a ring of buffers, so that measuring never
 //! makes the CPU wait; whoever wants to wait can.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
-
+use crate::run::map_request::{MapRequest, MapState};
 use crate::run::probe::{self, Probed};
 use crate::run::report::{GpuTime, GraphReport, Invocations, Measurements};
 
@@ -34,12 +32,8 @@ pub(crate) struct FrameQueries {
     pub counts: Vec<Option<u32>>,
     pub probed: Vec<Probed>,
     pub report: GraphReport,
-    state: Arc<AtomicU8>,
+    request: MapRequest,
 }
-
-const WAITING: u8 = 0;
-const ARRIVED: u8 = 1;
-const FAILED: u8 = 2;
 
 /// Whose time lies between two timestamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,7 +58,7 @@ impl FrameQueries {
             counts: Vec::new(),
             probed: Vec::new(),
             report: GraphReport::default(),
-            state: Arc::new(AtomicU8::new(WAITING)),
+            request: MapRequest::default(),
         }
     }
 
@@ -178,12 +172,8 @@ impl FrameQueries {
 
     /// After the submission: asks for the results.
     fn send_for(&mut self) {
-        let state = Arc::new(AtomicU8::new(WAITING));
-        self.state = Arc::clone(&state);
         if let Some(readback) = &self.readback {
-            readback.map_async(wgpu::MapMode::Read, .., move |result| {
-                state.store(if result.is_ok() { ARRIVED } else { FAILED }, Ordering::Release);
-            });
+            self.request = MapRequest::new(readback);
         }
     }
 
@@ -192,7 +182,7 @@ impl FrameQueries {
         let mut report = std::mem::take(&mut self.report);
         let layout = self.layout();
         let Some(readback) = &self.readback else { return report };
-        if self.state.load(Ordering::Acquire) == FAILED {
+        if self.request.state() == MapState::Failed {
             report.notes.push("the measurements of this frame were lost on their way back".into());
             return report;
         }
@@ -300,11 +290,20 @@ impl Ring {
         self.waiting.len() < RING
     }
 
+    /// Waits for the answers to all that was sent for, after the device was polled to the end.
+    pub fn wait(&self) {
+        for frame in &self.waiting {
+            if frame.request.wait() == MapState::Waiting {
+                return;
+            }
+        }
+    }
+
     /// The newest report that arrived.
     pub fn collect(&mut self, period: f64) -> Option<GraphReport> {
         let mut newest = None;
         while let Some(first) = self.waiting.first()
-            && first.state.load(Ordering::Acquire) != WAITING
+            && first.request.state() != MapState::Waiting
         {
             let mut queries = self.waiting.remove(0);
             newest = Some(queries.read(period));

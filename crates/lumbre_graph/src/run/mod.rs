@@ -3,6 +3,7 @@
 pub(crate) mod context;
 pub(crate) mod error;
 pub(crate) mod imports;
+pub(crate) mod map_request;
 pub(crate) mod measure;
 pub(crate) mod pool;
 pub(crate) mod probe;
