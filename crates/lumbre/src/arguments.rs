@@ -224,6 +224,9 @@ pub struct Bake {
     /// Leaves the seams between charts as they are.
     #[arg(long)]
     pub no_seams: bool,
+    /// Also writes every map's direct and bounced light, as MAP.direct.exr and MAP.bounced.exr beside it.
+    #[arg(long)]
+    pub separate_light: bool,
     /// Leaves out the estimate of the error that the map's resolution leaves.
     #[arg(long)]
     pub no_resolution_error: bool,

@@ -100,6 +100,7 @@ fn options(asked: &Bake) -> BakeOptions {
         },
         seams: !asked.no_seams,
         resolution_error: !asked.no_resolution_error,
+        separate_light: asked.separate_light,
         form_factors: match asked.form_factors {
             BakeFormFactors::Cosine => FormFactorMethod::CosineRays,
             BakeFormFactors::Lines => FormFactorMethod::GlobalLines,

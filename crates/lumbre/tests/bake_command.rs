@@ -273,6 +273,38 @@ fn lightmaps_have_a_folder_of_their_own_and_no_picture_outlives_its_node() {
 }
 
 #[test]
+fn direct_and_bounced_light_lie_beside_the_maps_when_asked_for() {
+    let place = place();
+    let bake = |more: &[&str]| done(place.bake(&["--ktx2", "none"]).args(more));
+    let files = || {
+        place.files().into_keys().filter_map(|name| Some(name.strip_prefix("level.lightmaps/")?.to_owned()))
+    };
+    bake(&["--separate-light"]);
+    let expected = ["0", "1", "2"]
+        .map(|map| ["bounced.", "direct.", ""].map(|light| format!("{map}.{light}exr")))
+        .concat();
+    assert_eq!(files().collect::<Vec<_>>(), expected);
+    let texels = |name: &str| {
+        let path = place.output.with_file_name("level.lightmaps").join(name);
+        image::open(path).unwrap().into_rgb32f().into_raw()
+    };
+    for map in ["0", "1"] {
+        let [whole, direct, bounced] =
+            ["", "direct.", "bounced."].map(|light| texels(&format!("{map}.{light}exr")));
+        assert!(direct.iter().any(|light| *light > 0.0) && bounced.iter().any(|light| *light > 0.0), "{map}");
+        for ((whole, direct), bounced) in whole.iter().zip(direct).zip(bounced) {
+            assert!(
+                (direct + bounced - whole).abs() <= 2.0 * f32::EPSILON * whole,
+                "{map}: {whole} {direct} {bounced}"
+            );
+        }
+    }
+    // Without the wish they go again.
+    bake(&[]);
+    assert_eq!(files().collect::<Vec<_>>(), ["0.exr", "1.exr", "2.exr"]);
+}
+
+#[test]
 fn a_box_that_moves_leaves_what_it_cannot_affect() {
     let place = place();
     done(&mut place.bake(&[]));

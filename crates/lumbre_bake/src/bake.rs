@@ -1,9 +1,13 @@
-//! The bake from end to end: reads the World, runs the stages, writes the World. Not the stages themselves.
+//! The bake from end to end: a static scene in, its light out, through the stages. Not the stages themselves.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use bevy_ecs::world::World;
+use lumbre_scene::{IrradianceVolume, Transform};
 
+use crate::apply::apply;
+use crate::baked_scene::{BakedMap, BakedObject, BakedScene, FilledTexels, baked_objects};
 use crate::checkpoint::Tape;
 use crate::content_hash::{ContentHash, Hashes, hashes_of};
 use crate::memory;
@@ -12,7 +16,7 @@ use crate::pages::Pages;
 use crate::probes;
 use crate::progress::{Callback, Stage, Watch};
 use crate::rebake::{Changes, Found, Samples, Usable, kept_bounces, rebake_report};
-use crate::scene::{Input, density_of};
+use crate::scene::{StaticScene, density_of, from_world};
 use crate::texels::covered_texels::CoveredTexels;
 use crate::texels::direct_light::direct_light;
 use crate::texels::fill::fill;
@@ -20,16 +24,16 @@ use crate::texels::radiance_cache::RadianceCache;
 use crate::texels::resolution_error::{compare, dense_points};
 use crate::texels::rounds::{self, Bounced};
 use crate::texels::seams::{Maps, close_seams};
+use crate::texels::separate_light::separate;
 use crate::texels::worst_places::worst_places;
 use crate::transport::exchange::Exchange;
 use crate::{
-    BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, ErrorAtTime, Progress, apply,
-    preparing,
+    BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, ErrorAtTime, Progress, preparing,
 };
 
 /// A bake that is about to run: the light of a world's static objects, in lightmaps.
 ///
-/// Reads every `Mesh` with a `StaticObject` (dynamic and hidden ones are left out), emissive materials, and lights whose
+/// Reads every `Mesh` with a `SceneObject` (dynamic and hidden ones are left out), emissive materials, and lights whose
 /// `BakeMode` is `Static` (direct light and bounces) or `Mixed` (bounces only). Afterwards each of those entities has
 /// its mesh with `uv1` and a `Lightmap` of E/π; the primitives of a glTF node share one map. If anything fails or is
 /// cancelled the world's meshes and lightmaps are as they were (only global transforms are brought up to date).
@@ -107,24 +111,65 @@ impl<'a> Bake<'a> {
         Self { former: samples.into(), ..self }
     }
 
-    /// Bakes.
+    /// Bakes a World's static scene, and gives its objects their maps.
     ///
     /// # Errors
     /// [`BakeError`], which names the option, node or stage; [`BakeError::Checkpoint`] if the checkpoint's file cannot be begun, or is something else.
     pub fn run(self, world: &mut World) -> Result<BakeReport, BakeError> {
-        self.on_threads(world).map(|(report, _)| report)
+        self.on_world(world).map(|(report, _)| report)
     }
 
-    /// Bakes, and returns the samples for [`Bake::former`] of the next time: none where there was nothing to bake, or no time for it.
+    /// As [`Bake::run`], and returns the samples for [`Bake::former`] of the next time: none where there was nothing to bake, or no time for it.
     ///
     /// # Errors
     /// As [`Bake::run`].
     pub fn run_keeping_samples(self, world: &mut World) -> Result<(BakeReport, Option<Samples>), BakeError> {
-        Self { keeps_samples: true, ..self }.on_threads(world)
+        Self { keeps_samples: true, ..self }.on_world(world)
     }
 
-    fn on_threads(mut self, world: &mut World) -> Result<(BakeReport, Option<Samples>), BakeError> {
+    /// Bakes plain data, without a World. With [`Bake::keep_samples`] the samples for the next time come with the maps.
+    ///
+    /// # Errors
+    /// As [`Bake::run`].
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use lumbre_bake::{Bake, BakeOptions, Density, PlacedPrimitive, Quality, SceneObject, StaticScene};
+    /// # use glam::Vec3;
+    /// let floor = PlacedPrimitive {
+    ///     mesh: Arc::new(lumbre_mesh::shapes::cuboid(Vec3::new(4.0, 0.2, 4.0), 1)),
+    ///     ..PlacedPrimitive::default()
+    /// };
+    /// let objects = vec![SceneObject::new("floor", vec![floor])];
+    /// let scene = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() };
+    /// let options = BakeOptions { density: Density::MapSize(32), quality: Quality::Draft, ..BakeOptions::default() };
+    /// let baked = Bake::new(&options).run_scene(scene)?;
+    /// let map = &baked.maps[baked.objects[0].map];
+    /// assert_eq!(map.image.width, 32);
+    /// assert_eq!(baked.objects[0].meshes[0].uv1.len(), baked.objects[0].meshes[0].positions.len());
+    /// # Ok::<(), lumbre_bake::BakeError>(())
+    /// ```
+    pub fn run_scene(self, scene: StaticScene) -> Result<BakedScene, BakeError> {
         self.options.check()?;
+        self.on_threads(&Arc::new(scene.checked()?))
+    }
+
+    /// Keeps samples for [`Bake::former`] of the next time.
+    #[must_use]
+    pub fn keep_samples(self) -> Self {
+        Self { keeps_samples: true, ..self }
+    }
+
+    fn on_world(self, world: &mut World) -> Result<(BakeReport, Option<Samples>), BakeError> {
+        self.options.check()?;
+        let (scene, entities) = from_world(world);
+        let scene = Arc::new(scene.checked()?);
+        let mut baked = self.on_threads(&scene)?;
+        apply(world, &scene, &entities, &mut baked);
+        Ok((baked.report, baked.samples))
+    }
+
+    fn on_threads(mut self, scene: &Arc<StaticScene>) -> Result<BakedScene, BakeError> {
         let mut bake = || {
             let mut report = BakeReport { threads: rayon::current_num_threads(), ..BakeReport::default() };
             let watch = Watch::new(&mut *self.progress, self.options.time);
@@ -135,8 +180,8 @@ impl<'a> Bake<'a> {
                 former: self.former,
                 keeps_samples: self.keeps_samples,
             };
-            let samples = run(world, &request, &mut watch, &mut report)?;
-            Ok((finish(report, &mut watch), samples))
+            let Light { objects, maps, volume, samples } = run(scene, &request, &mut watch, &mut report)?;
+            Ok(BakedScene { objects, maps, volume, samples, report: finish(report, &mut watch) })
         };
         match self.options.threads {
             None => bake(),
@@ -146,6 +191,15 @@ impl<'a> Bake<'a> {
             }
         }
     }
+}
+
+/// What the stages have made: a baked scene before its report is finished.
+#[derive(Default)]
+struct Light {
+    objects: Vec<BakedObject>,
+    maps: Vec<BakedMap>,
+    volume: Option<(Transform, IrradianceVolume)>,
+    samples: Option<Samples>,
 }
 
 /// What a bake is to do, without who is told about it.
@@ -158,33 +212,32 @@ struct Request<'a> {
 
 /// The stages, in their order; each takes what those before it have found.
 fn run(
-    world: &mut World,
+    input: &Arc<StaticScene>,
     request: &Request<'_>,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
-) -> Result<Option<Samples>, BakeError> {
+) -> Result<Light, BakeError> {
     let options = request.options;
     watch.stage(Stage::Layout, report)?;
-    let input = watch.during(0.0, || Input::read(world))??;
-    let hashes = watch.during(0.0, || hashes_of(&input, options))?;
+    let hashes = watch.during(0.0, || hashes_of(input, options))?;
     report.content_hash = hashes.content.to_string();
-    let usable = Usable::of(request.former, &hashes, &input, options, report);
+    let usable = Usable::of(request.former, &hashes, input, options, report);
     let identity = request.identity(&hashes, usable.as_ref());
     watch.tape = request.tape(&identity)?;
     if input.objects.is_empty() {
-        return Ok(nothing_to_bake(world, "the scene has no static mesh", report));
+        return Ok(nothing_to_bake("the scene has no static mesh", report));
     }
     let space = usable.as_ref().map_or_else(|| input.space(), |usable| usable.space);
     let density = usable.as_ref().map(|usable| usable.density);
     let density = density.unwrap_or_else(|| density_of(&input.objects, space, options));
-    let layout = preparing::layout(&input, space, density, options, watch, report)?;
+    let layout = preparing::layout(input, space, density, options, watch, report)?;
 
     watch.stage(Stage::Hierarchy, report)?;
-    let (scene, layout, emitters) = preparing::scene(&input, layout, space, watch, report)?;
-    let sources = preparing::sources(&input, &scene, emitters, watch, report)?;
+    let (scene, layout, emitters) = preparing::scene(input, layout, space, watch, report)?;
+    let sources = preparing::sources(input, &scene, emitters, watch, report)?;
     if sources.is_empty() {
         let why = "no surface emits, no light is static or mixed, and there is no sky";
-        return Ok(nothing_to_bake(world, why, report));
+        return Ok(nothing_to_bake(why, report));
     }
     let for_samples = request.bytes_of_samples(usable.is_some());
     memory::check_texels(&scene, &layout, for_samples, options)?;
@@ -220,8 +273,7 @@ fn run(
             (bounced, Some(cache))
         }
     };
-    let volume =
-        probes::bake(&input.wanted_probes, &scene, &sources, cache.as_ref(), options, watch, report)?;
+    let volume = probes::bake(input, &scene, &sources, cache.as_ref(), options, watch, report)?;
     let points = dense_points(&sources, cache.as_ref(), options, watch, report)?;
 
     watch.stage(Stage::Texels, report)?;
@@ -277,25 +329,28 @@ fn run(
     close_seams(&maps, &mut filled, options, watch, report)?;
     watch.advance(0.9)?;
     report.resolution = watch.during(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
-    let pages = watch.during(1.0, || Pages::new(&layout, options.atlas_size, options.gap))?;
+    let pages = watch.during(0.9, || Pages::new(&layout, options.atlas_size, options.gap))?;
     report.atlases = pages.pages.len();
     report.maps = report.atlases + pages.places.iter().filter(|place| place.is_none()).count();
+    let separate = watch.during(1.0, || {
+        let parts = options.separate_light.then_some((&direct, &bounced));
+        parts.map(|parts| separate(&texels, parts, &filled, options.gap, &scene.stop))
+    })?;
+    let found = FilledTexels { irradiance: &filled, variances: &errors, separate: separate.as_ref() };
+    let (objects, maps) = watch.during(1.0, || baked_objects(&input.objects, &layout, &found, &pages))?;
     watch.advance(1.0)?;
-    apply::apply(world, &input.objects, &layout, &filled, &errors, &pages);
-    apply::place_volume(world, volume.map(|placed| (placed.grid.transform(space), placed.volume)));
-    Ok(samples)
+    let volume = volume.map(|placed| (placed.grid.transform(space), placed.volume));
+    Ok(Light { objects, maps, volume, samples })
 }
 
 /// Where more than this share of direct light's time is gone before any light is known, the time is short beside the scene's size.
 const SHORT: f64 = 0.3;
 
-/// Takes away what a former bake left, and says why there is nothing new.
-fn nothing_to_bake(world: &mut World, why: &str, report: &mut BakeReport) -> Option<Samples> {
+/// Says why there is no light.
+fn nothing_to_bake(why: &str, report: &mut BakeReport) -> Light {
     report.skipped.push(format!("everything: {why}"));
-    apply::forget_lightmaps(world, &[]);
-    apply::place_volume(world, None);
     report.error_reached = true;
-    None
+    Light::default()
 }
 
 impl Request<'_> {

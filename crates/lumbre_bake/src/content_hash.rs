@@ -13,7 +13,7 @@ use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
 
-use crate::scene::{Input, Object, PlacedLight, PlacedPrimitive};
+use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
 use crate::{BakeError, BakeOptions, Density};
 
 /// The version of the crate, and a hash of its sources and those of the crates whose work goes into a baked file.
@@ -58,7 +58,7 @@ impl fmt::Display for ContentHash {
 /// [`BakeError`] as of a bake: an option out of its range, or a mesh that cannot be read.
 pub fn content_hash(world: &mut World, options: &BakeOptions) -> Result<ContentHash, BakeError> {
     options.check()?;
-    Ok(hashes_of(&Input::read(world)?, options).content)
+    Ok(hashes_of(&from_world(world).0.checked()?, options).content)
 }
 
 /// The hash of everything, and those of its parts.
@@ -74,8 +74,9 @@ pub(crate) struct Hashes {
 }
 
 /// The hashes of what was collected already.
-pub(crate) fn hashes_of(input: &Input, options: &BakeOptions) -> Hashes {
-    let Input { objects, lights, sky, wanted_probes: wanted } = input;
+pub(crate) fn hashes_of(input: &StaticScene, options: &BakeOptions) -> Hashes {
+    // What moves counts only where probes are called for.
+    let StaticScene { objects, lights, sky, moving: _ } = input;
     let mut images = Images::default();
     let object_hashes: Vec<ContentHash> =
         objects.iter().map(|object| object_hash(object, &mut images)).collect();
@@ -92,6 +93,7 @@ pub(crate) fn hashes_of(input: &Input, options: &BakeOptions) -> Hashes {
         resolution_error: of_samples.resolution_error,
         probes: of_samples.probes,
         probe_spacing: of_samples.probe_spacing,
+        separate_light: of_samples.separate_light,
         memory: of_samples.memory,
         ..*options
     });
@@ -110,27 +112,37 @@ pub(crate) fn hashes_of(input: &Input, options: &BakeOptions) -> Hashes {
     }
     hasher.hashes(&light_hashes);
     hasher.color(sky);
-    hasher.number(wanted.are(options).is_ok().into());
-    if wanted.are(options).is_ok() {
+    let probes = input.calls_for_probes(options).is_ok();
+    hasher.number(probes.into());
+    if probes {
         // Of what moves, the place of the probes' grid.
-        let (low, high) = wanted.bounds();
+        let (low, high) = bounds(input.moving_points());
         hasher.doubles(&[low.to_array(), high.to_array()].concat());
         // In the order of the parts, whose lengths are hashed with their objects.
-        hasher.number(wanted.real_time.len() as u64);
-        wanted.real_time.iter().for_each(|&own| hasher.number(own.into()));
+        hasher.number(input.primitives().count() as u64);
+        input.primitives().for_each(|part| hasher.number(part.lights_frames.into()));
     }
     Hashes { content: hasher.finish(), objects: object_hashes, lights: of_lights, sampling }
 }
 
+/// Corners of the box around points; infinite and turned inside out if there is nothing.
+fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
+    let finite = points.iter().filter(|point| point.is_finite());
+    finite
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)))
+}
+
 /// The hash of an object in its place.
-fn object_hash(object: &Object, images: &mut Images) -> ContentHash {
+fn object_hash(object: &SceneObject, images: &mut Images) -> ContentHash {
     let mut hasher = Hasher::new("object");
     // The map is named after the object.
-    let Object { name, primitives } = object;
+    let SceneObject { name, primitives, lightmap_scale } = object;
     hasher.bytes(name.as_bytes());
+    hasher.doubles(&[*lightmap_scale]);
     hasher.number(primitives.len() as u64);
     for primitive in primitives {
-        let PlacedPrimitive { entity: _, mesh, material, textures, transform } = primitive;
+        // What lights frames counts with the probes, which it concerns.
+        let PlacedPrimitive { mesh, material, textures, transform, lights_frames: _ } = primitive;
         hasher.mesh(mesh);
         hasher.material(material);
         hasher.textures(textures.as_ref().unwrap_or(&MaterialTextures::default()), images);
@@ -286,6 +298,7 @@ impl Hasher {
             resolution_error,
             probes,
             probe_spacing,
+            separate_light,
             memory,
         } = options;
         match density {
@@ -313,6 +326,7 @@ impl Hasher {
         self.number((*resolution_error).into());
         self.number(*probes as u64);
         self.doubles(&[probe_spacing.unwrap_or(0.0)]);
+        self.number((*separate_light).into());
     }
 
     fn mesh(&mut self, mesh: &TriangleMesh) {

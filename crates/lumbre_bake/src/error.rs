@@ -28,6 +28,16 @@ pub enum BakeError {
         /// What is wrong.
         source: lumbre_mesh::MeshError,
     },
+    /// An object's share of texels is no number to multiply by.
+    #[error(
+        "{object}: its lightmap scale is {found}; give a positive finite number, 1 for the density of the scene"
+    )]
+    LightmapScale {
+        /// The node's name.
+        object: String,
+        /// What it was.
+        found: String,
+    },
     /// A material reads the coordinates that the lightmap would have to replace.
     #[error(
         "{object}: the textures of its material use TEXCOORD_0 and TEXCOORD_1, and TEXCOORD_1 overlaps or tiles and so cannot hold a \

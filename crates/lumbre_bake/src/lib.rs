@@ -1,10 +1,10 @@
-//! Radiosity baked into lightmaps: a World in, the same World with lit texels out.
+//! Radiosity baked into lightmaps: a World in, the same World with lit texels out; or plain meshes, materials and lights in, and maps out.
 //!
 //! No GPU, no files: `lumbre_scene` loads and saves. Light bounces between patches; texels show it.
 //!
 //! ```text
-//!   World ─► scene ─────────► transport ──────────────► texels ──────────────► transport ────────► texels ───────────────► World
-//!            Input             emitters, lights          covered texels          patches             radiance cache          uv1
+//!   World ─► scene ─────────► transport ──────────────► texels ──────────────► transport ────────► texels ───────────────► BakedScene ─► World
+//!            StaticScene       emitters, lights          covered texels          patches             radiance cache          uv1
 //!            lightmap layout   (trees, bounds)           direct light            form factors        final gather, rounds    Lightmap E/π
 //!            triangles, BVH                              local light             solver              error ledger            TexelErrors
 //!                                                                                                    smooth ─► fill ─► seams
@@ -40,6 +40,7 @@
 
 mod apply;
 mod bake;
+mod baked_scene;
 mod cancel_token;
 mod checkpoint;
 mod chunks;
@@ -62,8 +63,8 @@ mod texels;
 mod transport;
 mod unwrapped_from;
 
-pub use apply::TexelErrors;
 pub use bake::Bake;
+pub use baked_scene::{BakedMap, BakedObject, BakedScene, TexelErrors};
 pub use cancel_token::CancelToken;
 pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};
@@ -75,5 +76,6 @@ pub use report::{
     BakeReport, Ended, ErrorAtTime, ErrorPart, ProbeReport, RebakeReport, ResolutionReport, SeamReport,
     StageTime, WorstPlace,
 };
+pub use scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
 pub use transport::method_study::{FormFactorErrors, form_factor_errors};
 pub use unwrapped_from::UnwrappedFrom;

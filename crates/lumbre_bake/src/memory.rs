@@ -35,6 +35,15 @@ const COVERED: u64 = (size_of::<Texel>()
 /// among the covered ones and its surface; its reflectance, and the light that the rounds before have gathered, with its error.
 const MAPPED: u64 = 4 * (13 + 12 + 7 + 1 + 1) + 8 + 4 * (3 + 3 + 1 + 2);
 
+/// Of a texel of a map, for direct and bounced light apart: both as they were found, filled, and divided.
+const SEPARATE: u64 = 6 * 12;
+
+/// Bytes of the texels of all maps.
+fn of_maps(layout: &LightmapLayout, options: &BakeOptions) -> u64 {
+    let separate = if options.separate_light { SEPARATE } else { 0 };
+    (layout.texels as u64 + margins(layout)) * MAPPED + layout.texels as u64 * separate
+}
+
 /// What rows of texels have beside them, in texels.
 fn margins(layout: &LightmapLayout) -> u64 {
     layout.maps.iter().map(|map| u64::from(map.height) * BESIDE_A_ROW as u64).sum()
@@ -79,7 +88,7 @@ pub(crate) fn check_texels(
     let Some(limit) = options.memory else { return Ok(()) };
     let area = |t: &SceneTriangle| f64::from((t.uv[1] - t.uv[0]).perp_dot(t.uv[2] - t.uv[0]).abs()) / 2.0;
     let covered = scene.triangles.iter().map(area).sum::<f64>().min(layout.texels as f64) as u64;
-    let texels = covered * (COVERED + samples) + (layout.texels as u64 + margins(layout)) * MAPPED;
+    let texels = covered * (COVERED + samples) + of_maps(layout, options);
     let needed = texels + scene.triangles.len() as u64 * TRIANGLE + REST;
     if needed > limit {
         return Err(BakeError::Memory { needed, texels, covered, limit });
@@ -112,7 +121,7 @@ pub(crate) fn resolution(
     let points = listed.sum::<u64>();
     let for_texels = covered * (COVERED + samples)
         + points * size_of::<FootprintPoint>() as u64
-        + (layout.texels as u64 + margins(layout)) * MAPPED;
+        + of_maps(layout, options);
     let asked = Patches::count(scene, side);
     let (mut patches, mut fewest) = (asked, false);
     loop {

@@ -9,12 +9,12 @@ use crate::BakeError;
 /// How many texels a surface gets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Density {
-    /// About 500,000 texels for the whole scene, spread by area: any scale of scene just works.
+    /// About 500,000 texels for the whole scene, spread by area and by the square of each object's lightmap scale: any scale of scene just works.
     #[default]
     Automatic,
-    /// Texels along one metre of surface; positive and finite.
+    /// Texels along one metre of surface, times each object's lightmap scale; positive and finite.
     TexelsPerMeter(f64),
-    /// The side of each node's own square map, in texels, in [4, 8192].
+    /// The side of each node's own square map, in texels, in [4, 8192], times its lightmap scale.
     MapSize(u32),
 }
 
@@ -102,6 +102,8 @@ pub struct BakeOptions {
     pub probes: Probes,
     /// Metres between probes at most, positive and finite; by the scene's size, for up to 4096 of them, if absent.
     pub probe_spacing: Option<f64>,
+    /// Also gives every map's direct and bounced light as maps of their own. The maps themselves stay the same.
+    pub separate_light: bool,
     /// Bytes that the bake may take beside the World: fewer patches and rays where more would not fit.
     pub memory: Option<u64>,
 }
@@ -124,6 +126,7 @@ impl Default for BakeOptions {
             resolution_error: true,
             probes: Probes::default(),
             probe_spacing: None,
+            separate_light: false,
             memory: None,
         }
     }

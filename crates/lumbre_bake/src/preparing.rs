@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, Input, LightmapLayout, lay_out_with};
+use crate::scene::{BakeScene, Canonical, LightmapLayout, StaticScene, lay_out_with};
 use crate::transport::direct::{Sources, shines_inside_only};
 use crate::transport::emitters::{Emitter, coarse_textures, emitters};
 use crate::{BakeError, BakeOptions, BakeReport};
@@ -14,17 +14,17 @@ use crate::{BakeError, BakeOptions, BakeReport};
 /// # Errors
 /// [`BakeError`] of the layout, or that nobody waits for it.
 pub(crate) fn layout(
-    input: &Input,
+    input: &Arc<StaticScene>,
     space: Canonical,
     density: f64,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
 ) -> Result<LightmapLayout, BakeError> {
-    let (objects, options, stop) = (Arc::clone(&input.objects), *options, watch.stop().clone());
+    let (input, options, stop) = (Arc::clone(input), *options, watch.stop().clone());
     let (layout, warnings) = watch.apart(0.0, move || {
         let mut warnings = Vec::new();
-        (lay_out_with(&objects, space, density, &options, &stop, &mut warnings), warnings)
+        (lay_out_with(&input.objects, space, density, &options, &stop, &mut warnings), warnings)
     })?;
     report.warnings.extend(warnings);
     layout
@@ -35,16 +35,16 @@ pub(crate) fn layout(
 /// # Errors
 /// [`BakeError`] of the scene, or that nobody waits for it.
 pub(crate) fn scene(
-    input: &Input,
+    input: &Arc<StaticScene>,
     layout: LightmapLayout,
     space: Canonical,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
 ) -> Result<(BakeScene, LightmapLayout, Vec<Emitter>), BakeError> {
-    let (objects, stop) = (Arc::clone(&input.objects), watch.stop().clone());
+    let (own, stop) = (Arc::clone(input), watch.stop().clone());
     let (scene, layout, warnings) = watch.apart(0.0, move || {
         let mut warnings = Vec::new();
-        let scene = BakeScene::new(&objects, &layout, space, &stop, &mut warnings);
+        let scene = BakeScene::new(&own.objects, &layout, space, &stop, &mut warnings);
         (scene, layout, warnings)
     })?;
     report.warnings.extend(warnings);
@@ -60,7 +60,7 @@ pub(crate) fn scene(
 /// # Errors
 /// [`BakeError::Cancelled`].
 pub(crate) fn sources<'a>(
-    input: &Input,
+    input: &StaticScene,
     scene: &'a BakeScene,
     emitters: Vec<Emitter>,
     watch: &mut Watch<'_>,

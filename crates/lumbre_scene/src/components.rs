@@ -127,6 +127,18 @@ pub struct Lightmap {
     pub image: Arc<LightmapImage>,
 }
 
+/// The light of an entity's [`Lightmap`] in two maps of the same size and coordinates, which add up to it within the rounding of numbers. A baker makes
+/// it on request; saving writes both beside the map, as `<map>.direct.exr` and `<map>.bounced.exr`, which no file names. Frames do not read it.
+///
+/// Where seams were closed or values carried past a border, both follow in the proportion of their light there.
+#[derive(Component, Clone, Debug)]
+pub struct SeparateLight {
+    /// What arrives straight from lamps, shining surfaces and the sky. E/π.
+    pub direct: Arc<LightmapImage>,
+    /// What arrives by bounces. E/π.
+    pub bounced: Arc<LightmapImage>,
+}
+
 /// Says that an entity never moves: the baker lights it. Set by the importer on every mesh that is not under a
 /// [`DynamicObject`].
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -135,6 +147,11 @@ pub struct StaticObject;
 /// An entity that moves in the game: the baker leaves it (and what hangs below it) out.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DynamicObject;
+
+/// Texels along one metre of an entity's lightmap, relative to the rest of the scene: a positive finite factor, 1 without it. What is looked at closely
+/// gets more, what nobody comes near gets less. Read by the baker; primitives that share a map get the largest.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct LightmapScale(pub f64);
 
 /// Asks that an entity's emissive faces light other objects in real time: each becomes a polygon light. Without it emission adds a
 /// colour and lights nothing in a frame (in the baker it always does).

@@ -59,9 +59,9 @@ pub use census::{
     light_place, shines, shown_objects,
 };
 pub use components::{
-    ActiveCamera, Bounds, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, MaterialTextures,
-    Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, Primitive, Projection, SharedImage,
-    StaticObject,
+    ActiveCamera, Bounds, Camera, DynamicObject, EmissiveLight, Extras, Hidden, Lightmap, LightmapScale,
+    MaterialTextures, Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, Primitive, Projection,
+    SeparateLight, SharedImage, StaticObject,
 };
 pub use default_camera::default_camera;
 pub use default_light::{add_default_light, is_without_light};

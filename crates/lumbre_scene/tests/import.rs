@@ -460,6 +460,22 @@ fn who_lights_others() {
 }
 
 #[test]
+fn lightmaps_have_a_scale() {
+    let file = |scale: serde_json::Value| {
+        let mut file = File::new();
+        file.square(|_, _| {});
+        file.node(json!({"mesh": 0, "extensions": {"LUMBRE_object": {"lightmapScale": scale}}}));
+        file
+    };
+    let (mut world, _) = file(json!(0.25)).load().unwrap();
+    assert_eq!(only::<LightmapScale>(&mut world), LightmapScale(0.25));
+    for wrong in [json!(0), json!(-2)] {
+        let text = file(wrong).load().err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(text.contains("LUMBRE_object.lightmapScale") && text.contains("factor above 0"), "{text}");
+    }
+}
+
+#[test]
 fn scene_settings_and_cameras() {
     let mut file = File::new();
     file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"ambient": [1, 2, 3], "localViewer": false,

@@ -150,6 +150,7 @@ fn everything() -> World {
             if index == 0 {
                 primitive.insert(textured.clone());
             }
+            primitive.insert(LightmapScale(2.5));
             primitive.insert((Shading::Flat, ReflectionModel::Blinn4n, Lightmap { image: lightmap.clone() }));
         }
     }

@@ -19,7 +19,7 @@ pub(crate) use light::ProbeSample;
 use self::grid::Grid;
 use crate::chunks::in_chunks_anew;
 use crate::progress::{Stage, Watch};
-use crate::scene::{BakeScene, WantedProbes};
+use crate::scene::{BakeScene, StaticScene};
 use crate::texels::gather::RadianceCache;
 use crate::transport::direct::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
@@ -32,7 +32,7 @@ pub(crate) struct PlacedVolume {
 
 /// Bakes the probes, if they are called for; the report says why not.
 pub(crate) fn bake(
-    wanted: &WantedProbes,
+    input: &StaticScene,
     scene: &BakeScene,
     sources: &Sources<'_>,
     cache: Option<&RadianceCache<'_>>,
@@ -40,15 +40,17 @@ pub(crate) fn bake(
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
 ) -> Result<Option<PlacedVolume>, BakeError> {
-    if let Err(reason) = wanted.are(options) {
+    if let Err(reason) = input.calls_for_probes(options) {
         report.skipped.push(format!("probes: {reason}"));
         return Ok(None);
     }
-    let real_time = |triangle: u32| {
+    // A surface of the scene is a primitive.
+    let lights_frames: Vec<bool> = input.primitives().map(|primitive| primitive.lights_frames).collect();
+    let in_frames = |triangle: u32| {
         let surface = scene.triangles[triangle as usize].surface;
-        wanted.real_time.get(surface as usize).copied().unwrap_or(false)
+        lights_frames.get(surface as usize).copied().unwrap_or(false)
     };
-    let emitters = sources.only_emitters(|emitter| !real_time(emitter.triangle));
+    let emitters = sources.only_emitters(|emitter| !in_frames(emitter.triangle));
     if emitters.is_empty() && cache.is_none() {
         report
             .skipped
@@ -56,7 +58,7 @@ pub(crate) fn bake(
         return Ok(None);
     }
     watch.stage(Stage::Probes, report)?;
-    let grid = Grid::new(scene, &wanted.moving, options.probe_spacing, &mut report.warnings);
+    let grid = Grid::new(scene, input.moving_points(), options.probe_spacing, &mut report.warnings);
     let clock = watch.clock();
     let seen: Vec<ProbeSample> = in_chunks_anew(grid.count(), watch, |index| {
         // A complete volume, whatever time it takes: roughly, once the time is up.

@@ -9,7 +9,7 @@ use super::relit::shadowed;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples, fingerprint, first_triangles};
 use crate::content_hash::{ContentHash, Hashes};
 use crate::sampling::hash;
-use crate::scene::{BakeScene, Canonical, Input, LightmapLayout, Object, density_of};
+use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject, StaticScene, density_of};
 use crate::texels::covered_texels::CoveredTexels;
 use crate::texels::footprint::Texel;
 use crate::transport::direct::{Direct, Sources};
@@ -54,7 +54,7 @@ impl<'a> Usable<'a> {
     pub fn of(
         samples: Option<&'a Samples>,
         hashes: &Hashes,
-        input: &Input,
+        input: &StaticScene,
         options: &BakeOptions,
         report: &mut BakeReport,
     ) -> Option<Self> {
@@ -74,7 +74,7 @@ impl<'a> Usable<'a> {
     fn new(
         samples: &'a Samples,
         hashes: &Hashes,
-        objects: &[Object],
+        objects: &[SceneObject],
         space: Canonical,
         options: &BakeOptions,
     ) -> Result<Self, String> {
@@ -152,7 +152,7 @@ impl<'a> Changes<'a> {
     pub fn find(
         usable: &Usable<'a>,
         hashes: &Hashes,
-        objects: &[Object],
+        objects: &[SceneObject],
         sources: &Sources<'_>,
         texels: &CoveredTexels<'_>,
     ) -> Self {
@@ -208,7 +208,7 @@ impl<'a> Changes<'a> {
 }
 
 /// What is different, by name.
-fn names(objects: &[Object], changed: &[bool], gone: &[&ObjectSamples], lights: bool) -> Vec<String> {
+fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lights: bool) -> Vec<String> {
     let mut names = Vec::new();
     for (object, _) in objects.iter().zip(changed).filter(|(_, changed)| **changed) {
         let before = gone.iter().any(|gone| gone.name == object.name);

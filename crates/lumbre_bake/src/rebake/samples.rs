@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::changes::{bounds, emission, fold, layouts};
 use crate::content_hash::{ContentHash, Hashes};
 
-use crate::scene::{BakeScene, Canonical, LightmapLayout, Object};
+use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
 use crate::texels::footprint::{Footprint, Texel};
 use crate::texels::gather::{Gathered, Weights};
 use crate::transport::direct::{Direct, Sources};
@@ -165,7 +165,7 @@ impl Found<'_> {
         &self,
         identity: ContentHash,
         hashes: &Hashes,
-        objects: &[Object],
+        objects: &[SceneObject],
         sources: &Sources<'_>,
         exitance: &[[Vec3; 2]],
     ) -> Samples {

@@ -8,7 +8,7 @@ use lumbre_mesh::uv_validation::validate_uv1;
 use lumbre_mesh::{Charted, TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped};
 
 use super::texture_coordinates::{free_second, sets_read};
-use super::{Canonical, Object, SceneTriangle};
+use super::{Canonical, SceneObject, SceneTriangle};
 use crate::cancel_token::CancelToken;
 use crate::{BakeError, BakeOptions, Density};
 
@@ -55,9 +55,11 @@ const LARGEST_SIDE: u32 = 8192;
 /// Most texels of all maps: 4 GiB of working memory at some 64 bytes each.
 const MOST_TEXELS: u64 = 1 << 26;
 
-/// Texels per canonical unit, exact under a scale of 2^k, unlike metres; 1 where maps have a size instead.
-pub(crate) fn density_of(objects: &[Object], space: Canonical, options: &BakeOptions) -> f64 {
-    let area = || -> f64 { objects.iter().map(|object| Placed::new(object, space).area).sum() };
+/// Texels per canonical unit of objects whose lightmap scale is 1: exact under a scale of 2^k, unlike metres; 1 where maps have a size instead.
+pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &BakeOptions) -> f64 {
+    let area = || -> f64 {
+        objects.iter().map(|object| Placed::new(object, space).area * object.lightmap_scale.powi(2)).sum()
+    };
     match options.density {
         Density::Automatic => {
             let area = area();
@@ -70,7 +72,7 @@ pub(crate) fn density_of(objects: &[Object], space: Canonical, options: &BakeOpt
 
 /// Lays out every object, as densely as the options ask.
 pub(crate) fn lay_out(
-    objects: &[Object],
+    objects: &[SceneObject],
     space: Canonical,
     options: &BakeOptions,
     warnings: &mut Vec<String>,
@@ -81,7 +83,7 @@ pub(crate) fn lay_out(
 
 /// Lays out every object, with so many texels per canonical unit.
 pub(crate) fn lay_out_with(
-    objects: &[Object],
+    objects: &[SceneObject],
     space: Canonical,
     density: f64,
     options: &BakeOptions,
@@ -113,8 +115,9 @@ pub(crate) fn lay_out_with(
 }
 
 /// Objects that share their meshes and differ by a rotation and translation only share their coordinates.
-fn instance_key(object: &Object, space: Canonical) -> Vec<u64> {
-    let mut key = Vec::with_capacity(object.primitives.len() * 7);
+fn instance_key(object: &SceneObject, space: Canonical) -> Vec<u64> {
+    let mut key = Vec::with_capacity(1 + object.primitives.len() * 7);
+    key.push(object.lightmap_scale.to_bits());
     for part in &object.primitives {
         key.push(Arc::as_ptr(&part.mesh) as usize as u64);
         // A mesh whose second set holds a texture's coordinates in one place may be free in another.
@@ -148,7 +151,7 @@ struct Placed {
 }
 
 impl Placed {
-    fn new(object: &Object, space: Canonical) -> Self {
+    fn new(object: &SceneObject, space: Canonical) -> Self {
         let mut mesh = TriangleMesh::default();
         let has_uv =
             object.primitives.iter().all(|part| !part.mesh.uv1.is_empty() || part.mesh.positions.is_empty());
@@ -186,7 +189,7 @@ struct Made {
 }
 
 fn lay_out_object(
-    object: &Object,
+    object: &SceneObject,
     space: Canonical,
     density: f64,
     options: &BakeOptions,
@@ -194,9 +197,13 @@ fn lay_out_object(
     warnings: &mut Vec<String>,
 ) -> Result<Made, BakeError> {
     let placed = Placed::new(object, space);
+    let density = density * object.lightmap_scale;
+    let side_of_map = |side: u32| {
+        (f64::from(side) * object.lightmap_scale).round().clamp(4.0, f64::from(LARGEST_SIDE)) as u32
+    };
     if let Some(uv_area) = placed.uv_area.filter(|&area| area > 0.0) {
         let side = match options.density {
-            Density::MapSize(side) => side,
+            Density::MapSize(side) => side_of_map(side),
             _ => ((placed.area / uv_area).sqrt() * density).ceil().clamp(4.0, f64::from(LARGEST_SIDE)) as u32,
         };
         match validate_uv1(&placed.mesh, side, side) {
@@ -234,7 +241,8 @@ fn lay_out_object(
         Charted::new(&placed.mesh, &placed.mesh.positions, UnwrapOptions::default().chart_angle, &go_on)
             .map_err(|source| BakeError::Unwrap { object: object.name.clone(), source })?;
     let (unwrapped, width, height) = match options.density {
-        Density::MapSize(asked) => {
+        Density::MapSize(side) => {
+            let asked = side_of_map(side);
             let (made, side) = fit(&object, &placed, &charted, asked, options.gap)?;
             if side > asked {
                 warnings.push(format!(
@@ -258,7 +266,7 @@ fn lay_out_object(
 
 /// The densest unwrap that fits a square of `side` texels, or the next larger one by a power of two in which its charts have room; and its side.
 fn fit(
-    object: &Object,
+    object: &SceneObject,
     placed: &Placed,
     charted: &Charted<'_>,
     asked: u32,
@@ -305,7 +313,7 @@ fn fit(
 }
 
 fn unwrap_at_most(
-    object: &Object,
+    object: &SceneObject,
     charted: &Charted<'_>,
     density: f64,
     gap: u32,
@@ -338,7 +346,7 @@ const SPARSEST: f64 = 1e-9;
 const MOST_DENSITIES: u32 = 40;
 
 /// Gives the parts their shares of the unwrapped whole.
-fn split(object: &Object, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {
+fn split(object: &SceneObject, unwrapped: &Unwrapped, shrink: Vec2) -> Vec<Arc<TriangleMesh>> {
     let (mut first_vertex, mut first_index) = (0u32, 0usize);
     let mut meshes = Vec::with_capacity(object.primitives.len());
     for part in &object.primitives {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_mesh::TriangleMesh;
 use lumbre_scene::MaterialTextures;
 
-use super::{Object, PlacedPrimitive};
+use super::{PlacedPrimitive, SceneObject};
 use crate::BakeError;
 
 /// Which of a mesh's two sets of coordinates a material's textures read.
@@ -47,7 +47,7 @@ pub(crate) fn reading_first(mesh: &TriangleMesh, textures: &MaterialTextures) ->
 ///
 /// # Errors
 /// [`BakeError::CoordinatesInUse`] where both sets are read, by more than normal and occlusion maps, and differ: a mesh has no third.
-pub(crate) fn free_second(object: &Object) -> Result<(Object, Vec<bool>), BakeError> {
+pub(crate) fn free_second(object: &SceneObject) -> Result<(SceneObject, Vec<bool>), BakeError> {
     let mut freed = object.clone();
     let mut moved = vec![false; object.primitives.len()];
     for (part, moved) in freed.primitives.iter_mut().zip(&mut moved) {

@@ -10,7 +10,7 @@ use super::leaks::Leaks;
 use super::material::{LARGEST_REFLECTANCE, Side};
 use super::rooms::{Room, all_within, pieces};
 use super::texture_coordinates::textures_of;
-use super::{LightmapLayout, Object, SurfaceMaterial};
+use super::{LightmapLayout, SceneObject, SurfaceMaterial};
 use crate::BakeError;
 use crate::cancel_token::CancelToken;
 
@@ -147,7 +147,7 @@ const MOST_TRIANGLES: usize = 1 << 28;
 impl BakeScene {
     /// Extracts the triangles; odd ones are named in `warnings`.
     pub fn new(
-        objects: &[Object],
+        objects: &[SceneObject],
         layout: &LightmapLayout,
         space: Canonical,
         stop: &CancelToken,
@@ -190,7 +190,7 @@ impl BakeScene {
 }
 
 fn extract(
-    object: &Object,
+    object: &SceneObject,
     index: u32,
     layout: &LightmapLayout,
     space: Canonical,

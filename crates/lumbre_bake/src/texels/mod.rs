@@ -28,6 +28,7 @@ pub(crate) mod radiance_cache;
 pub(crate) mod resolution_error;
 pub(crate) mod rounds;
 pub(crate) mod seams;
+pub(crate) mod separate_light;
 pub(crate) mod shafts;
 pub(crate) mod shared_light;
 pub(crate) mod smooth;

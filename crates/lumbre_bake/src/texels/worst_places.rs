@@ -6,7 +6,7 @@ use glam::{DVec3, IVec3, Vec3};
 
 use super::footprint::{Texel, receiver};
 use crate::WorstPlace;
-use crate::scene::{BakeScene, Object};
+use crate::scene::{BakeScene, SceneObject};
 
 /// Places are cubes of this share of the level's longest side.
 const PLACE: f32 = 1.0 / 8.0;
@@ -28,7 +28,7 @@ struct Place {
 /// what is stated for all of them together.
 pub(crate) fn worst_places(
     scene: &BakeScene,
-    objects: &[Object],
+    objects: &[SceneObject],
     texels: &[Texel],
     squares: &[f32],
     whole: f64,

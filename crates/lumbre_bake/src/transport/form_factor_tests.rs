@@ -3,17 +3,15 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
-use lumbre_optics::Material;
 
 use super::form_factors::FormFactors;
 use super::patches::Patches;
 use crate::cancel_token::CancelToken;
 use crate::options::FormFactorMethod;
 use crate::progress::{Progress, Watch};
-use crate::scene::{BakeScene, Canonical, Object, PlacedPrimitive, lay_out};
+use crate::scene::{BakeScene, Canonical, PlacedPrimitive, SceneObject, lay_out};
 use crate::{BakeOptions, Density};
 
 fn carry_on(_: Progress) -> ControlFlow<()> {
@@ -33,20 +31,11 @@ pub(super) fn square(origin: [f32; 3], u: Vec3, v: Vec3) -> [[Vec3; 3]; 2] {
 
 /// A scene of matt objects, one per list of triangles.
 pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
-    let mut world = World::new();
-    let objects: Vec<Object> = objects
-        .iter()
-        .map(|triangles| Object {
-            name: "object".into(),
-            primitives: vec![PlacedPrimitive {
-                entity: world.spawn_empty().id(),
-                mesh: mesh(triangles),
-                material: Material::default(),
-                textures: None,
-                transform: glam::DAffine3::IDENTITY,
-            }],
-        })
-        .collect();
+    let object = |triangles: &&[[Vec3; 3]]| {
+        let primitive = PlacedPrimitive { mesh: mesh(triangles), ..PlacedPrimitive::default() };
+        SceneObject::new("object", vec![primitive])
+    };
+    let objects: Vec<SceneObject> = objects.iter().map(object).collect();
     let points = objects.iter().flat_map(|o| &o.primitives[0].mesh.positions).map(|p| p.as_dvec3());
     let space = Canonical::of(points);
     let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };

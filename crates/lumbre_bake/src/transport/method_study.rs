@@ -16,7 +16,7 @@ use crate::cancel_token::CancelToken;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream};
-use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::scene::{BakeScene, from_world, lay_out};
 use crate::{BakeError, BakeOptions};
 
 /// The two methods.
@@ -49,14 +49,12 @@ pub fn form_factor_errors(
     converged: usize,
 ) -> Result<Vec<FormFactorErrors>, BakeError> {
     options.check()?;
-    let objects = collect(world)?;
-    let points =
-        objects.iter().flat_map(|o| &o.primitives).flat_map(|part| world_points(&part.transform, &part.mesh));
-    let space = Canonical::of(points);
+    let input = from_world(world).0.checked()?;
+    let space = input.space();
     let mut warnings = Vec::new();
-    let layout = lay_out(&objects, space, options, &mut warnings)?;
-    let scene = BakeScene::new(&objects, &layout, space, &CancelToken::default(), &mut warnings)?;
-    let sources = Sources::new(&scene, emitters(&scene), lights(world), sky(world));
+    let layout = lay_out(&input.objects, space, options, &mut warnings)?;
+    let scene = BakeScene::new(&input.objects, &layout, space, &CancelToken::default(), &mut warnings)?;
+    let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
     let mut carry_on = |_| ControlFlow::Continue(());

@@ -12,8 +12,8 @@ use lumbre_bake::{
 };
 use lumbre_optics::{AlphaMode, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{
-    Camera, DynamicObject, EmissiveLight, Hidden, Image, MaterialTextures, Mesh, MetallicRoughnessTexture,
-    Name, Sampler, TextureReference, Transform, Wrap,
+    Camera, DynamicObject, EmissiveLight, Hidden, Image, LightmapScale, MaterialTextures, Mesh,
+    MetallicRoughnessTexture, Name, Sampler, TextureReference, Transform, Wrap,
 };
 
 use crate::corner::corner;
@@ -231,6 +231,10 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
             let crate_ = object(world, "box");
             world.despawn(crate_);
         }),
+        ("scale", |world| {
+            let crate_ = object(world, "box");
+            world.entity_mut(crate_).insert(LightmapScale(2.0));
+        }),
         ("something moves", |world| moving(world, 0.0)),
         ("it moves elsewhere", |world| moving(world, 1e-9)),
         ("and a face shines in real time", |world| {
@@ -282,6 +286,7 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         memory: _,
         form_factors: _,
         resolution_error: _,
+        separate_light: _,
     } = default;
     let options = [
         ("density", BakeOptions { density: Density::MapSize(64), ..default }),
@@ -292,6 +297,7 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("gap", BakeOptions { gap: 4, ..default }),
         ("seed", BakeOptions { seed: 1, ..default }),
         ("form factors", BakeOptions { form_factors: FormFactorMethod::GlobalLines, ..default }),
+        ("separate light", BakeOptions { separate_light: true, ..default }),
         ("resolution error", BakeOptions { resolution_error: false, ..default }),
         ("solver", BakeOptions { solver: Solver::Jacobi, ..default }),
         ("denoise", BakeOptions { denoise: false, ..default }),

@@ -16,7 +16,7 @@ use super::{container, export_scene, uri};
 use crate::lightmap_files::{
     EncodingError, LightmapFileError, PackedFormat, Supercompression, lightmap_to_ktx2, lightmap_to_open_exr,
 };
-use crate::{IrradianceVolume, LightmapEncoding, LightmapImage};
+use crate::{IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage, SeparateLight};
 
 /// What is written beside what a glTF file and its OpenEXR lightmaps need.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -187,6 +187,7 @@ pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Resul
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let mut lightmaps = LightmapFiles::new(&stem, options.encoding);
     let nodes = Nodes::collect(world, &mut lightmaps)?;
+    lightmaps.add_separate_light(world);
     let scene = export_scene::settings(world)?;
 
     let mut files = Files::default();
@@ -398,6 +399,22 @@ impl LightmapFiles {
         }
         self.volumes.push((name, volume.clone()));
         reference
+    }
+
+    /// The direct and the bounced light of the images beside them, where the World has it. Last: nothing names these files.
+    pub(crate) fn add_separate_light(&mut self, world: &mut World) {
+        let mut query = world.query::<(&Lightmap, &SeparateLight)>();
+        let separate: HashMap<_, _> =
+            query.iter(world).map(|(map, own)| (Arc::as_ptr(&map.image), own)).collect();
+        let beside = |(name, image): &(String, Arc<LightmapImage>)| {
+            let SeparateLight { direct, bounced } = separate.get(&Arc::as_ptr(image))?;
+            let stem = name.strip_suffix(".exr").unwrap_or(name);
+            let file =
+                |light: &str, image: &Arc<LightmapImage>| (format!("{stem}.{light}.exr"), Arc::clone(image));
+            Some([file("direct", direct), file("bounced", bounced)])
+        };
+        let files: Vec<_> = self.images.iter().filter_map(beside).flatten().collect();
+        self.images.extend(files);
     }
 
     /// Where an image lies, as the file that shows it names it.

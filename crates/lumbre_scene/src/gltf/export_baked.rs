@@ -71,7 +71,8 @@ pub fn save_baked(
     baked.volumes(world)?;
     baked.sky(world)?;
     baked.extensions_used();
-    let Baked { mut patch, lightmaps, primitives, .. } = baked;
+    let Baked { mut patch, mut lightmaps, primitives, .. } = baked;
+    lightmaps.add_separate_light(world);
     let (data, mut notes) = (primitives.data, primitives.notes);
 
     let mut files = Files::default();

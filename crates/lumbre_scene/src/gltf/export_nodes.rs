@@ -16,7 +16,7 @@ use super::quadric_extension::QuadricExtension;
 use super::{export_light, export_material, export_scene};
 use crate::{
     ActiveCamera, Camera, DynamicObject, EmissiveLight, Extras, Hidden, IrradianceVolume, Lightmap,
-    LightmapImage, MaterialTextures, Medium, Mesh, Primitive, Quadric, Transform,
+    LightmapImage, LightmapScale, MaterialTextures, Medium, Mesh, Primitive, Quadric, Transform,
 };
 
 /// The lists of a file being written.
@@ -40,6 +40,7 @@ struct Appearance {
     lightmap: Option<Arc<LightmapImage>>,
     hidden: bool,
     emissive_light: bool,
+    lightmap_scale: Option<LightmapScale>,
     quadric: Option<Quadric>,
     dynamic: bool,
 }
@@ -123,6 +124,7 @@ impl Nodes {
             if let Some((appearance, group)) = own {
                 object.hidden = appearance.hidden;
                 object.emissive_light = appearance.emissive_light;
+                object.lightmap_scale = appearance.lightmap_scale.map(|scale| scale.0);
                 result.show(
                     world,
                     &mut node,
@@ -155,6 +157,7 @@ impl Nodes {
                     dynamic: (appearance.dynamic && !dynamic).then_some(true),
                     hidden: appearance.hidden,
                     emissive_light: appearance.emissive_light,
+                    lightmap_scale: appearance.lightmap_scale.map(|scale| scale.0),
                 };
                 object_extension(&mut below, object)?;
                 result.nodes.push(below.into());
@@ -339,6 +342,7 @@ fn appearance(world: &World, entity: Entity, dynamic: bool) -> Appearance {
         lightmap: world.get::<Lightmap>(entity).map(|lightmap| lightmap.image.clone()),
         hidden: world.get::<Hidden>(entity).is_some(),
         emissive_light: world.get::<EmissiveLight>(entity).is_some(),
+        lightmap_scale: world.get::<LightmapScale>(entity).copied(),
         quadric: world.get::<Quadric>(entity).cloned(),
         dynamic: dynamic || world.get::<DynamicObject>(entity).is_some(),
     }
@@ -350,7 +354,7 @@ fn ancestors(world: &World, entity: Entity) -> impl Iterator<Item = Entity> + '_
 }
 
 fn object_extension(node: &mut Map<String, Value>, object: ObjectExtension) -> Result<(), SaveError> {
-    if object.dynamic.is_some() || object.hidden || object.emissive_light {
+    if object != ObjectExtension::default() {
         let extension = serde_json::to_value(object);
         extend(node, "LUMBRE_object", extension.map_err(|source| SaveError::Json { source })?);
     }

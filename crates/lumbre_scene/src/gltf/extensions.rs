@@ -179,7 +179,7 @@ pub(crate) struct IrradianceVolumeExtension {
 }
 
 /// `nodes[i].extensions.LUMBRE_object`.
-#[derive(Deserialize, Serialize, Clone, Debug, Default)]
+#[derive(Deserialize, Serialize, Clone, Debug, Default, PartialEq)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ObjectExtension {
     /// `false` says of a mesh with a skeleton that it stands still.
@@ -189,6 +189,8 @@ pub(crate) struct ObjectExtension {
     pub hidden: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub emissive_light: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lightmap_scale: Option<f64>,
 }
 
 /// `nodes[i].extensions.LUMBRE_camera`, beside the node's `camera`.

@@ -285,6 +285,9 @@ fn spawn_primitive(world: &mut World, node: &PreparedNode, primitive: &PreparedP
     if node.emissive_light {
         entity.insert(EmissiveLight);
     }
+    if let Some(scale) = node.lightmap_scale {
+        entity.insert(scale);
+    }
     if node.dynamic {
         entity.insert(DynamicObject);
     } else {

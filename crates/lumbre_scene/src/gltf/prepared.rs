@@ -25,8 +25,8 @@ use super::uri::Base;
 use super::value::number;
 use super::{import_light, import_material, import_medium, import_mesh, import_scene};
 use crate::{
-    Camera, IrradianceVolume, Lightmap, MaterialTextures, Medium, Primitive, Quadric, SceneSettings,
-    Transform,
+    Camera, IrradianceVolume, Lightmap, LightmapScale, MaterialTextures, Medium, Primitive, Quadric,
+    SceneSettings, Transform,
 };
 
 /// A primitive of a mesh with its material.
@@ -56,6 +56,7 @@ pub(crate) struct PreparedNode {
     pub dynamic: bool,
     pub hidden: bool,
     pub emissive_light: bool,
+    pub lightmap_scale: Option<LightmapScale>,
     pub quadric: Option<Quadric>,
     pub extras: Option<serde_json::Value>,
 }
@@ -237,12 +238,26 @@ pub(crate) fn prepare(
             dynamic: dynamic.contains(&index),
             hidden: object.hidden,
             emissive_light: object.emissive_light,
+            lightmap_scale: lightmap_scale(object.lightmap_scale, &place)?,
             quadric,
             extras: node.extras.clone(),
         });
     }
     let (node_count, files) = (document.nodes.len(), Vec::new());
     Ok(Prepared { nodes, meshes, settings, node_count, files, photometric_lights, states_exposure })
+}
+
+/// `LUMBRE_object.lightmapScale` of a node.
+fn lightmap_scale(found: Option<f64>, place: &str) -> Result<Option<LightmapScale>, LoadProblem> {
+    match found {
+        Some(scale) if !(scale.is_finite() && scale > 0.0) => Err(LoadProblem::Value {
+            place: place.to_owned(),
+            field: "LUMBRE_object.lightmapScale".to_owned(),
+            value: scale.to_string(),
+            expected: "use a factor above 0, 1 for the density of the scene".to_owned(),
+        }),
+        scale => Ok(scale.map(LightmapScale)),
+    }
 }
 
 /// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.

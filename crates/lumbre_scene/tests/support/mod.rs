@@ -195,6 +195,7 @@ fn describe(world: &World, entity: Entity, depth: usize, text: &mut String) {
     let _ = write!(text, "{:?} ", world.get::<DynamicObject>(entity));
     let _ = write!(text, "{:?} ", world.get::<Hidden>(entity));
     let _ = write!(text, "{:?} ", world.get::<EmissiveLight>(entity));
+    let _ = write!(text, "{:?} ", world.get::<LightmapScale>(entity));
     let lightmap = world.get::<Lightmap>(entity).map(|lightmap| {
         let image = &lightmap.image;
         (image.width, image.height, image.encoding, image.texels.clone())
