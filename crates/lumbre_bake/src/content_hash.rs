@@ -12,6 +12,7 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{AlphaMode, Attenuation, BakeMode, Light, LightKind, Material, SpotCone, Surface};
 use lumbre_scene::{Image, MaterialTextures, MetallicRoughnessTexture, TextureReference, Wrap};
+use serde::{Deserialize, Serialize};
 
 use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, from_world};
 use crate::{BakeError, BakeOptions, Density};
@@ -20,18 +21,13 @@ use crate::{BakeError, BakeOptions, Density};
 pub(crate) const BAKER: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("LUMBRE_BAKE_SOURCES"));
 
 /// A BLAKE3 hash of a bake's input; 64 hexadecimal digits when displayed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ContentHash([u8; 32]);
 
 impl ContentHash {
     /// Its bytes.
     pub fn bytes(&self) -> &[u8; 32] {
         &self.0
-    }
-
-    /// From its bytes.
-    pub(crate) fn of_bytes(bytes: [u8; 32]) -> Self {
-        Self(bytes)
     }
 
     /// The hash of what this stands for, made from what `other` stands for.

@@ -44,6 +44,7 @@ mod baked_scene;
 mod cancel_token;
 mod checkpoint;
 mod chunks;
+mod conjugate_gradients;
 mod content_hash;
 mod disjoint_sets;
 mod error;

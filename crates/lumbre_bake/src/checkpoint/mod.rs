@@ -8,12 +8,12 @@
 //!   checksum  32 bytes   BLAKE3 of all that
 //!   blocks, each:
 //!     bytes    u64       of the block's content: all up to its checksum
-//!     stage    u8        by its place in the order of the stages
-//!     of       u64       values of the whole list
-//!     start    u64       the first of them that is here
-//!     count    u64       how many are here; 0 where the time ran out
-//!     seconds  f64       that the bake had taken
-//!     values
+//!     in the format of postcard:
+//!       stage            by its place in the order of the stages
+//!       of               values of the whole list
+//!       start            the first of them that is here
+//!       seconds          that the bake had taken
+//!       values           none where the time ran out
 //!     checksum 32 bytes  BLAKE3 of the checksum before and of this block
 //! ```
 //!
@@ -22,7 +22,7 @@
 //! follows cannot tell where its values come from.
 //!
 //! The header is written beside and renamed. Blocks are appended, each value once; a block that a crash has cut short fails its checksum,
-//! and the bake goes on from the one before. Nothing is allocated by a count that the bytes of its block do not hold.
+//! and the bake goes on from the one before.
 
 pub(crate) mod record;
 pub(crate) mod tape;
@@ -34,7 +34,7 @@ pub(crate) use record::Record;
 pub(crate) use tape::Tape;
 
 /// The version of the format: another is not read.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Where a bake keeps what it has computed, and whether it begins with what is kept there.
 ///

@@ -6,7 +6,9 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::record::{Cursor, Record};
+use serde::{Deserialize, Serialize};
+
+use super::record::{self, Record};
 use super::{Checkpoint, VERSION};
 use crate::content_hash::ContentHash;
 use crate::error::CheckpointError;
@@ -14,15 +16,13 @@ use crate::error::CheckpointError;
 const MAGIC: &[u8; 8] = b"LUMBRECP";
 const CHECKSUM: usize = 32;
 const HEADER: usize = 8 + 4 + 32 + CHECKSUM;
-/// Bytes of a block's content before its values.
-const HEAD: usize = 1 + 8 + 8 + 8 + 8;
 /// More than this does not wait for the interval.
 const MOST_PENDING: usize = 64 << 20;
 /// Writing may take one part in so many of the time.
 const SHARE: u32 = 20;
 
 /// Which values of which list a block holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Place {
     /// The stage, by its place in the order.
     pub stage: u8,
@@ -143,7 +143,10 @@ impl Tape {
             self.cut();
         }
         let Some(open) = &mut self.open else { return };
-        open.append(place, values, seconds);
+        match record::written(&(place, seconds, values)) {
+            Ok(content) => open.append(&content),
+            Err(error) => return self.give_up(&io::Error::other(error)),
+        }
         if open.pending.len() > MOST_PENDING || open.written.elapsed() >= open.interval {
             self.flush();
         }
@@ -198,7 +201,7 @@ impl OpenTape {
         read(&mut self.file, &mut size)?;
         let bytes = u64::from_le_bytes(size);
         // What the file does not hold is not allocated.
-        if bytes < HEAD as u64 || bytes > left - 8 || left - 8 - bytes < CHECKSUM as u64 {
+        if bytes > left - 8 || left - 8 - bytes < CHECKSUM as u64 {
             return Err(CUT);
         }
         let mut content = vec![0; bytes as usize];
@@ -209,34 +212,22 @@ impl OpenTape {
         if chain != checksum {
             return Err(DAMAGED);
         }
-        let mut from = Cursor(&content);
-        let head = (|| {
-            let head = <(u8, [u64; 3])>::read(&mut from)?;
-            Some((head, f64::read(&mut from)?))
-        })();
-        let Some(((stage, [of, start, count]), seconds)) = head else { return Err(DAMAGED) };
-        let fits = stage == place.stage && of == place.of as u64 && start == place.start as u64;
-        if !fits || count > of - start || !(seconds.is_finite() && seconds >= 0.0) {
+        let (at, seconds, values): (Place, f64, Vec<T>) = record::read(&content).ok_or(OTHER)?;
+        let fits = at == place && values.len() <= place.of - place.start;
+        if !fits || !(seconds.is_finite() && seconds >= 0.0) {
             return Err(OTHER);
         }
-        let values = from.list(count).filter(|_| from.0.is_empty()).ok_or(OTHER)?;
         self.chain = chain;
         self.end += 8 + bytes + CHECKSUM as u64;
         Ok(Some((values, seconds)))
     }
 
-    fn append<T: Record>(&mut self, place: Place, values: &[T], seconds: f64) {
-        let first = self.pending.len();
-        self.pending.extend_from_slice(&[0; 8]);
-        place.stage.write(&mut self.pending);
-        [place.of, place.start, values.len()].map(|n| n as u64).write(&mut self.pending);
-        seconds.write(&mut self.pending);
-        values.iter().for_each(|value| value.write(&mut self.pending));
-        let bytes = (self.pending.len() - first - 8) as u64;
-        self.pending[first..first + 8].copy_from_slice(&bytes.to_le_bytes());
-        self.chain = chained(&self.chain, &self.pending[first + 8..]);
+    fn append(&mut self, content: &[u8]) {
+        self.pending.extend_from_slice(&(content.len() as u64).to_le_bytes());
+        self.pending.extend_from_slice(content);
+        self.chain = chained(&self.chain, content);
         self.pending.extend_from_slice(&self.chain);
-        self.end += 8 + bytes + CHECKSUM as u64;
+        self.end += (8 + content.len() + CHECKSUM) as u64;
     }
 }
 

@@ -21,6 +21,7 @@ mod relit;
 mod report;
 mod samples;
 mod samples_file;
+mod settled;
 
 pub(crate) use change::kept_bounces;
 pub(crate) use changes::{Changes, Usable};

@@ -2,10 +2,11 @@
 //! `samples_file`.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::changes::{bounds, emission, fold, layouts};
+use super::settled;
 use crate::content_hash::{ContentHash, Hashes};
-
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
 use crate::texels::footprint::{Footprint, Texel};
 use crate::texels::gather::{Gathered, Weights};
@@ -16,7 +17,7 @@ use crate::transport::direct::{Direct, Sources};
 pub struct Samples(pub(crate) Content);
 
 /// What is in there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Content {
     /// Of what was baked.
     pub content: ContentHash,
@@ -33,7 +34,7 @@ pub(crate) struct Content {
 }
 
 /// Of an object.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct ObjectSamples {
     pub hash: ContentHash,
     pub name: String,
@@ -51,13 +52,14 @@ pub(crate) struct ObjectSamples {
 }
 
 /// Of a texel that is not hidden.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct TexelSamples {
     /// Column and row in one number, as in its map.
     pub cell: u32,
     /// What it shows of its object, in one number.
     pub footprint: u32,
     pub direct: Direct,
+    #[serde(with = "settled")]
     pub gathered: Gathered,
     /// Irradiance by bounces that the map showed, W/m².
     pub bounced: Vec3,

@@ -5,8 +5,7 @@
 //!   version    u32       VERSION; everything is little endian
 //!   checksum  32 bytes   BLAKE3 of all that follows
 //!   length     u64       bytes of what the rest holds, which is a Zstandard frame: two thirds of it, as most of its digits are noise
-//!   content, identity, sampling, lights (32 bytes each), sky, centre, scale, density
-//!   objects, each: hash, name, box, emission, exitance, layout, texels, each some 160 bytes
+//!   `Content`, field by field, in the format of postcard; a texel takes some 150 bytes
 //! ```
 //!
 //! Nothing is allocated by a count that the bytes do not hold, nor more than the length; a file that is cut short or damaged is named so.
@@ -15,19 +14,13 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use glam::{DVec3, Vec2, Vec3};
-
-use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
-use crate::checkpoint::record::{Cursor, fields};
-use crate::checkpoint::{Record, tape};
-use crate::content_hash::ContentHash;
+use super::samples::{Content, Samples, TexelSamples};
+use crate::checkpoint::{record, tape};
 use crate::scene::Canonical;
-use crate::texels::gather::{Gathered, REPLICATES, Weights};
-use crate::transport::direct::Direct;
 
 const MAGIC: &[u8; 8] = b"LUMBRESA";
 /// The version of the format: another is not read.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const CHECKSUM: usize = 32;
 /// Of Zstandard: higher ones take longer and save no more.
 const LEVEL: i32 = 1;
@@ -53,174 +46,6 @@ pub enum SamplesError {
     Damaged,
 }
 
-/// What a texel has gathered, weights apart: those of settled samples follow from the rest.
-struct Settled {
-    sums: [Vec3; REPLICATES],
-    patch_errors: Vec2,
-    texel_variances: f32,
-    texel_reads: u32,
-    checks: u32,
-    differences: Vec3,
-    squared_differences: f32,
-    inverse_distances: f32,
-    samples: u32,
-}
-
-fields!(Settled {
-    sums: [Vec3; REPLICATES],
-    patch_errors: Vec2,
-    texel_variances: f32,
-    texel_reads: u32,
-    checks: u32,
-    differences: Vec3,
-    squared_differences: f32,
-    inverse_distances: f32,
-    samples: u32,
-});
-
-impl From<&Gathered> for Settled {
-    fn from(own: &Gathered) -> Self {
-        let Gathered {
-            sums,
-            weights: _,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-            rays: _,
-        } = *own;
-        Self {
-            sums,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-        }
-    }
-}
-
-impl From<Settled> for Gathered {
-    fn from(own: Settled) -> Self {
-        let Settled {
-            sums,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-        } = own;
-        let weights = sums.map(|sum| Weights::of_equal(sum, samples));
-        Self {
-            sums,
-            weights,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-            rays: 0,
-        }
-    }
-}
-
-impl Record for TexelSamples {
-    const LEAST: usize = 4 + 4 + Direct::LEAST + Settled::LEAST + 12 + 4;
-
-    fn write(&self, out: &mut Vec<u8>) {
-        let Self { cell, footprint, direct, gathered, bounced, neglected } = self;
-        (*cell, *footprint).write(out);
-        direct.write(out);
-        Settled::from(gathered).write(out);
-        bounced.write(out);
-        neglected.write(out);
-    }
-
-    fn read(from: &mut Cursor<'_>) -> Option<Self> {
-        let (cell, footprint) = Record::read(from)?;
-        let direct = Direct::read(from)?;
-        let gathered: Gathered = Settled::read(from)?.into();
-        let (bounced, neglected): (Vec3, f32) = Record::read(from)?;
-        let own = Self { cell, footprint, direct, gathered, bounced, neglected };
-        // No bake writes what is not a number; a map of it could not be mended.
-        own.is_sound().then_some(own)
-    }
-}
-
-fields!(ObjectSamples {
-    hash: ContentHash,
-    name: String,
-    low: Vec3,
-    high: Vec3,
-    emission: u32,
-    exitance: [Vec3; 2],
-    layout: u32,
-    texels: Vec<TexelSamples>,
-});
-
-fields!(Content {
-    content: ContentHash,
-    identity: ContentHash,
-    sampling: ContentHash,
-    lights: ContentHash,
-    sky: Vec3,
-    space: Canonical,
-    density: f64,
-    objects: Vec<ObjectSamples>,
-});
-
-fields!(Canonical { center: DVec3, scale: f64 });
-
-impl Record for DVec3 {
-    const LEAST: usize = 24;
-
-    fn write(&self, out: &mut Vec<u8>) {
-        self.to_array().write(out);
-    }
-
-    fn read(from: &mut Cursor<'_>) -> Option<Self> {
-        Record::read(from).map(Self::from_array)
-    }
-}
-
-impl Record for ContentHash {
-    const LEAST: usize = 32;
-
-    fn write(&self, out: &mut Vec<u8>) {
-        self.bytes().write(out);
-    }
-
-    fn read(from: &mut Cursor<'_>) -> Option<Self> {
-        Record::read(from).map(Self::of_bytes)
-    }
-}
-
-impl Record for String {
-    const LEAST: usize = 8;
-
-    fn write(&self, out: &mut Vec<u8>) {
-        (self.len() as u64).write(out);
-        out.extend_from_slice(self.as_bytes());
-    }
-
-    fn read(from: &mut Cursor<'_>) -> Option<Self> {
-        String::from_utf8(Record::read(from)?).ok()
-    }
-}
-
 impl Samples {
     /// Reads what [`Samples::write`] wrote.
     ///
@@ -244,12 +69,13 @@ impl Samples {
         }
         let (length, frame) = rest.split_first_chunk::<8>().ok_or(SamplesError::Damaged)?;
         let unpacked = unpacked(frame, u64::from_le_bytes(*length)).ok_or(SamplesError::Damaged)?;
-        let mut cursor = Cursor(&unpacked);
-        let content = Content::read(&mut cursor).filter(|_| cursor.0.is_empty());
-        let content = content.filter(|content| {
+        let content = record::read::<Content>(&unpacked).filter(|content| {
             let Canonical { center, scale } = content.space;
             let positive = |number: f64| number.is_finite() && number > 0.0;
-            positive(content.density) && positive(scale) && center.is_finite() && content.sky.is_finite()
+            let space = positive(content.density) && positive(scale) && center.is_finite();
+            // No bake writes what is not a number; a map of it could not be mended.
+            let mut texels = content.objects.iter().flat_map(|object| &object.texels);
+            space && content.sky.is_finite() && texels.all(TexelSamples::is_sound)
         });
         content.map(Self).ok_or(SamplesError::Damaged)
     }
@@ -259,9 +85,7 @@ impl Samples {
     /// # Errors
     /// [`SamplesError::Io`]; what was there is then as it was.
     pub fn write(&self, path: &Path) -> Result<(), SamplesError> {
-        let mut content = Vec::new();
-        self.0.write(&mut content);
-        let content = packed(&content)?;
+        let content = packed(&record::written(&self.0).map_err(io::Error::other)?)?;
         let beside = tape::temporary(path);
         let written = (|| {
             let mut file = loop {

@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use lumbre_rays::{Bvh, triangle_extent};
+use serde::{Deserialize, Serialize};
 
 use super::duplicates::superseded;
 use super::hidden_side::closed_pieces;
@@ -15,7 +16,7 @@ use crate::BakeError;
 use crate::cancel_token::CancelToken;
 
 /// The space in which everything is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Canonical {
     /// Its origin in the world, metres.
     pub center: DVec3,

@@ -5,12 +5,12 @@
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::footprint::{Texel, receiver};
 use super::incident::{GatherRequest, Hit, IncidentSample, SamplePath};
 pub(crate) use super::radiance_cache::RadianceCache;
 use super::tile_sequence::TileSequence;
-use crate::checkpoint::record::fields;
 use crate::sampling::Stream;
 use crate::scene::material::Side;
 use crate::transport::direct::Receiver;
@@ -105,7 +105,7 @@ impl Reading {
 /// The weights of a replicate's samples: their mean is 1 in the long run, so that what they are beside it can be taken out of what was
 /// gathered (regression; Owen and Zhou, "Safe and Effective Importance Sampling", 2000). Under light that is the same all around nothing
 /// else differs.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Weights {
     pub sum: f32,
     pub squares: f32,
@@ -114,8 +114,6 @@ pub(crate) struct Weights {
     /// And of that light, mean of the channels, with itself.
     pub light_squares: f32,
 }
-
-fields!(Weights { sum: f32, squares: f32, products: Vec3, light_squares: f32 });
 
 impl Weights {
     fn add(&mut self, weight: f32, light: Vec3) {
@@ -127,7 +125,7 @@ impl Weights {
 }
 
 /// What a texel has gathered: irradiance by bounces.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Gathered {
     /// Sum of the samples of each replicate.
     pub sums: [Vec3; REPLICATES],
@@ -150,20 +148,6 @@ pub(crate) struct Gathered {
     /// Rays cast.
     pub rays: u64,
 }
-
-fields!(Gathered {
-    sums: [Vec3; REPLICATES],
-    weights: [Weights; REPLICATES],
-    patch_errors: Vec2,
-    texel_variances: f32,
-    texel_reads: u32,
-    checks: u32,
-    differences: Vec3,
-    squared_differences: f32,
-    inverse_distances: f32,
-    samples: u32,
-    rays: u64,
-});
 
 /// Variance of weights below which they are all the same.
 const LEAST_SPREAD: f32 = 1e-4;

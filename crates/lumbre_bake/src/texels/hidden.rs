@@ -4,11 +4,11 @@
 
 use glam::Vec2;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::tiles::{Tiles, area, positions_of};
 use crate::BakeError;
-use crate::checkpoint::record::fields;
 use crate::chunks::in_chunks;
 use crate::progress::{Clock, Watch};
 use crate::sampling::{Sequence, Stream, cosine_about};
@@ -172,14 +172,12 @@ fn looks_odd(scene: &BakeScene, texel: &Texel, probes: u32) -> bool {
 }
 
 /// What was found out about a texel.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Judged {
     /// Whether each of the points of its fine footprint is in the open, bit by bit; empty where all are.
     open: Vec<u64>,
     rays: u32,
 }
-
-fields!(Judged { open: Vec<u64>, rays: u32 });
 
 /// The evenly spread points of a texel that are judged, the same ones each time.
 fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> {

@@ -4,10 +4,10 @@
 //! itself, by its own estimate, is taken away. Not the sampling error: that is `error_ledger`.
 
 use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::footprint::{Footprint, FootprintPoint, Texel, receiver};
 use super::gather::{Gathered, REPLICATES, RadianceCache};
-use crate::checkpoint::record::fields;
 use crate::chunks::in_chunks;
 use crate::progress::{Stage, Watch};
 use crate::report::ResolutionReport;
@@ -28,7 +28,7 @@ const GATHER_RAYS: u32 = 32;
 const JUDGES: u32 = 8;
 
 /// A point, baked on its own.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct DensePoint {
     pub triangle: u32,
     pub at: (f32, f32),
@@ -42,17 +42,6 @@ pub(crate) struct DensePoint {
     pub differences: Vec3,
     pub rays: u64,
 }
-
-fields!(DensePoint {
-    triangle: u32,
-    at: (f32, f32),
-    counts: bool,
-    direct: [Vec3; 2],
-    indirect: [Vec3; 2],
-    checks: u32,
-    differences: Vec3,
-    rays: u64,
-});
 
 /// Points that the finished map is compared with; none if that is not asked for, or the time is up. `cache` is `None` where nothing bounces.
 ///

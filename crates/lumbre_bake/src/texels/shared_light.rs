@@ -4,6 +4,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::allocation::{Allotment, allot_within};
 use super::error_estimate::spread;
@@ -14,7 +15,6 @@ use super::local_light::LocalLight;
 use super::smooth::{Estimates, mean, smooth};
 use super::surroundings::Surroundings;
 use super::tile_sequence::TileSequence;
-use crate::checkpoint::record::fields;
 use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
 use crate::sampling::{Stream, hash};
@@ -23,7 +23,7 @@ use crate::transport::light_cut::Rest;
 use crate::{BakeError, BakeOptions};
 
 /// What a texel has found.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Shared {
     /// Sum of the samples of each replicate, of what is baked.
     pub sums: [Vec3; REPLICATES],
@@ -36,8 +36,6 @@ pub(crate) struct Shared {
     /// Rays cast.
     pub rays: u32,
 }
-
-fields!(Shared { sums: [Vec3; REPLICATES], mixed: Vec3, inverse_distances: f32, samples: u32, rays: u32 });
 
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;

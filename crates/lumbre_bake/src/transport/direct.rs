@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 use lumbre_optics::LightKind;
+use serde::{Deserialize, Serialize};
 
 use super::cut_out::Pieces;
 use super::emitter_tree::{EXACT_EMITTERS, EmitterTree, TERM_ERROR};
@@ -15,7 +16,6 @@ use super::receiver_quadrature::ReceiverQuadrature;
 use super::share_variance::{share_variance, uneven_variance};
 use super::visibility::{PartOccluders, Visibility};
 use super::visible_part::visible_part;
-use crate::checkpoint::record::fields;
 use crate::sampling::{Sequence, hash, triangle_point};
 use crate::scene::{BakeScene, PlacedLight};
 
@@ -33,7 +33,7 @@ pub(crate) struct Receiver {
 }
 
 /// Irradiance, W/m².
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Direct {
     /// From emissive triangles and static lights: goes into the map.
     pub baked: Vec3,
@@ -51,26 +51,14 @@ pub(crate) struct Direct {
     pub seen: Seen,
 }
 
-fields!(Direct {
-    baked: Vec3,
-    mixed: Vec3,
-    variance: f32,
-    caution: f32,
-    rays: u32,
-    sampled: bool,
-    seen: Seen
-});
-
 /// What a receiver saw of the sources.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Seen {
     /// Some source was seen by one sample and not by another: a penumbra, or a shadow's edge.
     pub partly: bool,
     /// One number for each combination of hidden sources.
     pub signature: u32,
 }
-
-fields!(Seen { partly: bool, signature: u32 });
 
 impl Seen {
     /// What the samples to source `id` found. Sources that are wholly seen, or that do not shine here, leave no mark: which of them

@@ -13,7 +13,7 @@ use super::method_study::form_factor_errors;
 use crate::cancel_token::CancelToken;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, collect, lay_out, lights, sky, world_points};
+use crate::scene::{BakeScene, from_world, lay_out};
 use crate::{BakeOptions, BakeReport, Density, Quality};
 
 const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
@@ -38,13 +38,12 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
         solver,
         ..BakeOptions::default()
     };
-    let objects = collect(world).unwrap();
-    let points =
-        objects.iter().flat_map(|o| &o.primitives).flat_map(|part| world_points(&part.transform, &part.mesh));
-    let space = Canonical::of(points);
-    let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
-    let scene = BakeScene::new(&objects, &layout, space, &CancelToken::default(), &mut Vec::new()).unwrap();
-    let sources = Sources::new(&scene, emitters(&scene), lights(world), sky(world));
+    let input = from_world(world).0.checked().unwrap();
+    let space = input.space();
+    let layout = lay_out(&input.objects, space, &options, &mut Vec::new()).unwrap();
+    let scene =
+        BakeScene::new(&input.objects, &layout, space, &CancelToken::default(), &mut Vec::new()).unwrap();
+    let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut watch = Watch::new(&mut carry_on, None);
     let mut report = BakeReport::default();

@@ -4,13 +4,13 @@
 //! Not the counting (`cosine_rays`, `global_lines`), nor the solution of the system they make.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::near_pairs::{NearPairs, near_pairs};
 use super::patches::Patches;
 use super::{cosine_rays, global_lines};
 use crate::BakeError;
 use crate::cancel_token::CancelToken;
-use crate::checkpoint::record::fields;
 use crate::options::FormFactorMethod;
 use crate::progress::Watch;
 use crate::scene::BakeScene;
@@ -195,7 +195,7 @@ impl FormFactors {
 }
 
 /// Rays of one patch, in two halves: how many met each other patch, by index, began inside other geometry, met nothing.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Cast {
     pub met: [Vec<(u32, u32)>; 2],
     pub inside: [u32; 2],
@@ -203,8 +203,6 @@ pub(crate) struct Cast {
     /// How many they were.
     pub count: [u32; 2],
 }
-
-fields!(Cast { met: [Vec<(u32, u32)>; 2], inside: [u32; 2], missed: [u32; 2], count: [u32; 2] });
 
 /// The same, of one half or of both together.
 #[derive(Clone, Debug, Default)]

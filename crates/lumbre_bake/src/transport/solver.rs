@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::components::levels;
 use super::form_factors::FormFactors;
+use crate::conjugate_gradients::{self, System};
 use crate::options::Solver;
 
 /// A solution and how it was come by.
@@ -44,7 +45,9 @@ impl Solver {
             Self::GaussSeidel => {
                 stationary(factors, reflectance, emission, tolerance, size, gauss_seidel_sweep)
             }
-            Self::ConjugateGradients => conjugate_gradients(factors, reflectance, emission, tolerance, size),
+            Self::ConjugateGradients => {
+                by_conjugate_gradients(factors, reflectance, emission, tolerance, size)
+            }
         };
         // Of the part that is solved worst, at most.
         solution.residual *= parts;
@@ -105,7 +108,7 @@ fn stationary(
     solution
 }
 
-fn conjugate_gradients(
+fn by_conjugate_gradients(
     factors: &FormFactors,
     reflectance: &[f64],
     emission: &[f64],
@@ -122,23 +125,12 @@ fn conjugate_gradients(
         .zip(reflectance)
         .map(|(&a, &r)| if r > 0.0 { f64::from(a) / r } else { 1.0 })
         .collect();
-    let apply = |x: &[f64]| -> Vec<f64> {
-        (0..x.len())
-            .into_par_iter()
-            .map(|i| {
-                if reflectance[i] > 0.0 {
-                    diagonal[i] * x[i] - factors.row(i).map(|(j, g)| g * x[j]).sum::<f64>()
-                } else {
-                    0.0
-                }
-            })
-            .collect()
-    };
+    let system = Radiosity { factors, reflectance, diagonal: &diagonal, enough: tolerance * size };
     let mut x: Vec<f64> =
         emission.iter().zip(reflectance).map(|(&e, &r)| if r > 0.0 { e } else { 0.0 }).collect();
-    let applied = apply(&x);
+    let applied = system.multiply(&x);
     // The right-hand side is A (E/ρ + F known).
-    let mut residual: Vec<f64> = (0..x.len())
+    let residual: Vec<f64> = (0..x.len())
         .map(|i| {
             if reflectance[i] > 0.0 {
                 diagonal[i] * (emission[i] + reflectance[i] * from_known[i]) - applied[i]
@@ -147,42 +139,48 @@ fn conjugate_gradients(
             }
         })
         .collect();
-    // diagonal⁻¹ residual is the residual of the equation B = E + ρ F B itself.
-    let precondition = |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
-    let mut z = precondition(&residual);
-    let mut direction = z.clone();
-    let mut rz = dot(&residual, &z);
-    let mut iterations = 0;
-    let mut relative = norm(factors, &z) / size;
-    while relative > tolerance && rz > 0.0 && iterations < MOST_ITERATIONS && !factors.stop.is_cancelled() {
-        let applied = apply(&direction);
-        let curvature = dot(&direction, &applied);
-        if curvature <= 0.0 {
-            break;
-        }
-        let step = rz / curvature;
-        for i in 0..x.len() {
-            x[i] += step * direction[i];
-            residual[i] -= step * applied[i];
-        }
-        z = precondition(&residual);
-        let next = dot(&residual, &z);
-        let ratio = next / rz;
-        rz = next;
-        for (d, z) in direction.iter_mut().zip(&z) {
-            *d = z + ratio * *d;
-        }
-        iterations += 1;
-        relative = norm(factors, &z) / size;
-    }
+    let (iterations, left) = conjugate_gradients::solve(&system, &mut x, residual);
+    let (iterations, residual) = (iterations as u32, norm(factors, &left) / size);
     for (x, known) in x.iter_mut().zip(&known) {
         *x += known;
     }
-    Solution { radiosity: x, iterations, residual: relative }
+    Solution { radiosity: x, iterations, residual }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// The system [diag(A/ρ) - G] B = A E/ρ of patches that reflect.
+struct Radiosity<'a> {
+    factors: &'a FormFactors,
+    reflectance: &'a [f64],
+    /// A/ρ; 1 where nothing is reflected.
+    diagonal: &'a [f64],
+    /// Norm of the residual that is small enough.
+    enough: f64,
+}
+
+impl System for Radiosity<'_> {
+    fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        let Self { factors, reflectance, diagonal, .. } = self;
+        let row = |i: usize| {
+            if reflectance[i] > 0.0 {
+                diagonal[i] * x[i] - factors.row(i).map(|(j, g)| g * x[j]).sum::<f64>()
+            } else {
+                0.0
+            }
+        };
+        (0..x.len()).into_par_iter().map(row).collect()
+    }
+
+    /// The residual of the equation B = E + ρ F B itself.
+    fn precondition(&self, residual: &[f64]) -> Vec<f64> {
+        residual.iter().zip(self.diagonal).map(|(r, d)| r / d).collect()
+    }
+
+    fn goes_on(&self, steps: usize, left: &[f64], energy: f64) -> bool {
+        norm(self.factors, left) > self.enough
+            && energy > 0.0
+            && steps < MOST_ITERATIONS as usize
+            && !self.factors.stop.is_cancelled()
+    }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::samples::{Reading, Sample};
 use super::{Maps, NO_CHART};
 use crate::cancel_token::CancelToken;
+use crate::conjugate_gradients::{self, System};
 use crate::report::SeamReport;
 
 /// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.
@@ -28,14 +29,14 @@ const LIMIT: f64 = 2.0;
 const BESIDE: f64 = 4.0;
 /// Relative residual at which conjugate gradients end, and their most steps.
 const RESIDUAL: f64 = 1e-6;
-const MOST_STEPS: u32 = 400;
+const MOST_STEPS: usize = 400;
 /// Times that texels at their limit are taken out and the others solved again.
 const ACTIVE_SETS: u32 = 6;
 
 /// How long the solution is sought.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patience {
-    steps: u32,
+    steps: usize,
     active_sets: u32,
 }
 
@@ -253,7 +254,7 @@ impl<'a> Channel<'a> {
         let mut held = vec![false; count];
         let mut changes = vec![0.0; count];
         for _ in 0..patience.active_sets {
-            self.conjugate_gradients(&held, &mut changes, patience.steps);
+            self.solve_free(&held, &mut changes, patience.steps);
             let mut cut = false;
             for ((change, [low, high]), held) in changes.iter_mut().zip(&self.bounds).zip(&mut held) {
                 let within = change.clamp(*low, *high);
@@ -269,47 +270,55 @@ impl<'a> Channel<'a> {
     }
 
     /// Solves for the changes that are not held, starting from what they are.
-    fn conjugate_gradients(&self, held: &[bool], changes: &mut [f64], steps: u32) {
-        let count = changes.len();
-        let free = |vector: &mut [f64]| {
-            for (value, _) in vector.iter_mut().zip(held).filter(|(_, held)| **held) {
-                *value = 0.0;
-            }
-        };
-        let multiply = |x: &[f64], jumps: Option<&[f64]>| {
-            let mut product: Vec<f64> = x.iter().zip(&self.stiffness).map(|(x, s)| x * s).collect();
-            for (index, equation) in self.equations.iter().enumerate() {
-                let jump = jumps.map_or(0.0, |jumps| jumps[index]);
-                equation.add_transposed(self.weights[index] * (equation.apply(x) + jump), &mut product);
-            }
-            product
-        };
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    fn solve_free(&self, held: &[bool], changes: &mut [f64], most_steps: usize) {
         let mut residual: Vec<f64> =
-            multiply(changes, Some(&self.jumps)).into_iter().map(|value| -value).collect();
-        free(&mut residual);
-        let mut scaled: Vec<f64> = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * p).collect();
-        let mut direction = scaled.clone();
-        let mut energy = dot(&residual, &scaled);
-        let enough = energy * RESIDUAL * RESIDUAL;
-        for _ in 0..steps {
-            if energy <= enough || !energy.is_finite() || self.stop.is_cancelled() {
-                break;
-            }
-            let mut product = multiply(&direction, None);
-            free(&mut product);
-            let step = energy / dot(&direction, &product);
-            for place in 0..count {
-                changes[place] += step * direction[place];
-                residual[place] -= step * product[place];
-                scaled[place] = residual[place] * self.preconditioner[place];
-            }
-            let next = dot(&residual, &scaled);
-            let ratio = next / energy;
-            energy = next;
-            for (direction, scaled) in direction.iter_mut().zip(&scaled) {
-                *direction = scaled + ratio * *direction;
-            }
+            self.gradient(changes, Some(&self.jumps)).into_iter().map(|value| -value).collect();
+        without(held, &mut residual);
+        let energy: f64 = residual.iter().zip(&self.preconditioner).map(|(r, p)| r * (r * p)).sum();
+        let system = Free { channel: self, held, most_steps, enough: energy * RESIDUAL * RESIDUAL };
+        conjugate_gradients::solve(&system, changes, residual);
+    }
+
+    /// The system times changes; with the jumps that there are, half the gradient of what is minimised.
+    fn gradient(&self, x: &[f64], jumps: Option<&[f64]>) -> Vec<f64> {
+        let mut product: Vec<f64> = x.iter().zip(&self.stiffness).map(|(x, s)| x * s).collect();
+        for (index, equation) in self.equations.iter().enumerate() {
+            let jump = jumps.map_or(0.0, |jumps| jumps[index]);
+            equation.add_transposed(self.weights[index] * (equation.apply(x) + jump), &mut product);
         }
+        product
+    }
+}
+
+/// The system of the changes that are not held.
+struct Free<'a> {
+    channel: &'a Channel<'a>,
+    held: &'a [bool],
+    most_steps: usize,
+    /// Energy of the residual that is small enough.
+    enough: f64,
+}
+
+impl System for Free<'_> {
+    fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        let mut product = self.channel.gradient(x, None);
+        without(self.held, &mut product);
+        product
+    }
+
+    fn precondition(&self, residual: &[f64]) -> Vec<f64> {
+        residual.iter().zip(&self.channel.preconditioner).map(|(r, p)| r * p).collect()
+    }
+
+    fn goes_on(&self, steps: usize, _: &[f64], energy: f64) -> bool {
+        let is_enough = energy <= self.enough || !energy.is_finite();
+        steps < self.most_steps && !is_enough && !self.channel.stop.is_cancelled()
+    }
+}
+
+/// Takes what is held out of a vector.
+fn without(held: &[bool], vector: &mut [f64]) {
+    for (value, _) in vector.iter_mut().zip(held).filter(|(_, held)| **held) {
+        *value = 0.0;
     }
 }
