@@ -59,7 +59,7 @@ mod rebake;
 mod report;
 mod sampling;
 mod scene;
-
+mod texel_index;
 mod texels;
 mod transport;
 mod unwrapped_from;

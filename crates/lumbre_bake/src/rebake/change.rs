@@ -98,7 +98,7 @@ impl<'a> Change<'a> {
         let mut change = vec![Vec3::ZERO; layout.texels];
         for ((texel, now), known) in texels.iter().zip(direct).zip(&changes.known) {
             if let Some(known) = known {
-                change[texel.index as usize] = now.total() - known.direct.total();
+                change[texel.index.place()] = now.total() - known.direct.total();
             }
         }
         Self {

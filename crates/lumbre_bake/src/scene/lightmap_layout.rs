@@ -10,6 +10,7 @@ use lumbre_mesh::{Charted, TriangleMesh, UnwrapError, UnwrapOptions, Unwrapped};
 use super::texture_coordinates::{free_second, sets_read};
 use super::{Canonical, SceneObject, SceneTriangle};
 use crate::cancel_token::CancelToken;
+use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeOptions, Density};
 
 /// The texels of one object.
@@ -27,6 +28,13 @@ pub(crate) struct MapLayout {
     pub first: usize,
 }
 
+impl MapLayout {
+    /// The texel in a column and a row.
+    pub fn texel(&self, x: u32, y: u32) -> MapTexel {
+        MapTexel::new(self.first + (y * self.width + x) as usize)
+    }
+}
+
 /// The texels of all objects.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightmapLayout {
@@ -39,12 +47,12 @@ pub(crate) struct LightmapLayout {
 }
 
 impl LightmapLayout {
-    /// The texel at a point of a triangle, in the row of all maps; none where it is not on its map.
-    pub fn texel_at(&self, triangle: &SceneTriangle, at: (f32, f32)) -> Option<usize> {
+    /// The texel at a point of a triangle; none where it is not on its map.
+    pub fn texel_at(&self, triangle: &SceneTriangle, at: (f32, f32)) -> Option<MapTexel> {
         let map = &self.maps[triangle.object as usize];
         let place = triangle.place_on_map(at);
         let (x, y) = (place.x as u32, place.y as u32);
-        (x < map.width && y < map.height).then(|| map.first + (y * map.width + x) as usize)
+        (x < map.width && y < map.height).then(|| map.texel(x, y))
     }
 }
 

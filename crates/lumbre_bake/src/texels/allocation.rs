@@ -6,10 +6,12 @@
 
 use rayon::prelude::*;
 
+use crate::texel_index::CoveredTexel;
+
 /// A texel that is to have more samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Allotment {
-    pub index: u32,
+    pub texel: CoveredTexel,
     /// In all, with those that it has.
     pub samples: u32,
 }
@@ -24,9 +26,9 @@ const LEAST: f64 = 1e-9;
 const HALVINGS: u32 = 6;
 
 /// The samples that bring the sum of variances down to `goal`, each texel's to at most `most`, by powers of two; all that can be had if that
-/// does not suffice. `variances` and `samples` are those of `texels`, by index; `order` is that of the variance's fall with the samples.
+/// does not suffice. `variances` and `samples` are those of the covered texels; `order` is that of the variance's fall with the samples.
 pub(crate) fn allot(
-    texels: impl Iterator<Item = u32> + Clone,
+    texels: impl Iterator<Item = CoveredTexel> + Clone,
     variances: &[f32],
     samples: &[u32],
     most: u32,
@@ -36,10 +38,11 @@ pub(crate) fn allot(
     // With k times the samples, each is worth 1 / k^(1 + p) of what it was, and k^-p of the variance is left.
     let powers = |exponent: f64| [1.0, 2.0, 4.0, 8.0].map(|factor: f64| factor.powf(exponent));
     let (devalued, remaining) = (powers(1.0 + order), powers(-order));
-    let worth = |index: u32| f64::from(variances[index as usize]) / f64::from(samples[index as usize].max(1));
+    let worth =
+        |texel: CoveredTexel| f64::from(variances[texel.place()]) / f64::from(samples[texel.place()].max(1));
     // Doublings of a texel's samples; the last one may end at `most`.
-    let doublings = |index: u32, least_worth: f64| {
-        let (own, worth) = (samples[index as usize].max(1), worth(index));
+    let doublings = |texel: CoveredTexel, least_worth: f64| {
+        let (own, worth) = (samples[texel.place()].max(1), worth(texel));
         let mut doublings = 0;
         while doublings < MOST_DOUBLINGS
             && own << doublings < most
@@ -49,10 +52,11 @@ pub(crate) fn allot(
         }
         doublings
     };
-    let all: Vec<u32> = texels.clone().collect();
+    let all: Vec<CoveredTexel> = texels.clone().collect();
     let left = |least_worth: f64| -> f64 {
-        let one =
-            |&index: &u32| f64::from(variances[index as usize]) * remaining[doublings(index, least_worth)];
+        let one = |&texel: &CoveredTexel| {
+            f64::from(variances[texel.place()]) * remaining[doublings(texel, least_worth)]
+        };
         // By chunks of one size, so that the sum is the same on any number of threads.
         let sums: Vec<f64> = all.par_chunks(CHUNK).map(|chunk| chunk.iter().map(one).sum()).collect();
         sums.iter().sum()
@@ -76,28 +80,28 @@ pub(crate) fn allot(
             least_worth = below;
         }
     }
-    let wanted = |index: u32| {
-        let own = samples[index as usize].max(1);
-        (own << doublings(index, least_worth)).min(most.max(own))
+    let wanted = |texel: CoveredTexel| {
+        let own = samples[texel.place()].max(1);
+        (own << doublings(texel, least_worth)).min(most.max(own))
     };
-    let more = |index: u32| Allotment { index, samples: wanted(index) };
-    texels.map(more).filter(|own| own.samples > samples[own.index as usize]).collect()
+    let more = |texel: CoveredTexel| Allotment { texel, samples: wanted(texel) };
+    texels.map(more).filter(|own| own.samples > samples[own.texel.place()]).collect()
 }
 
 /// As [`allot`], of at most `budget` more samples: what is left over the goal is then as little as they can make it.
 pub(crate) fn allot_within(
     budget: u64,
-    texels: impl Iterator<Item = u32> + Clone,
+    texels: impl Iterator<Item = CoveredTexel> + Clone,
     variances: &[f32],
     samples: &[u32],
     most: u32,
     order: f64,
     mut goal: f64,
 ) -> Vec<Allotment> {
-    let left: f64 = texels.clone().map(|index| f64::from(variances[index as usize])).sum();
+    let left: f64 = texels.clone().map(|texel| f64::from(variances[texel.place()])).sum();
     loop {
         let wanted = allot(texels.clone(), variances, samples, most, order, goal);
-        let more = |own: &Allotment| u64::from(own.samples - samples[own.index as usize]);
+        let more = |own: &Allotment| u64::from(own.samples - samples[own.texel.place()]);
         if wanted.iter().map(more).sum::<u64>() <= budget {
             return wanted;
         }
@@ -119,11 +123,13 @@ mod tests {
     fn the_goal_is_reached_with_rays_where_they_are_worth_most() {
         let variances = [16.0f32, 1.0, 0.01, 0.0];
         let samples = [4, 4, 4, 4];
-        let allotted = allot(0..4, &variances, &samples, 1024, 1.0, 6.0);
+        let allotted = allot(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
         // 16 to 4 brings 17.01 down to 5.01; the second's samples are worth a sixteenth of the first's.
-        assert_eq!(allotted, [Allotment { index: 0, samples: 16 }]);
+        assert_eq!(allotted, [Allotment { texel: CoveredTexel(0), samples: 16 }]);
         let total: f32 = variances.iter().sum();
-        assert!(allot(0..4, &variances, &samples, 1024, 1.0, f64::from(total) * 1.01).is_empty());
+        assert!(
+            allot(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, f64::from(total) * 1.01).is_empty()
+        );
     }
 
     #[test]
@@ -131,17 +137,23 @@ mod tests {
         let variances = [16.0f32, 1.0, 0.01, 0.0];
         let samples = [4, 4, 4, 4];
         // The goal alone would take far more than these.
-        let allotted = allot_within(12, 0..4, &variances, &samples, 1024, 1.0, 1e-3);
-        assert_eq!(allotted, [Allotment { index: 0, samples: 16 }]);
-        assert!(allot_within(3, 0..4, &variances, &samples, 1024, 1.0, 1e-3).is_empty());
-        let plenty = allot_within(1 << 20, 0..4, &variances, &samples, 1024, 1.0, 6.0);
-        assert_eq!(plenty, allot(0..4, &variances, &samples, 1024, 1.0, 6.0));
+        let allotted = allot_within(12, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3);
+        assert_eq!(allotted, [Allotment { texel: CoveredTexel(0), samples: 16 }]);
+        assert!(allot_within(3, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 1e-3).is_empty());
+        let plenty = allot_within(1 << 20, CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0);
+        assert_eq!(plenty, allot(CoveredTexel::all(4), &variances, &samples, 1024, 1.0, 6.0));
     }
 
     #[test]
     fn a_goal_out_of_reach_takes_all_there_is_and_ends() {
-        let allotted = allot(0..3, &[1.0, 2.0, 0.0], &[4, 8, 4], 16, 1.0, 0.0);
-        assert_eq!(allotted, [Allotment { index: 0, samples: 16 }, Allotment { index: 1, samples: 16 }]);
-        assert!(allot(0..1, &[f32::MIN_POSITIVE], &[16], 16, 1.0, 0.0).is_empty());
+        let allotted = allot(CoveredTexel::all(3), &[1.0, 2.0, 0.0], &[4, 8, 4], 16, 1.0, 0.0);
+        assert_eq!(
+            allotted,
+            [
+                Allotment { texel: CoveredTexel(0), samples: 16 },
+                Allotment { texel: CoveredTexel(1), samples: 16 }
+            ]
+        );
+        assert!(allot(CoveredTexel::all(1), &[f32::MIN_POSITIVE], &[16], 16, 1.0, 0.0).is_empty());
     }
 }

@@ -6,6 +6,7 @@ use super::hidden::remove_hidden;
 use super::straddling::{Straddling, crossed, straddling};
 use crate::progress::Watch;
 use crate::scene::{BakeScene, LightmapLayout};
+use crate::texel_index::MapTexel;
 use crate::{BakeError, BakeReport};
 
 /// The texels that show a surface, map by map, row by row; lists "of the covered texels" are in this order.
@@ -34,13 +35,13 @@ impl<'a> CoveredTexels<'a> {
         let (mut list, charts, crossed) =
             watch.during(0.0, || (footprints(scene, layout), charts(scene), crossed(scene, layout)))?;
         // Which texels a wall divides is asked twice: of all that they cover, to know where to look closely, and of what is then found in the open.
-        let touched: Vec<usize> = watch.during(0.0, || {
+        let touched: Vec<MapTexel> = watch.during(0.0, || {
             let divided = straddling(layout, &list, &crossed);
-            divided.iter().map(|straddling| list[straddling.texel as usize].index as usize).collect()
+            divided.iter().map(|straddling| list[straddling.texel.place()].index).collect()
         })?;
-        let crossed_places = crossed.iter().map(|(place, _)| *place);
+        let crossed_texels = crossed.iter().map(|(texel, _)| *texel);
         (report.hidden_texels, report.rays) =
-            remove_hidden(scene, layout, &mut list, crossed_places, &touched, watch)?;
+            remove_hidden(scene, layout, &mut list, crossed_texels, &touched, watch)?;
         let straddling = watch.during(1.0, || straddling(layout, &list, &crossed))?;
         report.texels = layout.texels;
         report.coverage = list.len() as f64 / layout.texels.max(1) as f64;

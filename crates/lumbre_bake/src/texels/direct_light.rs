@@ -16,6 +16,7 @@ use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream};
 use crate::scene::LightmapLayout;
+use crate::texel_index::CoveredTexel;
 use crate::transport::direct::{Direct, Seen, Sources};
 use crate::{BakeError, BakeOptions, BakeReport};
 
@@ -35,7 +36,7 @@ impl DirectLight {
     pub fn by_place(&self, texels: &CoveredTexels<'_>) -> Vec<Vec3> {
         let mut total = vec![Vec3::NAN; texels.layout.texels];
         for (texel, direct) in texels.list.iter().zip(&self.texels).filter(|(texel, _)| !texel.is_hidden()) {
-            total[texel.index as usize] = direct.total();
+            total[texel.index.place()] = direct.total();
         }
         total
     }
@@ -55,20 +56,20 @@ pub(crate) fn direct_light(
 ) -> Result<DirectLight, BakeError> {
     let scene = sources.scene;
     let CoveredTexels { layout, list: texels, charts, .. } = texels;
-    let known = |index: u32| known.get(index as usize).copied().flatten();
+    let known = |texel: CoveredTexel| known.get(texel.place()).copied().flatten();
     let [few, many, most] = options.effort().direct;
     let mut cuts = watch.during(1.0, || LightCuts::new(sources, texels, charts))?;
-    let wanted = |index: u32| known(index).is_none();
+    let wanted = |texel: CoveredTexel| known(texel).is_none();
     let shafts = watch.during(1.0, || Shafts::new(scene, sources, texels, &cuts, wanted))?;
     // Where rays would have to tell, one to any of the sources tells as much as one to each.
     cuts.share(sources, &shafts.unresolved(&cuts));
     let cuts = cuts;
-    let light = |place: usize, samples: u32| {
-        let texel = &texels[place];
+    let light = |own: CoveredTexel, samples: u32| {
+        let (place, texel) = (own.place(), &texels[own.place()]);
         if texel.is_hidden() {
             return Direct::default();
         }
-        let sequence = Sequence::new(options.seed, Stream::DirectLight, texel.index);
+        let sequence = Sequence::new(options.seed, Stream::DirectLight, texel.index.0);
         sources.own(cuts.of(place), &shafts.visibility(place, texel), sequence, samples, &|x, y| {
             texel.point(scene, x, y).map(|point| receiver(scene, &point))
         })
@@ -76,18 +77,18 @@ pub(crate) fn direct_light(
     // A complete map first, whatever time it takes.
     let clock = watch.clock();
     watch.pass(PASS);
-    let unknown: Vec<u32> = (0..texels.len() as u32).filter(|&index| known(index).is_none()).collect();
+    let unknown: Vec<CoveredTexel> = CoveredTexel::all(texels.len()).filter(|&texel| wanted(texel)).collect();
     let found = in_chunks(unknown.len(), watch, |place| {
-        light(unknown[place] as usize, if clock.late() { few.min(LATE) } else { few })
+        light(unknown[place], if clock.late() { few.min(LATE) } else { few })
     })?;
     let mut direct: Vec<Direct> =
-        (0..texels.len() as u32).map(|index| known(index).unwrap_or_default()).collect();
-    for (&index, found) in unknown.iter().zip(found) {
-        direct[index as usize] = found;
+        CoveredTexel::all(texels.len()).map(|texel| known(texel).unwrap_or_default()).collect();
+    for (texel, found) in unknown.iter().zip(found) {
+        direct[texel.place()] = found;
     }
     let shared = match cuts.share_samples() {
         true => {
-            let wanted = |place: usize| known(place as u32).is_none();
+            let wanted = |place: usize| wanted(CoveredTexel::new(place));
             // What is known has no samples that others could be compared with.
             let keys = cuts.keys().into_iter().enumerate();
             let groups: Vec<u32> = keys.map(|(place, key)| 2 * key + u32::from(wanted(place))).collect();
@@ -109,9 +110,9 @@ pub(crate) fn direct_light(
     let own_goal = if shared.is_some() { 0.5 * goal } else { goal };
 
     let mut again = in_doubt(layout, texels, &direct);
-    again.retain(|&index| known(index).is_none() && direct[index as usize].sampled);
+    again.retain(|&texel| wanted(texel) && direct[texel.place()].sampled);
     watch.pass(PASS);
-    let better = in_chunks_in_time(again.len(), watch, |place| light(again[place] as usize, many))?;
+    let better = in_chunks_in_time(again.len(), watch, |place| light(again[place], many))?;
     replace(&mut direct, &again, better);
     // Then more where the error asked for is not in sight yet, in the shadows' edges mostly.
     let mut samples = vec![many; texels.len()];
@@ -123,22 +124,22 @@ pub(crate) fn direct_light(
         let wanted = allot(again.iter().copied(), &relative, &samples, most, ORDER, own_goal);
         watch.pass(PASS);
         let better = in_chunks_in_time(wanted.len(), watch, |place| {
-            light(wanted[place].index as usize, wanted[place].samples)
+            light(wanted[place].texel, wanted[place].samples)
         })?;
         if better.is_empty() {
             break;
         }
         for wanted in &wanted {
-            samples[wanted.index as usize] = wanted.samples;
+            samples[wanted.texel.place()] = wanted.samples;
         }
-        let again: Vec<u32> = wanted.iter().map(|wanted| wanted.index).collect();
+        let again: Vec<CoveredTexel> = wanted.iter().map(|wanted| wanted.texel).collect();
         replace(&mut direct, &again, better);
     }
     if let Some(shared) = shared {
         let left = goal - sum(&relative(&direct, &local));
         shared.finish(&mut direct, &local, left.max(own_goal), watch)?;
     }
-    let new = unknown.iter().map(|&index| u64::from(direct[index as usize].rays));
+    let new = unknown.iter().map(|texel| u64::from(direct[texel.place()].rays));
     report.rays += new.sum::<u64>();
     Ok(DirectLight { texels: direct, local })
 }
@@ -167,28 +168,28 @@ fn sum(numbers: &[f32]) -> f64 {
 }
 
 /// Those that there was time for.
-fn replace(direct: &mut [Direct], at: &[u32], better: Vec<Direct>) {
-    for (&index, better) in at.iter().zip(better) {
-        let first = &mut direct[index as usize];
+fn replace(direct: &mut [Direct], at: &[CoveredTexel], better: Vec<Direct>) {
+    for (texel, better) in at.iter().zip(better) {
+        let first = &mut direct[texel.place()];
         *first = Direct { rays: first.rays + better.rays, ..better };
     }
 }
 
 /// Texels that saw a source partly, or near one that did, or next to one that saw other sources.
-fn in_doubt(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<u32> {
+fn in_doubt(layout: &LightmapLayout, texels: &[Texel], direct: &[Direct]) -> Vec<CoveredTexel> {
     let mut seen: Vec<Option<Seen>> = vec![None; layout.texels];
     for (texel, direct) in texels.iter().zip(direct).filter(|(texel, _)| !texel.is_hidden()) {
-        seen[texel.index as usize] = Some(direct.seen);
+        seen[texel.index.place()] = Some(direct.seen);
     }
     let doubtful = |texel: &Texel| {
-        let Some(own) = seen[texel.index as usize] else { return false };
+        let Some(own) = seen[texel.index.place()] else { return false };
         let map = &layout.maps[texel.object as usize];
         let rows = texel.y.saturating_sub(REACH)..=(texel.y + REACH).min(map.height - 1);
         let columns = texel.x.saturating_sub(REACH)..=(texel.x + REACH).min(map.width - 1);
         rows.flat_map(|y| columns.clone().map(move |x| (x, y))).any(|(x, y)| {
-            seen[map.first + (y * map.width + x) as usize]
+            seen[map.texel(x, y).place()]
                 .is_some_and(|other| other.partly || other.signature != own.signature)
         })
     };
-    (0..texels.len() as u32).filter(|&index| doubtful(&texels[index as usize])).collect()
+    CoveredTexel::all(texels.len()).filter(|own| doubtful(&texels[own.place()])).collect()
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::footprint::{FINE, Footprint, FootprintPoint, Texel, footprint, receiver};
 use super::straddling::Straddling;
 use crate::sampling::{Sequence, Stream};
+use crate::texel_index::MapTexel;
 use crate::transport::direct::Sources;
 
 /// Lines through one texel that count: as many as a part's sides have bits.
@@ -39,8 +40,7 @@ struct Divided {
 /// All of them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DividedLight {
-    /// By place in the row of all maps.
-    texels: HashMap<u32, Divided>,
+    texels: HashMap<MapTexel, Divided>,
     /// Texels with more lines than count.
     full: usize,
 }
@@ -53,13 +53,13 @@ impl DividedLight {
         straddling: &[Straddling],
         (samples, seed): (u32, u32),
     ) -> (Self, u64) {
-        let divided: Vec<(u32, Divided, u64)> = straddling
+        let divided: Vec<(MapTexel, Divided, u64)> = straddling
             .par_iter()
             .filter_map(|straddling| {
                 if sources.scene.stop.is_cancelled() {
                     return None;
                 }
-                let texel = &texels[straddling.texel as usize];
+                let texel = &texels[straddling.texel.place()];
                 let (divided, rays) = divide(sources, texel, &straddling.lines, samples, seed)?;
                 Some((texel.index, divided, rays))
             })
@@ -81,13 +81,13 @@ impl DividedLight {
         })
     }
 
-    /// Places, in the row of all maps, of the texels.
-    pub fn places(&self) -> impl Iterator<Item = usize> + '_ {
-        self.texels.keys().map(|&index| index as usize)
+    /// The texels.
+    pub fn texels(&self) -> impl Iterator<Item = MapTexel> + '_ {
+        self.texels.keys().copied()
     }
 
     /// Direct irradiance at a point of a texel's unit square; `None` if the texel is not divided.
-    pub fn at(&self, index: u32, offset: Vec2) -> Option<Vec3> {
+    pub fn at(&self, index: MapTexel, offset: Vec2) -> Option<Vec3> {
         let divided = self.texels.get(&index)?;
         let sides = sides(&divided.lines, offset);
         let own = divided.parts.iter().find(|part| part.sides == sides);
@@ -135,7 +135,7 @@ fn divide(
     by_side.sort_by_key(|(sides, _)| *sides);
     let mut rays = 0;
     let parts = by_side.chunk_by(|a, b| a.0 == b.0).map(|own| {
-        let sequence = Sequence::new(seed, Stream::DividedTexel, texel.index).of(own[0].0);
+        let sequence = Sequence::new(seed, Stream::DividedTexel, texel.index.0).of(own[0].0);
         let direct = sources.irradiance(sequence, samples, &|x, _| {
             let index = ((x * own.len() as f32) as usize).min(own.len() - 1);
             Some(receiver(sources.scene, &own[index].1))
@@ -170,10 +170,10 @@ mod tests {
         let parts = vec![part(Vec2::new(0.25, 0.5), 1.0), part(Vec2::new(0.75, 0.5), 8.0)];
         assert_ne!(parts[0].sides, parts[1].sides);
         let divided = Divided { lines, full: false, parts };
-        let divided = DividedLight { texels: HashMap::from([(7, divided)]), full: 0 };
+        let divided = DividedLight { texels: HashMap::from([(MapTexel(7), divided)]), full: 0 };
         for (x, y, expected) in [(0.49, 0.99, 1.0), (0.01, 0.0, 1.0), (0.51, 0.01, 8.0), (0.99, 0.98, 8.0)] {
-            assert_eq!(divided.at(7, Vec2::new(x, y)), Some(Vec3::splat(expected)), "{x} {y}");
+            assert_eq!(divided.at(MapTexel(7), Vec2::new(x, y)), Some(Vec3::splat(expected)), "{x} {y}");
         }
-        assert_eq!(divided.at(8, Vec2::splat(0.5)), None);
+        assert_eq!(divided.at(MapTexel(8), Vec2::splat(0.5)), None);
     }
 }

@@ -191,7 +191,7 @@ pub(crate) fn fill(
     for (texel, (&value, &variance)) in texels.iter().zip(values.iter().zip(variances)) {
         if !texel.is_hidden() {
             let chart = charts[texel.triangle as usize];
-            known[texel.index as usize] = Some(Known { value, variance, middle: texel.middle(), chart });
+            known[texel.index.place()] = Some(Known { value, variance, middle: texel.middle(), chart });
         }
     }
     let hidden = hidden(layout, texels, if rings >= BICUBIC_RINGS { 2 } else { 1 });
@@ -213,7 +213,7 @@ pub(crate) fn fill(
 fn hidden(layout: &LightmapLayout, texels: &[Texel], reach: u32) -> Vec<Hidden> {
     let mut hidden = vec![Hidden::No; layout.texels];
     for texel in texels.iter().filter(|texel| texel.is_hidden()) {
-        hidden[texel.index as usize] = Hidden::Deep;
+        hidden[texel.index.place()] = Hidden::Deep;
     }
     for texel in texels {
         let map = &layout.maps[texel.object as usize];

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
+use crate::texel_index::MapTexel;
 use crate::transport::direct::Receiver;
 
 /// A point of a triangle, seen by a texel.
@@ -32,8 +33,7 @@ pub(crate) enum Footprint {
 /// A texel that some triangle covers.
 #[derive(Clone, Debug)]
 pub(crate) struct Texel {
-    /// Index in the row of all maps.
-    pub index: u32,
+    pub index: MapTexel,
     pub object: u32,
     /// Column and row in its map.
     pub x: u32,
@@ -82,7 +82,7 @@ pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texe
                         Footprint::Points(points) => points[points.len() / 2].triangle,
                         _ => triangles().next()?,
                     };
-                    let index = (map.first + cell as usize) as u32;
+                    let index = map.texel(x, y);
                     Some(Texel { index, object: object as u32, x, y, triangle, footprint })
                 })
                 .collect()

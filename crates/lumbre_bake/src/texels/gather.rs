@@ -273,7 +273,7 @@ impl RadianceCache<'_> {
             gathered.inverse_distances += found.weight / hit.distance.max(f32::MIN_POSITIVE);
             // In turn over replicates, samples and texels, so that every neighbourhood has some at any number of samples.
             let turn =
-                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.wrapping_mul(7));
+                (sample * REPLICATES as u32 + replicate as u32).wrapping_add(texel.index.0.wrapping_mul(7));
             reading.checked = turn.is_multiple_of(CHECKED);
             let receiver = &samples.requests[place].receiver;
             let last = self.read(receiver, hit, &sequences[replicate], sample, reading);

@@ -13,6 +13,7 @@ use crate::chunks::in_chunks;
 use crate::progress::{Clock, Watch};
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::texel_index::MapTexel;
 use crate::transport::box_tree::BoxTree;
 use crate::transport::shaft::is_free_before;
 
@@ -39,7 +40,7 @@ const ALWAYS_CLOSELY: usize = 4096;
 const PASSES: [f32; 2] = [0.1, 0.2];
 
 /// Takes what is hidden out of the footprints; returns how many texels are hidden in part or whole, and the rays cast. Contact lines cross the
-/// texels that are `crossed`, and divide those that are `touched`: places in the row of all maps.
+/// texels that are `crossed`, and divide those that are `touched`.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
@@ -47,34 +48,33 @@ pub(crate) fn remove_hidden(
     scene: &BakeScene,
     layout: &LightmapLayout,
     texels: &mut [Texel],
-    crossed: impl Iterator<Item = usize>,
-    touched: &[usize],
+    crossed: impl Iterator<Item = MapTexel>,
+    touched: &[MapTexel],
     watch: &mut Watch<'_>,
 ) -> Result<(usize, u64), BakeError> {
     let clock = watch.clock().until(CLOSELY);
     let (odd, mut rays) = odd(scene, texels, clock, watch)?;
     // Six rays may miss a corner of a texel; its neighbours' rays did not.
     let mut near = vec![false; layout.texels];
-    touched.iter().for_each(|&index| near[index] = true);
+    touched.iter().for_each(|texel| near[texel.place()] = true);
     let mut mixed = vec![false; layout.texels];
-    crossed.for_each(|index| mixed[index] = true);
+    crossed.for_each(|texel| mixed[texel.place()] = true);
     for (texel, _) in texels.iter().zip(&odd).filter(|(_, odd)| **odd) {
         let map = &layout.maps[texel.object as usize];
         for y in texel.y.saturating_sub(1)..=(texel.y + 1).min(map.height - 1) {
             for x in texel.x.saturating_sub(1)..=(texel.x + 1).min(map.width - 1) {
-                near[map.first + (y * map.width + x) as usize] = true;
+                near[map.texel(x, y).place()] = true;
             }
         }
     }
-    let mut suspects: Vec<&mut Texel> =
-        texels.iter_mut().filter(|texel| near[texel.index as usize]).collect();
+    let mut suspects: Vec<&mut Texel> = texels.iter_mut().filter(|texel| near[texel.index.place()]).collect();
     watch.pass(PASSES[1]);
     let judged = in_chunks(suspects.len(), watch, |place| {
         let texel = &*suspects[place];
         if place >= ALWAYS_CLOSELY && clock.late() {
             judge_roughly(scene, texel)
         } else {
-            judge(scene, texel, mixed[texel.index as usize])
+            judge(scene, texel, mixed[texel.index.place()])
         }
     })?;
     rays += judged.iter().map(|judged| u64::from(judged.rays)).sum::<u64>();
@@ -147,7 +147,7 @@ enum Probe {
 }
 
 fn probe(scene: &BakeScene, texel: &Texel, ray: u32) -> Probe {
-    let [x, y, u, v] = Sequence::new(SEED, Stream::HiddenTexel, texel.index).point(ray, 0);
+    let [x, y, u, v] = Sequence::new(SEED, Stream::HiddenTexel, texel.index.0).point(ray, 0);
     let Some(point) = texel.point(scene, x, y) else { return Probe::Clear };
     let receiver = receiver(scene, &point);
     let direction = cosine_about(receiver.geometric_normal, u, v);
@@ -198,7 +198,7 @@ fn fine_points(scene: &BakeScene, texel: &Texel) -> Option<Vec<FootprintPoint>> 
 /// the corners and the middle tell for all, if they agree.
 fn judge(scene: &BakeScene, texel: &Texel, mixed: bool) -> Judged {
     let Some(points) = fine_points(scene, texel) else { return Judged::default() };
-    let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index);
+    let sequence = Sequence::new(SEED, Stream::HiddenView, texel.index.0);
     let pressed = pressed(scene, texel);
     let mut rays = 0;
     let mut is_open = |index: usize| {

@@ -9,6 +9,7 @@ use super::radiance_cache::RadianceCache;
 use crate::sampling::{cosine_about, triangle_point};
 use crate::scene::SurfaceHit;
 use crate::scene::material::Side;
+use crate::texel_index::MapTexel;
 use crate::transport::direct::Receiver;
 use crate::transport::sampling_guide::RowPart;
 
@@ -110,7 +111,7 @@ pub(super) struct SamplePath {
     part: RowPart,
     /// Region and texel met, where they count, and the texel's direct light.
     region: Option<u32>,
-    texel: usize,
+    texel: MapTexel,
     direct: Vec3,
     reflectance: Vec3,
 }
@@ -122,7 +123,7 @@ impl SamplePath {
         share: None,
         part: RowPart::NONE,
         region: None,
-        texel: usize::MAX,
+        texel: MapTexel::NONE,
         direct: Vec3::ZERO,
         reflectance: Vec3::ZERO,
     };
@@ -173,7 +174,7 @@ impl RadianceCache<'_> {
             self.follow(request, path, found);
         }
         for (path, found) in paths.iter_mut().zip(found.iter_mut()) {
-            path.texel = usize::MAX;
+            path.texel = MapTexel::NONE;
             let Some(hit) = &mut found.hit else { continue };
             let Some(patch) = self.patches.at(hit.triangle, hit.side, hit.at) else {
                 *found = IncidentSample::NOTHING;
@@ -188,8 +189,8 @@ impl RadianceCache<'_> {
             path.texel = self.texel_at(hit.triangle, hit.side, hit.at);
         }
         for path in paths.iter_mut() {
-            path.direct = self.direct.get(path.texel).copied().unwrap_or(Vec3::NAN);
-            path.reflectance = self.reflectance.get(path.texel).copied().unwrap_or(Vec3::NAN);
+            path.direct = self.direct.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
+            path.reflectance = self.reflectance.get(path.texel.place()).copied().unwrap_or(Vec3::NAN);
         }
         for ((path, request), found) in paths.iter_mut().zip(requests).zip(found.iter_mut()) {
             let Some(hit) = &mut found.hit else { continue };

@@ -75,7 +75,7 @@ impl LocalLight {
         let blocks = Blocks::new(texels, charts, BLOCK);
         let mut places = vec![u32::MAX; layout.texels];
         for (place, texel) in texels.iter().enumerate().filter(|(_, texel)| !texel.is_hidden()) {
-            places[texel.index as usize] = place as u32;
+            places[texel.index.place()] = place as u32;
         }
         let level = Level { sources, layout, places, blocks: &blocks, direct };
         // Kept in the checkpoint, so that a bake which goes on from there judges by the same light.
@@ -189,7 +189,7 @@ impl Level<'_> {
     /// The covered texel at a point of a triangle's front.
     fn place_at(&self, triangle: u32, at: (f32, f32)) -> Option<u32> {
         let texel = self.layout.texel_at(&self.sources.scene.triangles[triangle as usize], at)?;
-        Some(self.places[texel]).filter(|place| *place != u32::MAX)
+        Some(self.places[texel.place()]).filter(|place| *place != u32::MAX)
     }
 }
 

@@ -10,6 +10,7 @@ use super::texel_radiance::{GatheredLight, mean_reflectances};
 use crate::progress::Watch;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
+use crate::texel_index::MapTexel;
 use crate::transport::direct::Sources;
 use crate::transport::exchange::Exchange;
 use crate::transport::patches::Patches;
@@ -76,7 +77,7 @@ impl<'a> RadianceCache<'a> {
         report.rays += rays;
         report.warnings.extend(divided.warning());
         let mut direct = direct.by_place(texels);
-        divided.places().for_each(|index| direct[index] = Vec3::NAN);
+        divided.texels().for_each(|texel| direct[texel.place()] = Vec3::NAN);
         let reflectance =
             watch.during(0.0, || mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list))?;
         Ok(Self {
@@ -120,28 +121,28 @@ impl RadianceCache<'_> {
         })
     }
 
-    /// The texel that shows a point, in the row of all maps; the greatest number where none does.
-    pub(super) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> usize {
-        let (index, _) = self.place_at(triangle, at);
-        index.filter(|_| side == Side::Front).unwrap_or(usize::MAX)
+    /// The texel that shows a point; [`MapTexel::NONE`] where none does.
+    pub(super) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
+        let (texel, _) = self.place_at(triangle, at);
+        texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
     }
 
     /// Of a texel, if it has one for all of it.
-    pub(super) fn direct_of(&self, texel: usize) -> Option<Vec3> {
-        self.direct.get(texel).copied().filter(|direct| !direct.x.is_nan())
+    pub(super) fn direct_of(&self, texel: MapTexel) -> Option<Vec3> {
+        self.direct.get(texel.place()).copied().filter(|direct| !direct.x.is_nan())
     }
 
     /// Where the texel has none: of its part or of the patch.
     #[cold]
     pub(super) fn direct_of_part(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
-        let (index, uv) = self.place_at(triangle, at);
-        let index = index.filter(|_| side == Side::Front);
-        let divided = index.and_then(|index| self.divided.at(index as u32, uv.fract()));
+        let (texel, uv) = self.place_at(triangle, at);
+        let texel = texel.filter(|_| side == Side::Front);
+        let divided = texel.and_then(|texel| self.divided.at(texel, uv.fract()));
         divided.unwrap_or_else(|| self.patch_direct[patch as usize])
     }
 
     /// The texel at a point, if it is on the map, and the point on the map.
-    fn place_at(&self, triangle: u32, (u, v): (f32, f32)) -> (Option<usize>, Vec2) {
+    fn place_at(&self, triangle: u32, (u, v): (f32, f32)) -> (Option<MapTexel>, Vec2) {
         let triangle = &self.scene.triangles[triangle as usize];
         (self.layout.texel_at(triangle, (u, v)), triangle.place_on_map((u, v)))
     }

@@ -13,6 +13,7 @@ use crate::progress::{Stage, Watch};
 use crate::report::ResolutionReport;
 use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::texel_index::MapTexel;
 use crate::transport::direct::{Receiver, Sources};
 use crate::{BakeError, BakeOptions, BakeReport};
 
@@ -123,7 +124,7 @@ impl Light<'_> {
         let Some(cache) = self.cache else { return point };
         // A texel of one point, in a tile and of an object of its own: so its samples are no texel's.
         let footprint = Footprint::Points(vec![footprint]);
-        let texel = Texel { index, object: index, x: 0, y: 0, triangle, footprint };
+        let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
         let mut gathered = Gathered::default();
         cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ Stream::ResolutionPoints.number()));
         let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);

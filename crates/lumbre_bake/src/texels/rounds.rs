@@ -19,6 +19,7 @@ use super::surroundings::Surroundings;
 use super::texel_radiance::GatheredLight;
 use crate::chunks::in_chunks_in_time;
 use crate::progress::Watch;
+use crate::texel_index::CoveredTexel;
 use crate::transport::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport, Ended, ErrorAtTime};
 
@@ -128,7 +129,7 @@ struct Judge<'a> {
     direct: &'a [Direct],
     local: &'a LocalLight,
     /// Of the covered texels, those that are not hidden.
-    open: Vec<u32>,
+    open: Vec<CoveredTexel>,
     /// Mean direct light of those, W/m², mean of the channels.
     mean_direct: f64,
     /// By how much light that is kept may have changed.
@@ -166,8 +167,8 @@ impl<'a> Judge<'a> {
         options: &'a BakeOptions,
     ) -> Self {
         let list = &texels.list;
-        let open: Vec<u32> =
-            (0..list.len() as u32).filter(|&index| !list[index as usize].is_hidden()).collect();
+        let open: Vec<CoveredTexel> =
+            CoveredTexel::all(list.len()).filter(|texel| !list[texel.place()].is_hidden()).collect();
         let sum = direct.texels.iter().map(|direct| channel_mean(direct.baked)).sum::<f64>();
         Self {
             surroundings,
@@ -189,8 +190,8 @@ impl<'a> Judge<'a> {
     /// The first round's, wherever nothing is kept.
     fn first_samples(&self, gathered: &[Gathered]) -> Vec<Allotment> {
         let samples = self.options.effort().gather[0] / REPLICATES as u32;
-        let new = self.open.iter().copied().filter(|&index| gathered[index as usize].samples == 0);
-        new.map(|index| Allotment { index, samples }).collect()
+        let new = self.open.iter().copied().filter(|texel| gathered[texel.place()].samples == 0);
+        new.map(|texel| Allotment { texel, samples }).collect()
     }
 
     /// The light that the samples tell, smoothed, with its errors; the report states them.
@@ -277,14 +278,14 @@ fn cast(
     watch: &mut Watch<'_>,
 ) -> Result<bool, BakeError> {
     let found = in_chunks_in_time(wanted.len(), watch, |place| {
-        let Allotment { index, samples } = wanted[place];
-        let mut own = gathered[index as usize];
-        cache.gather(&texels[index as usize], &mut own, samples, options.seed);
+        let Allotment { texel, samples } = wanted[place];
+        let mut own = gathered[texel.place()];
+        cache.gather(&texels[texel.place()], &mut own, samples, options.seed);
         own
     })?;
     let in_time = found.len() == wanted.len();
     for (allotted, own) in wanted.iter().zip(found) {
-        gathered[allotted.index as usize] = own;
+        gathered[allotted.texel.place()] = own;
     }
     Ok(in_time)
 }
@@ -303,7 +304,7 @@ fn affordable(
     let begun = watch.seconds();
     if !cast(cache, texels, &once, gathered, options, watch)? {
         // Where one was too much, those without any are the ones that are left.
-        wanted.retain(|own| gathered[own.index as usize].samples == 0);
+        wanted.retain(|own| gathered[own.texel.place()].samples == 0);
         return Ok(wanted);
     }
     let (clock, seconds) = (watch.clock(), watch.seconds() - begun);

@@ -11,6 +11,7 @@ use super::light_cuts::LightCuts;
 use super::light_visibility::visibilities;
 use super::tiles::{Tiles, area, positions_of, shows_plane};
 use crate::scene::BakeScene;
+use crate::texel_index::CoveredTexel;
 use crate::transport::box_tree::BoxTree;
 use crate::transport::direct::Sources;
 use crate::transport::light_cut::LightCut;
@@ -44,13 +45,13 @@ pub(crate) struct Shafts<'a> {
 }
 
 impl<'a> Shafts<'a> {
-    /// For all covered texels; tiles of which none is wanted (by its number) are left out.
+    /// For all covered texels; tiles of which none is wanted are left out.
     pub fn new(
         scene: &'a BakeScene,
         sources: &'a Sources<'a>,
         texels: &[Texel],
         cuts: &LightCuts,
-        wanted: impl Fn(u32) -> bool + Sync,
+        wanted: impl Fn(CoveredTexel) -> bool + Sync,
     ) -> Self {
         let mut shafts = Self { scene, sources, tiles: Vec::new(), tile_of: Vec::new() };
         if sources.emitters.is_empty() && sources.lights.is_empty() {
@@ -62,7 +63,7 @@ impl<'a> Shafts<'a> {
         shafts.tiles = members
             .par_iter()
             .map(|members| {
-                if scene.stop.is_cancelled() || !members.iter().any(|&place| wanted(place)) {
+                if scene.stop.is_cancelled() || !members.iter().any(|&place| wanted(CoveredTexel(place))) {
                     return OfTile::default();
                 }
                 let cut = cuts.of(members[0] as usize);

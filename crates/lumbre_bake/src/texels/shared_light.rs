@@ -18,6 +18,7 @@ use super::tile_sequence::TileSequence;
 use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
 use crate::sampling::{Stream, hash};
+use crate::texel_index::CoveredTexel;
 use crate::transport::direct::{Direct, Sources};
 use crate::transport::light_cut::Rest;
 use crate::{BakeError, BakeOptions};
@@ -179,10 +180,10 @@ impl<'a> SharedLight<'a> {
             let spread = watch.during(1.0, || spread(&self.surroundings, &estimates))?;
             let variances = spread.with(&bias);
             let relative = variances.relative(local);
-            let asked = |place: &u32| self.found[*place as usize].samples > 0;
-            let places = (0..self.texels.len() as u32).filter(asked);
+            let asked = |texel: &CoveredTexel| self.found[texel.place()].samples > 0;
+            let asking = CoveredTexel::all(self.texels.len()).filter(asked);
             let summed =
-                |squares: &[f32]| places.clone().map(|place| f64::from(squares[place as usize])).sum::<f64>();
+                |squares: &[f32]| asking.clone().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
             let left = summed(&relative.expected);
             let stalled = left > STALLED * before;
             if left <= goal * ENOUGH || stalled || watch.clock().late() {
@@ -191,25 +192,25 @@ impl<'a> SharedLight<'a> {
             before = left;
             let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
             let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let budget = self.options.effort().budget(places.clone().count() as u64) / REPLICATES as u64;
+            let budget = self.options.effort().budget(asking.clone().count() as u64) / REPLICATES as u64;
             let budget = budget.saturating_sub(taken);
             // Samples are given out by the cautious figures; the goal is one of expected ones.
             let feared = summed(&relative.cautious) / left;
             let goal = feared * goal.max(left / MOST_OF_A_ROUND);
             let wanted: Vec<Allotment> =
-                allot_within(budget, places, &relative.cautious, &samples, self.most, ORDER, goal);
+                allot_within(budget, asking, &relative.cautious, &samples, self.most, ORDER, goal);
             watch.pass(PASS);
             let more = in_chunks_in_time(wanted.len(), watch, |index| {
-                let Allotment { index: place, samples } = wanted[index];
-                let mut own = self.found[place as usize];
-                self.add(place as usize, &mut own, samples);
+                let Allotment { texel, samples } = wanted[index];
+                let mut own = self.found[texel.place()];
+                self.add(texel.place(), &mut own, samples);
                 own
             })?;
             if more.is_empty() {
                 break (estimates, variances);
             }
             for (allotted, own) in wanted.iter().zip(more) {
-                self.found[allotted.index as usize] = own;
+                self.found[allotted.texel.place()] = own;
             }
         };
         for (place, (direct, own)) in direct.iter_mut().zip(&self.found).enumerate() {

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::footprint::{Footprint, Texel};
 use crate::scene::{BakeScene, LightmapLayout};
+use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::transport::box_tree::BoxTree;
 use crate::transport::contacts::{PlaneFrame, contacts};
 
@@ -16,14 +17,14 @@ const MARGIN: f64 = 0.05;
 
 /// A texel that contact lines divide: its place among those covered, and the lines' parts in its unit square.
 pub(crate) struct Straddling {
-    pub texel: u32,
+    pub texel: CoveredTexel,
     pub lines: Vec<[DVec2; 2]>,
 }
 
 /// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
-pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(usize, [DVec2; 2])> {
+pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
     let tree = BoxTree::new(&scene.triangles, &scene.stop);
-    let mut lines: Vec<(usize, [DVec2; 2])> = (0..scene.triangles.len())
+    let mut lines: Vec<(MapTexel, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
         .flat_map_iter(|index| divisions(scene, layout, &tree, index))
         .collect();
@@ -39,16 +40,16 @@ pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(usize,
 pub(crate) fn straddling(
     layout: &LightmapLayout,
     texels: &[Texel],
-    crossed: &[(usize, [DVec2; 2])],
+    crossed: &[(MapTexel, [DVec2; 2])],
 ) -> Vec<Straddling> {
-    let mut place = vec![u32::MAX; layout.texels];
-    for (number, texel) in texels.iter().enumerate() {
-        place[texel.index as usize] = number as u32;
+    let mut covered = vec![None; layout.texels];
+    for (place, texel) in texels.iter().enumerate() {
+        covered[texel.index.place()] = Some(CoveredTexel::new(place));
     }
     let mut found: Vec<Straddling> = Vec::new();
     for &(index, line) in crossed {
-        let texel = place[index];
-        if texels.get(texel as usize).is_some_and(|texel| is_divided(texel, line)) {
+        let Some(texel) = covered[index.place()] else { continue };
+        if is_divided(&texels[texel.place()], line) {
             match found.last_mut() {
                 Some(last) if last.texel == texel => last.lines.push(line),
                 _ => found.push(Straddling { texel, lines: vec![line] }),
@@ -64,7 +65,7 @@ fn divisions(
     layout: &LightmapLayout,
     tree: &BoxTree,
     index: usize,
-) -> Vec<(usize, [DVec2; 2])> {
+) -> Vec<(MapTexel, [DVec2; 2])> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.object as usize];
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
@@ -102,7 +103,7 @@ fn divisions(
             if x < map.width && y < map.height {
                 let corner = DVec2::new(x.into(), y.into());
                 let part = [pair[0], pair[1]].map(|t| start.lerp(end, t) - corner);
-                found.push((map.first + (y * map.width + x) as usize, part));
+                found.push((map.texel(x, y), part));
             }
         }
     }

@@ -55,8 +55,8 @@ impl<'a> Surroundings<'a> {
                 surfaces.push(Surface { chart, normal, group });
                 surfaces.len() as u32 - 1
             });
-            places[texel.index as usize] = index as u32;
-            ground[texel.index as usize] = surface;
+            places[texel.index.place()] = index as u32;
+            ground[texel.index.place()] = surface;
         }
         let sizes = layout.maps.iter().map(|map| (map.width, map.height));
         let mut grid = Grid::new(sizes, ground.into_iter(), surfaces);

@@ -7,6 +7,7 @@ use super::footprint::{Footprint, FootprintPoint, Texel};
 use super::gather::Gathered;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};
+use crate::texel_index::MapTexel;
 use crate::transport::patches::Patches;
 
 /// The irradiance by bounces that a former round of the gather has found in every texel: closer than that of the patches, so that rays that read it
@@ -43,17 +44,17 @@ impl GatheredLight {
             let (irradiance, variance) = (light[place], variances[place]);
             let patch_error = gathered[place].patch_error();
             let finite = irradiance.is_finite() && variance.is_finite() && patch_error.is_finite();
-            if finite && !direct[texel.index as usize].is_nan() {
-                found[texel.index as usize] = TexelLight { irradiance, variance, patch_error };
+            if finite && !direct[texel.index.place()].is_nan() {
+                found[texel.index.place()] = TexelLight { irradiance, variance, patch_error };
             }
         }
         Self { texels: found }
     }
 
-    /// That of a texel in the row of all maps, if it is known.
+    /// That of a texel, if it is known.
     #[inline]
-    pub fn at(&self, texel: usize) -> Option<&TexelLight> {
-        self.texels.get(texel).filter(|texel| !texel.irradiance.x.is_nan())
+    pub fn at(&self, texel: MapTexel) -> Option<&TexelLight> {
+        self.texels.get(texel.place()).filter(|texel| !texel.irradiance.x.is_nan())
     }
 }
 
@@ -78,7 +79,7 @@ pub(crate) fn mean_reflectances(
         let (u, v) = point.at;
         Some(surface.reflectance(Side::Front, triangle.vertices, [1.0 - u - v, u, v]))
     };
-    let of_texel = |texel: &Texel| -> Option<(u32, Vec3)> {
+    let of_texel = |texel: &Texel| -> Option<(MapTexel, Vec3)> {
         // All or none: beside a surface of one colour, that of the point tells.
         let found: Option<Vec<Vec3>> = match &texel.footprint {
             Footprint::Points(points) => points.iter().map(at_point).collect(),
@@ -87,10 +88,10 @@ pub(crate) fn mean_reflectances(
         let found = found.filter(|found| !found.is_empty())?;
         Some((texel.index, found.iter().sum::<Vec3>() / found.len() as f32))
     };
-    let found: Vec<(u32, Vec3)> = texels.par_iter().filter_map(of_texel).collect();
+    let found: Vec<(MapTexel, Vec3)> = texels.par_iter().filter_map(of_texel).collect();
     let mut all = if found.is_empty() { Vec::new() } else { vec![Vec3::NAN; layout.texels] };
     for (index, reflectance) in found {
-        all[index as usize] = reflectance;
+        all[index.place()] = reflectance;
     }
     all
 }

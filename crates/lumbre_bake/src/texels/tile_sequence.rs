@@ -64,10 +64,11 @@ fn morton(x: u32, y: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::texel_index::MapTexel;
     use crate::texels::footprint::Footprint;
 
     fn texel(x: u32, y: u32) -> Texel {
-        Texel { index: 0, object: 0, x, y, triangle: 0, footprint: Footprint::Hidden }
+        Texel { index: MapTexel(0), object: 0, x, y, triangle: 0, footprint: Footprint::Hidden }
     }
 
     #[test]

@@ -82,7 +82,7 @@ fn close(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
     let edges = edges::borders(maps.scene);
     let mut charts = vec![NO_CHART; maps.layout.texels];
     for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
-        charts[texel.index as usize] = maps.charts[texel.triangle as usize];
+        charts[texel.index.place()] = maps.charts[texel.triangle as usize];
     }
     let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }.all();
     let (rays, crowded) = (found.rays, found.crowded);
