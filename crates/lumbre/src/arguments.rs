@@ -422,6 +422,9 @@ pub struct Cost {
     /// Fewer points and rounds: about two minutes on two cores, instead of six.
     #[arg(long)]
     pub quick: bool,
+    /// Counts alone: nothing is timed, compared or drawn for people, and the report is the same on every machine. What --compare is to watch over without noise.
+    #[arg(long)]
+    pub counts_only: bool,
     /// Only this study; may be given several times.
     #[arg(long = "study", value_name = "NAME")]
     pub studies: Vec<String>,
@@ -438,7 +441,7 @@ pub struct Cost {
     #[arg(long)]
     pub quiet: bool,
     /// Says what differs between two reports instead; exit status 1 if a count or an error of the second is larger, or a point is gone.
-    #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "studies", "resume", "size", "seed", "quiet"])]
+    #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "counts_only", "studies", "resume", "size", "seed", "quiet"])]
     pub compare: Option<Vec<PathBuf>>,
     /// Counts, errors and times that differ by less than this factor count as equal.
     #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, conflicts_with = "output", allow_negative_numbers = true)]

@@ -112,6 +112,7 @@ fn bad_arguments_are_refused_with_what_to_do() {
         (&["cost", "-o", &out, "--times"], 2, "cannot be used with"),
         (&["cost", "--compare", "a.json"], 2, "2 values"),
         (&["cost", "--compare", "a.json", "b.json", "--quick"], 2, "--quick"),
+        (&["cost", "--compare", "a.json", "b.json", "--counts-only"], 2, "--counts-only"),
         (&["cost", "--compare", "a.json", "b.json", "--factor", "0.5"], 2, "at least 1"),
         (&["cost", "--compare", "a.json", "b.json"], 1, "a.json"),
         (&["cost", "--compare", text(&garbage), text(&garbage)], 1, "is no report of lumbre cost"),

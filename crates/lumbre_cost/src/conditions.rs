@@ -19,6 +19,8 @@ pub struct Conditions<'a> {
     pub gpu: &'a Gpu,
     /// Fewer points and rounds.
     pub quick: bool,
+    /// Nothing is timed and nothing compared: whatever serves only that is done once, or cut short.
+    pub counts_only: bool,
     /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
     /// Of everything that draws random numbers.
@@ -48,12 +50,24 @@ impl Conditions<'_> {
         }
     }
 
-    /// Rounds for about so many seconds, a sixth of them if it has to be quick.
+    /// Rounds for about so many seconds, a sixth of them if it has to be quick; none for counts alone.
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
+            _ if self.counts_only => Rounds { warm_up: 0, fewest: 0, most: 0, time: Duration::ZERO },
             true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 6.0) },
             false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
         }
+    }
+
+    /// How often work is done that takes too long for rounds by time: once for counts alone.
+    pub fn repetitions(&self, usual: usize) -> usize {
+        if self.counts_only { 1 } else { usual }
+    }
+
+    /// How long a bake may take that others are compared with, in seconds of a full and of a quick report. For counts alone, which are not compared with it, hardly any time.
+    pub fn reference_time(&self, full: f64, quick: f64) -> Duration {
+        let seconds = if self.counts_only { 0.01 } else { self.unless_quick(full, quick) };
+        Duration::from_secs_f64(seconds)
     }
 
     /// The first of two in a full report, the second in a quick one.

@@ -46,10 +46,9 @@ pub struct DrawnFrame {
     pub times: Vec<f64>,
     /// What it shows, in 32-bit floats and without exposure.
     pub picture: Picture,
-    /// Vertices that were shaded.
-    pub vertex_invocations: u64,
-    /// Fragments that were shaded.
-    pub fragment_invocations: u64,
+    /// Vertices and fragments that were shaded. How often a device shades a vertex that several triangles share, and whether it counts fragments that another one hides, is
+    /// its own affair: nothing where only that is counted which is the same everywhere.
+    pub invocations: Option<[u64; 2]>,
     /// What the renderer says of it.
     pub statistics: Statistics,
 }
@@ -62,13 +61,15 @@ impl DrawnFrame {
 
     /// Counts that do not depend on the hour.
     pub fn counts(&self) -> BTreeMap<String, f64> {
+        let of_device = self.invocations.map(|[vertices, fragments]| {
+            [("vertex invocations", vertices as f64), ("fragment invocations", fragments as f64)]
+        });
         let counts = [
-            ("vertex invocations", self.vertex_invocations as f64),
-            ("fragment invocations", self.fragment_invocations as f64),
             ("triangles", self.statistics.triangles as f64),
             ("draw calls", self.statistics.draws as f64),
+            ("bytes uploaded", self.statistics.uploads.total() as f64),
         ];
-        counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect()
+        of_device.into_iter().flatten().chain(counts).map(|(name, count)| (name.to_owned(), count)).collect()
     }
 }
 
@@ -140,14 +141,14 @@ fn picture_of(
         display: Display::Linear,
         exposure: Some(1.0),
         full_precision: true,
-        measure: Measure::TimeAndInvocations,
+        measure: if conditions.counts_only { Measure::Nothing } else { Measure::TimeAndInvocations },
         ..options.clone()
     };
     let report = renderer.render(world, &target.target(), &options)?;
     let measured = renderer.wait()?.cloned().unwrap_or_default();
     let invocations = measured.passes.iter().filter_map(|pass| pass.invocations);
-    let (vertex, fragment) = invocations
-        .fold((0, 0), |(vertex, fragment), found| (vertex + found.vertex, fragment + found.fragment));
+    let sum = invocations
+        .fold([0, 0], |[vertices, fragments], found| [vertices + found.vertex, fragments + found.fragment]);
     let radiance = target.read_linear(conditions.gpu)?;
     Ok(DrawnFrame {
         times: Vec::new(),
@@ -155,8 +156,7 @@ fn picture_of(
             width: width as usize,
             radiance: radiance.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(),
         },
-        vertex_invocations: vertex,
-        fragment_invocations: fragment,
+        invocations: (!conditions.counts_only).then_some(sum),
         statistics: report.statistics,
     })
 }

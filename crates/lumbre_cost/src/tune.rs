@@ -142,6 +142,7 @@ pub fn tune(
     let conditions = Conditions {
         gpu,
         quick: options.quick,
+        counts_only: false,
         size: options.size,
         seed: 0,
         folder: report.unwrap_or(Path::new(".")),
@@ -155,7 +156,8 @@ pub fn tune(
         let measured = Measured { study: tuned.study.clone(), ..std::mem::take(&mut tuned.pictures) };
         folder.write_pictures(&measured)?;
         let files = vec![options.file.display().to_string()];
-        let settings = Settings { quick: options.quick, size: options.size, seed: 0, files };
+        let settings =
+            Settings { quick: options.quick, counts_only: false, size: options.size, seed: 0, files };
         folder.write(&CostReport { machine: machine(gpu), settings, studies: vec![measured.study] })?;
     }
     Ok(tuned)

@@ -1,7 +1,5 @@
 //! Bakes that are asked for less and less error: what they take, what they state, and what is true by a converged bake of the same texels.
 
-use std::time::Duration;
-
 use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
 
@@ -101,7 +99,7 @@ fn of_scene(
     let converged = BakeOptions {
         quality: Quality::Reference,
         error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 3.0))),
+        time: Some(conditions.reference_time(25.0, 3.0)),
         seed: conditions.seed.wrapping_add(99),
         denoise: false,
         ..options
@@ -120,11 +118,12 @@ fn of_scene(
     let all = asked(conditions, options);
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); all.len()];
     let mut last = Vec::new();
-    for round in 0..ROUNDS {
+    let rounds = conditions.repetitions(ROUNDS);
+    for round in 0..rounds {
         last.clear();
         for (place, asked) in all.iter().enumerate() {
             let share =
-                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (ROUNDS * all.len()) as f64;
+                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
             let told = [part(share(place)), part(share(place + 1))];
             let baked = bake_scene(conditions, scene, &asked.options, told)?;
             times[place].push(1e3 * baked.report.seconds);

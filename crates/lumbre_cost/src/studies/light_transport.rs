@@ -137,7 +137,7 @@ fn of_scene(
         conditions.tell(part(0.7 + 0.3 * place as f64 / all.len() as f64))?;
         let mut times = Vec::new();
         let mut found = None;
-        for _ in 0..conditions.unless_quick(3, 2) {
+        for _ in 0..conditions.repetitions(conditions.unless_quick(3, 2)) {
             let begun = Instant::now();
             let one = traced(conditions, scene, options)?;
             times.push(milliseconds_since(begun));

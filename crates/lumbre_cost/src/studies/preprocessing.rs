@@ -1,8 +1,6 @@
 //! Light that bounces, before the game or in it: what it costs a frame when it was baked, what baking takes, and what it takes again when something of the
 //! level has moved. Not how good a bake of which price is: that is `bake`.
 
-use std::time::Duration;
-
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, Quality, Samples};
@@ -70,7 +68,7 @@ fn of_scene(
     let converged = BakeOptions {
         quality: Quality::Reference,
         error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(10.0, 2.0))),
+        time: Some(conditions.reference_time(10.0, 2.0)),
         seed: conditions.seed.wrapping_add(99),
         denoise: false,
         ..options
@@ -106,8 +104,9 @@ fn of_scene(
     let truth = maps_of(&mut truth.world);
     let (mut whole, mut kept) = (Vec::new(), Vec::new());
     let mut last = None;
-    for round in 0..ROUNDS {
-        let share = |step: usize| part(0.8 + 0.2 * (2 * round + step) as f64 / (2 * ROUNDS) as f64);
+    let rounds = conditions.repetitions(ROUNDS);
+    for round in 0..rounds {
+        let share = |step: usize| part(0.8 + 0.2 * (2 * round + step) as f64 / (2 * rounds) as f64);
         let bake = |former: Option<&Samples>, step| {
             let (baked, _) =
                 bake_world(conditions, changed()?, &options, former, [share(step), share(step + 1)])?;

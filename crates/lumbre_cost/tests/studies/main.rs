@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
+mod counts;
+
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,6 +26,7 @@ fn options(studies: &[&str], files: Vec<PathBuf>) -> CostOptions {
         files,
         studies: studies_named(&names).unwrap(),
         quick: true,
+        counts_only: false,
         size: (48, 32),
         seed: 1,
         resume: false,
