@@ -6,7 +6,11 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use bevy_ecs::world::World;
+use glam::DQuat;
+use lumbre_optics::Light;
 use lumbre_render::{Display, FrameOptions, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
+
+use lumbre_scene::Transform;
 
 use crate::picture::Picture;
 use crate::rounds::{Work, in_rounds, milliseconds_since};
@@ -21,7 +25,12 @@ pub struct Frame {
     /// Frames of one name share a renderer, and with it what it has compiled, which takes longer than many a frame. Each is then drawn twice in a row, and the
     /// second one timed: in the first the renderer reads another World. Without a name a frame has a renderer of its own.
     pub renderer: Option<&'static str>,
+    /// Before each frame that is timed every lamp that casts shadows moves by [`HAIR`] and back again: no shadow map is as it was.
+    pub moving_lamps: bool,
 }
+
+/// How far lamps move, in metres, and along which axis directional lights turn, by as many radians.
+const HAIR: f64 = 1e-4;
 
 impl Frame {
     /// A frame with a renderer of its own.
@@ -31,12 +40,17 @@ impl Frame {
 
     /// The same of a scene that other frames show, too.
     pub fn of(world: &Rc<RefCell<World>>, options: FrameOptions) -> Self {
-        Self { world: Rc::clone(world), options, renderer: None }
+        Self { world: Rc::clone(world), options, renderer: None, moving_lamps: false }
     }
 
     /// The same with a renderer in common with all that name it so.
     pub fn sharing(self, renderer: &'static str) -> Self {
         Self { renderer: Some(renderer), ..self }
+    }
+
+    /// The same with lamps that move.
+    pub fn with_moving_lamps(self) -> Self {
+        Self { moving_lamps: true, ..self }
     }
 }
 
@@ -100,10 +114,15 @@ pub fn draw_frames(
     shared.dedup();
     let shared: Vec<_> = shared.into_iter().map(|name| (name, RefCell::new(Renderer::new(gpu)))).collect();
     let mut work: Vec<Work<'_>> = Vec::new();
-    for Frame { world, options, renderer } in &frames {
+    for Frame { world, options, renderer, moving_lamps } in &frames {
         let named = shared.iter().find(|(name, _)| Some(*name) == *renderer);
         let target = &target;
-        let draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
+        let mut side = HAIR;
+        let mut draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
+            if *moving_lamps {
+                move_lamps(&mut world.borrow_mut(), side);
+                side = -side;
+            }
             let begun = Instant::now();
             renderer.render(&mut world.borrow_mut(), target, options)?;
             renderer.wait()?;
@@ -127,6 +146,15 @@ pub fn draw_frames(
         drawn.times = times;
     }
     Ok(drawn)
+}
+
+/// Moves and turns every lamp that casts shadows.
+fn move_lamps(world: &mut World, by: f64) {
+    let mut lamps = world.query::<(&Light, &mut Transform)>();
+    for (_, mut place) in lamps.iter_mut(world).filter(|(light, _)| light.shadow) {
+        place.translation.x += by;
+        place.rotation *= DQuat::from_rotation_x(by);
+    }
 }
 
 fn picture_of(

@@ -34,6 +34,7 @@ mod findings;
 mod folder;
 mod frames;
 mod fronts;
+mod lamps_in_pieces;
 mod machine;
 mod measured;
 mod page;

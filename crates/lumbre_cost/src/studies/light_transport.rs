@@ -87,7 +87,11 @@ fn of_scene(
     let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 2_000.0))?;
     let bake = BakeOptions { error: 0.02, ..bake };
     let baked = bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?;
-    let light = |shadows, multisample| FrameOptions { shadows, multisample, ..FrameOptions::default() };
+    let light = |shadows, multisample| FrameOptions {
+        shadows,
+        multisample: Some(multisample),
+        ..FrameOptions::default()
+    };
     let steps = [
         ("lamps alone", light(false, false), " --no-shadows"),
         ("with shadows", light(true, false), ""),
