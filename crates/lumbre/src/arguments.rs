@@ -95,6 +95,7 @@ Studies:
   shading        flat, Gouraud and Phong shading
   need           shading by need over the error allowed
   lamps          many lights, and how they are found
+  shadows        shadow maps by size and filter, against rays
   effects        every effect of a scene, switched off in turn
   bake           the error that a bake is asked for
   preprocessing  light that bounces, before the game or in it

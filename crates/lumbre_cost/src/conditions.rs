@@ -1,12 +1,14 @@
 //! What every study is run under: the device, the effort, the sizes, and who is told how far it is. Not what is studied.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use lumbre_render::Gpu;
+use lumbre_render::{Gpu, Renderer};
 
 use crate::CostError;
+use crate::converged::ConvergedBakes;
 use crate::rounds::Rounds;
 
 /// Who is told how much of a study is done, 0 to 1, or nothing new, and says whether to go on. Called from any thread.
@@ -17,6 +19,10 @@ pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;
 pub struct Conditions<'a> {
     /// The device that draws.
     pub gpu: &'a Gpu,
+    /// Draws all pictures of a study: what it has compiled for one serves the next.
+    pub pictures: &'a RefCell<Renderer>,
+    /// Bakes that a report has already, for studies that want the same.
+    pub converged: &'a ConvergedBakes,
     /// Fewer points and rounds.
     pub quick: bool,
     /// Nothing is timed and nothing compared: whatever serves only that is done once, or cut short.

@@ -8,7 +8,9 @@ use std::time::Instant;
 use bevy_ecs::world::World;
 use glam::DQuat;
 use lumbre_optics::Light;
-use lumbre_render::{Display, FrameOptions, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
+use lumbre_render::{
+    Display, FrameOptions, FrameTarget, Measure, Offscreen, OffscreenFormat, Renderer, Statistics,
+};
 
 use lumbre_scene::Transform;
 
@@ -101,11 +103,10 @@ pub fn draw_frames(
     let (gpu, (width, height)) = (conditions.gpu, conditions.size);
     let [before, after] = told;
     let mut drawn = Vec::new();
-    let mut renderer = Renderer::new(gpu);
     let count = frames.len() as f64;
     for frame in &frames {
         conditions.tell(before + 0.3 * (after - before) * drawn.len() as f64 / count)?;
-        drawn.push(picture_of(conditions, &mut renderer, &mut frame.world.borrow_mut(), &frame.options)?);
+        drawn.push(picture_of(conditions, &mut frame.world.borrow_mut(), &frame.options)?);
     }
     let target = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
     let target = target.target();
@@ -123,10 +124,7 @@ pub fn draw_frames(
                 move_lamps(&mut world.borrow_mut(), side);
                 side = -side;
             }
-            let begun = Instant::now();
-            renderer.render(&mut world.borrow_mut(), target, options)?;
-            renderer.wait()?;
-            Ok(milliseconds_since(begun))
+            timed_frame(renderer, &mut world.borrow_mut(), target, options)
         };
         match named {
             Some((_, renderer)) => work.push(Box::new(move || {
@@ -148,6 +146,19 @@ pub fn draw_frames(
     Ok(drawn)
 }
 
+/// Milliseconds of a frame, from the call until the device has finished.
+fn timed_frame(
+    renderer: &mut Renderer,
+    world: &mut World,
+    target: &FrameTarget,
+    options: &FrameOptions,
+) -> Result<f64, CostError> {
+    let begun = Instant::now();
+    renderer.render(world, target, options)?;
+    renderer.wait()?;
+    Ok(milliseconds_since(begun))
+}
+
 /// Moves and turns every lamp that casts shadows.
 fn move_lamps(world: &mut World, by: f64) {
     let mut lamps = world.query::<(&Light, &mut Transform)>();
@@ -159,7 +170,6 @@ fn move_lamps(world: &mut World, by: f64) {
 
 fn picture_of(
     conditions: &Conditions<'_>,
-    renderer: &mut Renderer,
     world: &mut World,
     options: &FrameOptions,
 ) -> Result<DrawnFrame, CostError> {
@@ -172,6 +182,7 @@ fn picture_of(
         measure: if conditions.counts_only { Measure::Nothing } else { Measure::TimeAndInvocations },
         ..options.clone()
     };
+    let mut renderer = conditions.pictures.borrow_mut();
     let report = renderer.render(world, &target.target(), &options)?;
     let measured = renderer.wait()?.cloned().unwrap_or_default();
     let invocations = measured.passes.iter().filter_map(|pass| pass.invocations);
@@ -198,6 +209,36 @@ pub fn draw_picture(
     world: &mut World,
     options: &FrameOptions,
 ) -> Result<Picture, CostError> {
-    let mut renderer = Renderer::new(conditions.gpu);
-    Ok(picture_of(conditions, &mut renderer, world, options)?.picture)
+    Ok(picture_of(conditions, world, options)?.picture)
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_render::Gpu;
+    use lumbre_scene::update_transforms;
+
+    use super::*;
+    use crate::scenes::{Air, room};
+
+    /// Both clocks run over the same frames, so that what else the machine does meets both.
+    #[test]
+    fn a_studys_time_is_that_of_the_frames_own_account() -> Result<(), CostError> {
+        let gpu = Gpu::headless()?;
+        let target = Offscreen::new(&gpu, 160, 90, OffscreenFormat::Rgba8)?;
+        let mut world = room(Air::Clear);
+        update_transforms(&mut world);
+        let mut renderer = Renderer::new(&gpu);
+        let options = FrameOptions { measure: Measure::Time, ..FrameOptions::default() };
+        let mut apart = Vec::new();
+        for number in 0..11 {
+            let time = timed_frame(&mut renderer, &mut world, &target.target(), &options)?;
+            let account = renderer.accounting().and_then(|account| account.wall_ms);
+            let account = account.unwrap_or_else(|| panic!("frame {number} was measured and waited for"));
+            apart.push((time / account - 1.0).abs());
+        }
+        apart.sort_by(f64::total_cmp);
+        // The median: the scheduler may take the thread away between one clock and the other.
+        assert!(apart[5] < 0.1, "{apart:?}");
+        Ok(())
+    }
 }

@@ -29,6 +29,8 @@
 mod baked;
 mod comparison;
 mod conditions;
+mod converged;
+mod converged_bake;
 mod error;
 mod findings;
 mod folder;

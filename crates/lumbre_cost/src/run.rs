@@ -1,11 +1,13 @@
 //! A report from end to end: which studies are still to be done, each of them, and what is kept after each.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use lumbre_render::Gpu;
+use lumbre_render::{Gpu, Renderer};
 
+use crate::converged::ConvergedBakes;
 use crate::folder::{Folder, has_pictures};
 use crate::machine::machine;
 use crate::studies::StudyKind;
@@ -61,6 +63,7 @@ pub fn measure(
     let former = if options.resume { folder.report()? } else { None };
     let former = former.filter(|kept| kept.machine == report.machine && kept.settings == report.settings);
     let of = options.studies.len();
+    let converged = ConvergedBakes::default();
     for (number, kind) in options.studies.iter().enumerate() {
         let kept = former.as_ref().and_then(|former| former.study(kind.name));
         if let Some(kept) = kept.filter(|study| study.points.iter().all(|p| has_pictures(folder.path(), p))) {
@@ -68,8 +71,12 @@ pub fn measure(
             continue;
         }
         let listener = |fraction| told(CostProgress { study: kind.name, number, of, fraction });
+        // One for each study: what it uploads does not depend on the studies before it.
+        let pictures = RefCell::new(Renderer::new(gpu));
         let conditions = Conditions {
             gpu,
+            pictures: &pictures,
+            converged: &converged,
             quick: options.quick,
             counts_only: options.counts_only,
             size: options.size,

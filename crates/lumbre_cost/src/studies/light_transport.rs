@@ -84,7 +84,7 @@ fn of_scene(
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
     conditions.tell(part(0.5))?;
 
-    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 2_000.0))?;
+    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 1_500.0))?;
     let bake = BakeOptions { error: 0.02, ..bake };
     let baked = bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?;
     let light = |shadows, multisample| FrameOptions {
@@ -99,10 +99,10 @@ fn of_scene(
     ];
     let mut frames = Vec::new();
     for (_, options, _) in &steps {
-        frames.push(Frame::new(scene.open(conditions.aspect())?, options.clone()));
+        frames.push(Frame::new(scene.open(conditions.aspect())?, options.clone()).sharing("transport"));
     }
     let bake_time = 1e3 * baked.report.seconds;
-    frames.push(Frame::new(baked.world, light(true, true)));
+    frames.push(Frame::new(baked.world, light(true, true)).sharing("transport"));
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(0.7)])?;
     let labels = steps.iter().map(|(label, ..)| *label).chain(["and lightmaps"]);
     let more = steps.iter().map(|(.., more)| *more).chain([" --msaa"]);

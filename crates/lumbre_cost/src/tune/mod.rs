@@ -10,11 +10,12 @@ use std::time::Instant;
 
 use bevy_ecs::prelude::*;
 use lumbre_optics::Shading;
-use lumbre_render::{FrameOptions, Gpu};
+use lumbre_render::{FrameOptions, Gpu, Renderer};
 use lumbre_scene::{ActiveCamera, Camera, Name};
 
 pub use self::draw_settings::DrawSettings;
 use self::draw_settings::{Choices, Stage};
+use crate::converged::ConvergedBakes;
 use crate::findings::{cost_of, percent, short};
 use crate::folder::Folder;
 use crate::frames::{DrawnFrame, Frame, draw_frames};
@@ -78,8 +79,11 @@ pub fn tune(
 ) -> Result<Tuned, CostError> {
     let begun = Instant::now();
     let files = [options.file.clone()];
+    let (pictures, converged) = (RefCell::new(Renderer::new(gpu)), ConvergedBakes::default());
     let conditions = Conditions {
         gpu,
+        pictures: &pictures,
+        converged: &converged,
         quick: options.quick,
         counts_only: false,
         size: options.size,

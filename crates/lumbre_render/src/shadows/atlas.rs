@@ -47,7 +47,7 @@ pub(super) fn pack(wanted: &[f64], most: f64, limit: u32) -> (u32, Vec<Option<Ti
 
 fn power_of_two(side: f64, most: f64) -> u32 {
     // NaN is the least.
-    let side = side.min(most).max(f64::from(LEAST));
+    let side = side.max(f64::from(LEAST)).min(most.max(f64::from(LEAST)));
     1 << (side.log2().round() as u32)
 }
 
