@@ -57,8 +57,8 @@ const SHADOWS: [(ShadowFilter, f32); 6] = [
 const THRESHOLDS: [f32; 3] = [0.002, 0.01, 0.05];
 
 impl DrawSettings {
-    /// The most accurate: the others are measured against it.
-    pub const REFERENCE: Self = Self {
+    /// The most accurate of a level with shadows.
+    const MOST_ACCURATE: Self = Self {
         shading: Shading::Phong,
         shadows: true,
         shadow_filter: SHADOWS[0].0,
@@ -67,12 +67,12 @@ impl DrawSettings {
         multisample: true,
     };
 
-    pub(super) fn label(&self) -> String {
-        let usual = Self::REFERENCE;
+    /// What it is called beside the most accurate of its level.
+    pub(super) fn label(&self, reference: &Self) -> String {
         let of_maps = (self.shadow_filter, self.shadow_resolution);
         let shadows = match self.shadows {
             false => ", no shadows".to_owned(),
-            true if of_maps == (usual.shadow_filter, usual.shadow_resolution) => String::new(),
+            true if of_maps == (reference.shadow_filter, reference.shadow_resolution) => String::new(),
             true => format!(
                 ", {} shadows at {}",
                 self.shadow_filter.name(),
@@ -124,6 +124,14 @@ impl DrawSettings {
 }
 
 impl Choices {
+    /// The most accurate way: the others are measured against it. Where nothing casts a shadow, maps are as usual.
+    pub fn reference(&self) -> DrawSettings {
+        let usual = FrameSettings::default();
+        let most = DrawSettings::MOST_ACCURATE;
+        let shadow_resolution = if self.shadows { most.shadow_resolution } else { usual.shadow_resolution };
+        DrawSettings { shadow_resolution, ..most }
+    }
+
     /// Of a level.
     pub fn of(world: &mut World) -> Self {
         let mut lights = world.query::<&Light>();

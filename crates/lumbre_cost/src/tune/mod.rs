@@ -167,8 +167,9 @@ impl Candidates {
     /// What a stage has to measure: those that are still in the running, and what differs from the best of them in what the stage chooses.
     fn next(&self, stage: Stage, choices: &Choices) -> Vec<DrawSettings> {
         if self.latest.is_empty() {
-            let others = stage.others(DrawSettings::REFERENCE, choices);
-            return [DrawSettings::REFERENCE].into_iter().chain(others).collect();
+            let reference = choices.reference();
+            let others = stage.others(reference, choices);
+            return [reference].into_iter().chain(others).collect();
         }
         let running: Vec<DrawSettings> = self.contenders().iter().map(|&one| self.settings[one]).collect();
         let points: Vec<Point> = self.contenders().iter().map(|&one| self.points[one].clone()).collect();
@@ -206,7 +207,9 @@ impl Candidates {
             let place = match self.settings.iter().position(|known| *known == way) {
                 Some(place) => place,
                 None => {
-                    let Some(point) = point(conditions, scene, cameras, &way, drawn, measured)? else {
+                    let label = way.label(self.settings.first().unwrap_or(&way));
+                    let Some(point) = point(conditions, scene, cameras, (&way, label), drawn, measured)?
+                    else {
                         continue;
                     };
                     self.settings.push(way);
@@ -319,7 +322,7 @@ fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     cameras: &[(Entity, String)],
-    way: &DrawSettings,
+    (way, label): (&DrawSettings, String),
     drawn: &[DrawnFrame],
     measured: &mut Measured,
 ) -> Result<Option<Point>, CostError> {
@@ -331,7 +334,7 @@ fn point(
         one.pictures.extend(kept.map(|picture| (reference.clone(), picture)));
         let point = Point {
             series: way.shading.name().to_owned(),
-            label: way.label(),
+            label: label.clone(),
             counts: drawn.counts(),
             command: format!(
                 "lumbre render {} -o frame.png --camera '{camera}' --size {} {}",
