@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn table(gpu: &Gpu, rows: Vec<Vec<World>>, cell: u32) -> Result<RgbImage, Box<dyn std::error::Error>> {
     let frame = Offscreen::new(gpu, cell, cell, OffscreenFormat::Rgba8)?;
     let mut renderer = Renderer::new(gpu);
-    let options = FrameOptions { multisample: true, ..FrameOptions::default() };
+    let options = FrameOptions { multisample: Some(true), ..FrameOptions::default() };
     let across = |count: usize| count as u32 * (cell + GAP) - GAP;
     let columns = rows.first().map_or(0, Vec::len);
     let mut table = RgbImage::from_pixel(across(columns), across(rows.len()), Rgb([255; 3]));

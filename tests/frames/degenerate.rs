@@ -37,7 +37,8 @@ fn a_world_without_meshes_is_its_background() {
     let background = Vec3::new(0.1, 2.5, 1e-3);
     world.insert_resource(SceneSettings { background, ..SceneSettings::default() });
     for multisample in [false, true] {
-        let (pixels, report) = draw(&mut world, 5, 3, &FrameOptions { multisample, ..linear() });
+        let (pixels, report) =
+            draw(&mut world, 5, 3, &FrameOptions { multisample: Some(multisample), ..linear() });
         assert!(pixels.iter().all(|pixel| *pixel == background.as_dvec3()), "{}", pixels[0]);
         assert!(!report.plan.status("forward").unwrap().runs());
     }
@@ -51,7 +52,8 @@ fn a_world_without_meshes_is_its_background() {
 fn one_pixel_is_a_frame() {
     for multisample in [false, true] {
         let mut world = pane_of(Material::matt(Vec3::splat(0.5)));
-        let (pixels, _) = draw(&mut world, 1, 1, &FrameOptions { multisample, ..linear() });
+        let (pixels, _) =
+            draw(&mut world, 1, 1, &FrameOptions { multisample: Some(multisample), ..linear() });
         assert_eq!(pixels, [DVec3::splat(0.5)]);
     }
 }

@@ -88,7 +88,7 @@ fn a_frame_without_a_display_pass_has_the_numbers_of_the_f64_twin() {
 fn what_needs_radiance_keeps_the_display_pass() {
     let mut world = scene(Shading::Phong);
     assert!(!frame(&mut world, &FrameOptions::default()).1);
-    assert!(frame(&mut world, &FrameOptions { multisample: true, ..FrameOptions::default() }).1);
+    assert!(frame(&mut world, &FrameOptions { multisample: Some(true), ..FrameOptions::default() }).1);
     let glass =
         Material { alpha: 0.5, alpha_mode: lumbre_optics::AlphaMode::Blend, ..Material::matt(Vec3::ONE) };
     world.spawn((Mesh(Arc::new(shapes::uv_sphere(0.2, 8, 4))), glass, Transform::from_xyz(0.0, 0.0, 1.0)));

@@ -21,7 +21,7 @@ use lumbre_render::{
 use lumbre_scene::{
     AmbientCube, Camera, Census, EmissiveLight, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
     MaterialTextures, Mesh, MetallicRoughnessTexture, NormalTexture, OcclusionTexture, SceneSettings,
-    Transform,
+    ShadowFilter, Transform,
 };
 use lumbre_shaders::{Kept, MODULES, Program, UnnamedFeatures};
 use lumbre_tests::panes::{image, sharp};
@@ -263,6 +263,16 @@ const ROWS: &[Row] = &[
             spawn(scene, Light { shadow: true, ..cone() });
         },
         add: |scene| each_light(scene, |light| light.radius = 0.2),
+    },
+    Row {
+        effect: "hard shadows",
+        called_for_by: "a light with `shadow` under `ShadowFilter::Hard`",
+        features: &["HARD_SHADOWS"],
+        before: |scene| {
+            occluder(scene);
+            spawn(scene, Light { shadow: true, ..cone() });
+        },
+        add: |scene| settings(scene, |settings| settings.frame.shadow_filter = ShadowFilter::Hard),
     },
     Row {
         effect: "specular",
@@ -569,7 +579,7 @@ const ROWS: &[Row] = &[
         called_for_by: "`FrameOptions::multisample`",
         features: &["HALF_RANGE"],
         before: point_light,
-        add: |scene| scene.options.multisample = true,
+        add: |scene| scene.options.multisample = Some(true),
     },
     Row {
         effect: "counts of lights",

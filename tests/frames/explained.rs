@@ -175,7 +175,7 @@ fn what_is_explained_is_what_is_drawn() {
             lightmaps: !random.once_in(4),
             irradiance_volumes: !random.once_in(4),
             shadows: !random.once_in(4),
-            multisample: random.once_in(8),
+            multisample: random.once_in(8).then_some(true),
             full_precision: random.once_in(8),
             display: random.one_of(Display::ALL),
             shading: random.once_in(6).then_some(Shading::Gouraud),

@@ -16,6 +16,7 @@ mod effects_table;
 mod explained;
 mod faces;
 mod flat_rules;
+mod frame_settings;
 mod gltf_materials;
 mod highlights;
 mod irradiance_volumes;

@@ -122,7 +122,7 @@ fn what_is_switched_on_for_the_first_time_is_shown_when_its_pipelines_are_there(
     });
     scene.change("flat shading", true, |scene| scene.options.shading = Some(Shading::Flat));
     // Several samples are drawn into another format, and shown by a pass of their own.
-    scene.change("multisampling", true, |scene| scene.options.multisample = true);
+    scene.change("multisampling", true, |scene| scene.options.multisample = Some(true));
 }
 
 #[test]

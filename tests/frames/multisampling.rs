@@ -21,7 +21,7 @@ fn inside_a_surface_nothing_changes() {
         let options = FrameOptions { shading: Some(*shading), ..linear() };
         let (single, _) = draw(&mut world, SIZE as u32, SIZE as u32, &options);
         let (four, _) =
-            draw(&mut world, SIZE as u32, SIZE as u32, &FrameOptions { multisample: true, ..options });
+            draw(&mut world, SIZE as u32, SIZE as u32, &FrameOptions { multisample: Some(true), ..options });
         let twin_options = TwinOptions { shading: Some(*shading), ..TwinOptions::default() };
         // One triangle: where two share a pixel it is shaded for each.
         let inside = twin::draw(&mut world, SIZE, SIZE, twin_options).inside_surfaces(true);
@@ -44,7 +44,7 @@ fn edges_are_averages_of_four_samples() {
     let turned = Transform::from_rotation(DQuat::from_rotation_z(-0.15)).with_scale(glam::DVec3::splat(0.6));
     world.entity_mut(pane).insert(turned);
     let frame = |world: &mut World, multisample| {
-        draw(world, SIZE as u32, SIZE as u32, &FrameOptions { multisample, ..linear() }).0
+        draw(world, SIZE as u32, SIZE as u32, &FrameOptions { multisample: Some(multisample), ..linear() }).0
     };
     let four = frame(&mut world, true);
     let mut seen = [0_usize; 5];

@@ -55,7 +55,9 @@ fn radiance(renderer: &mut Renderer, world: &mut World) -> Vec<Vec4> {
 #[test]
 fn an_effect_that_is_not_called_for_leaves_every_bit_and_says_why() {
     let (mut world, ..) = ball(Material::matt(Vec3::ONE));
-    for options in [FrameOptions::default(), FrameOptions { multisample: true, ..FrameOptions::default() }] {
+    for options in
+        [FrameOptions::default(), FrameOptions { multisample: Some(true), ..FrameOptions::default() }]
+    {
         let plain = bytes(&mut Renderer::new(gpu()), &mut world, &options);
         assert_eq!(bytes(&mut with_both(), &mut world, &options), plain);
     }
@@ -116,7 +118,7 @@ fn bloom_spreads_light_and_keeps_its_energy() {
 #[test]
 fn an_outline_is_a_rim_of_its_width_around_its_object_and_nothing_else() {
     for multisample in [false, true] {
-        let options = FrameOptions { multisample, ..FrameOptions::default() };
+        let options = FrameOptions { multisample: Some(multisample), ..FrameOptions::default() };
         let (mut world, ball, _) = ball(Material::matt(Vec3::ONE));
         // A wall before it: the outline is seen through it.
         let wall = Mesh(Arc::new(shapes::cuboid(Vec3::new(0.5, 4.0, 0.1), 1)));

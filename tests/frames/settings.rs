@@ -156,11 +156,11 @@ fn options_that_change_from_frame_to_frame_leave_nothing_behind() {
         FrameOptions { lightmaps: false, ..linear() },
         linear(),
         FrameOptions { reflection: Some(ReflectionModel::Blinn), ..linear() },
-        FrameOptions { multisample: true, ..linear() },
+        FrameOptions { multisample: Some(true), ..linear() },
         FrameOptions { full_precision: false, exposure: Some(0.5), ..linear() },
         FrameOptions { display: Display::Clamp, ..linear() },
         FrameOptions { display: Display::Srgb, ..linear() },
-        FrameOptions { lightmaps: false, multisample: true, ..with_shading(Shading::Gouraud) },
+        FrameOptions { lightmaps: false, multisample: Some(true), ..with_shading(Shading::Gouraud) },
         linear(),
     ];
     let mut canvas = Canvas::new(SIZE as u32, SIZE as u32);

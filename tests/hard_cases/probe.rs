@@ -88,7 +88,7 @@ fn an_injected_infinity_is_named() -> Outcome {
 }
 
 fn an_injected_nan_among_samples_is_named() -> Outcome {
-    let options = FrameOptions { multisample: true, ..linear() };
+    let options = FrameOptions { multisample: Some(true), ..linear() };
     Outcome::text("NaN after overlay, in target at (5, 3)", probed(NAN, &options))
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{FlatRule, NoShading, ReflectionModel, Shading};
 use lumbre::render::Display;
-use lumbre::scene::PackedFormat;
+use lumbre::scene::{FrameSettings, PackedFormat, ShadowFilter};
 use lumbre::trace::{Aov, DEFAULT_WEIGHT, Filter, Integrator, TreeFormat};
 
 /// Lighting for games that tells you what it costs.
@@ -95,6 +95,7 @@ Studies:
   shading        flat, Gouraud and Phong shading
   need           shading by need over the error allowed
   lamps          many lights, and how they are found
+  shadows        shadow maps by size and filter, against rays
   effects        every effect of a scene, switched off in turn
   bake           the error that a bake is asked for
   preprocessing  light that bounces, before the game or in it
@@ -425,6 +426,9 @@ pub struct Cost {
     /// Fewer points and rounds: about two minutes on two cores, instead of six.
     #[arg(long)]
     pub quick: bool,
+    /// Counts alone: nothing is timed, compared or drawn for people, and the report is the same on every machine. What --compare is to watch over without noise.
+    #[arg(long)]
+    pub counts_only: bool,
     /// Only this study; may be given several times.
     #[arg(long = "study", value_name = "NAME")]
     pub studies: Vec<String>,
@@ -441,7 +445,7 @@ pub struct Cost {
     #[arg(long)]
     pub quiet: bool,
     /// Says what differs between two reports instead; exit status 1 if a count or an error of the second is larger, or a point is gone.
-    #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "studies", "resume", "size", "seed", "quiet"])]
+    #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "counts_only", "studies", "resume", "size", "seed", "quiet"])]
     pub compare: Option<Vec<PathBuf>>,
     /// Counts, errors and times that differ by less than this factor count as equal.
     #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, conflicts_with = "output", allow_negative_numbers = true)]
@@ -463,7 +467,7 @@ pub struct Tune {
     /// Relative RMSE that a frame may have against the most accurate settings (0.02 or 2%): without --frame-ms the least time within it is taken.
     #[arg(long, value_name = "ERROR", value_parser = share, allow_negative_numbers = true)]
     pub error: Option<f64>,
-    /// Where the level goes with the settings that were taken: its shading, and whether its lights cast shadows in frames.
+    /// Where the level goes with the settings that were taken: its shading, its shadows, where its lamps end, and samples a pixel.
     #[arg(short, long, value_name = "OUT.glb", requires = "goal")]
     pub output: Option<PathBuf>,
     /// Where a report goes, as of `lumbre cost`: every setting with its picture, time and error.
@@ -543,9 +547,21 @@ pub struct Frame {
     /// Draws no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,
-    /// Four samples per pixel.
+    /// Four samples per pixel, whatever the file says.
     #[arg(long)]
     pub msaa: bool,
+    /// One sample per pixel, whatever the file says.
+    #[arg(long, conflicts_with = "msaa")]
+    pub no_msaa: bool,
+    /// Lamps end where they bring a white surface that faces them less than this radiance, whatever the file says; 0: where the file ends them.
+    #[arg(long, value_name = "X", value_parser = threshold, allow_negative_numbers = true)]
+    pub light_threshold: Option<f32>,
+    /// Texels of shadow maps beside the usual number, along a side, from 0.0625 to 4, whatever the file says.
+    #[arg(long, value_name = "X", value_parser = shadow_resolution, allow_negative_numbers = true)]
+    pub shadow_resolution: Option<f32>,
+    /// How shadow maps are read, whatever the file says.
+    #[arg(long, value_name = "hard|percentage-closer|soft", value_parser = shadow_filter)]
+    pub shadow_filter: Option<ShadowFilter>,
     /// Factor on radiance, an exposure value like 12EV, or auto, instead of the camera's; without this auto in a PNG of lights in candela or lux that
     /// would be white.
     #[arg(long, value_name = "auto|EV|X", value_parser = exposure, allow_negative_numbers = true)]
@@ -575,6 +591,26 @@ fn positive(text: &str) -> Result<f64, String> {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("a number greater than 0 is wanted".into()),
     }
+}
+
+fn threshold(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value >= 0.0 && value.is_finite() => Ok(value),
+        _ => Err("a finite number of at least 0 is wanted".into()),
+    }
+}
+
+fn shadow_resolution(text: &str) -> Result<f32, String> {
+    let [least, most] = FrameSettings::SHADOW_RESOLUTIONS;
+    match text.parse::<f32>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a number from {least} to {most} is wanted")),
+    }
+}
+
+fn shadow_filter(text: &str) -> Result<ShadowFilter, String> {
+    let names: Vec<&str> = ShadowFilter::ALL.iter().map(|filter| filter.name()).collect();
+    ShadowFilter::from_name(text).ok_or_else(|| format!("use one of {}", names.join(", ")))
 }
 
 /// A number, or so many hundredths.

@@ -33,6 +33,7 @@ fn report(asked: &Cost, output: &Path) -> anyhow::Result<()> {
         files: asked.inputs.clone(),
         studies: studies_named(&asked.studies)?,
         quick: asked.quick,
+        counts_only: asked.counts_only,
         size: asked.size.unwrap_or(SIZES[usize::from(asked.quick)]),
         seed: asked.seed,
         resume: asked.resume,

@@ -5,7 +5,9 @@ use std::path::Path;
 use anyhow::bail;
 use bevy_ecs::prelude::*;
 use lumbre::render::{Display, FrameOptions, Gpu, meter};
-use lumbre::scene::{self, ActiveCamera, Camera, GlobalTransform, LoadOptions, LoadReport, Name, SourceFile};
+use lumbre::scene::{
+    self, ActiveCamera, Camera, GlobalTransform, LoadOptions, LoadReport, Name, SceneSettings, SourceFile,
+};
 
 use crate::arguments::{Exposure, Frame, Reading};
 
@@ -113,6 +115,10 @@ pub fn frame_options(
     if !frame.no_default_light {
         light_by_default(world, camera, path);
     }
+    let settings = &mut world.get_resource_or_insert_with(SceneSettings::default).frame;
+    settings.light_threshold = frame.light_threshold.unwrap_or(settings.light_threshold);
+    settings.shadow_resolution = frame.shadow_resolution.unwrap_or(settings.shadow_resolution);
+    settings.shadow_filter = frame.shadow_filter.unwrap_or(settings.shadow_filter);
     Ok(FrameOptions {
         camera: Some(camera),
         shading: frame.shading,
@@ -122,7 +128,11 @@ pub fn frame_options(
         lightmaps: !frame.no_lightmaps,
         irradiance_volumes: !frame.no_irradiance_volumes,
         shadows: !frame.no_shadows,
-        multisample: frame.msaa,
+        multisample: match (frame.msaa, frame.no_msaa) {
+            (true, _) => Some(true),
+            (false, true) => Some(false),
+            (false, false) => None,
+        },
         display,
         exposure: match frame.exposure {
             Some(Exposure::Factor(factor)) => Some(factor),

@@ -121,6 +121,12 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             asked.frame.specular_antialiasing.is_some(),
             "--specular-antialiasing means nothing to rays: --samples filters highlights and everything else",
         ),
+        (
+            asked.frame.light_threshold.is_some()
+                || asked.frame.shadow_resolution.is_some()
+                || asked.frame.shadow_filter.is_some(),
+            "--light-threshold, --shadow-resolution and --shadow-filter mean nothing to rays: no lamp ends early, and shadows are exact",
+        ),
         (trees && asked.error.is_some(), "--error is for --integrator path: the ray tree has no noise"),
         (
             !trees && asked.adaptive.is_some(),

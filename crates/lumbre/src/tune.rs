@@ -79,12 +79,10 @@ fn print(tuned: &Tuned, asked: &Tune) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the level again with the settings that a file can hold: the scene's shading, and no light with a shadow where shadows are not worth it.
+/// Writes the level again with the settings: the scene's shading and what its frames spend, and no light with a shadow where shadows are not worth it.
 fn write(settings: &DrawSettings, asked: &Tune, output: &Path) -> anyhow::Result<()> {
     let DrawSettings { shading, shadows, .. } = *settings;
-    save_settings(&asked.input, output, FileSettings { shading, shadows })?;
-    let samples =
-        if settings.multisample { "; four samples a pixel are the program's choice (--msaa)" } else { "" };
-    eprintln!("lumbre: {} has these settings{samples}", output.display());
+    save_settings(&asked.input, output, FileSettings { shading, shadows, frame: settings.frame() })?;
+    eprintln!("lumbre: {} has these settings", output.display());
     Ok(())
 }

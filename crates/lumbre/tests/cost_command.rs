@@ -112,6 +112,7 @@ fn bad_arguments_are_refused_with_what_to_do() {
         (&["cost", "-o", &out, "--times"], 2, "cannot be used with"),
         (&["cost", "--compare", "a.json"], 2, "2 values"),
         (&["cost", "--compare", "a.json", "b.json", "--quick"], 2, "--quick"),
+        (&["cost", "--compare", "a.json", "b.json", "--counts-only"], 2, "--counts-only"),
         (&["cost", "--compare", "a.json", "b.json", "--factor", "0.5"], 2, "at least 1"),
         (&["cost", "--compare", "a.json", "b.json"], 1, "a.json"),
         (&["cost", "--compare", text(&garbage), text(&garbage)], 1, "is no report of lumbre cost"),
@@ -155,7 +156,15 @@ fn a_level_with_the_settings_that_keep_a_time() {
     let command = said.lines().find(|line| line.starts_with("lumbre render ")).unwrap();
     let mut read = World::new();
     load(&mut read, &tuned).unwrap();
-    let shading = read.resource::<SceneSettings>().shading;
+    let SceneSettings { shading, frame, .. } = *read.resource::<SceneSettings>();
+    assert_eq!(frame.multisample, Some(command.contains("--msaa")), "{command}");
+    assert!(command.contains(&format!("--light-threshold {}", frame.light_threshold)), "{command}");
+    let of_maps = format!(
+        "--shadow-filter {} --shadow-resolution {}",
+        frame.shadow_filter.name(),
+        frame.shadow_resolution
+    );
+    assert!(command.contains("--no-shadows") || command.contains(&of_maps), "{command}");
     assert!(command.contains(&format!("--shading {shading}")), "{command}");
     let mut lights = read.query::<&Light>();
     let shadow = lights.iter(&read).next().unwrap().shadow;
@@ -175,6 +184,7 @@ fn a_level_with_the_settings_that_keep_a_time() {
     for json in [&mut before, &mut after] {
         json["extensionsUsed"] = "".into();
         json["scenes"][0]["extensions"]["LUMBRE_scene"]["shading"] = "".into();
+        json["scenes"][0]["extensions"]["LUMBRE_scene"]["frame"] = "".into();
         json["extensions"]["KHR_lights_punctual"]["lights"][0]["extensions"]["LUMBRE_lights_phong"]["shadow"] =
             "".into();
     }

@@ -1,14 +1,14 @@
 //! Scenes that are baked for a study, and how far the texels of one bake are from those of another. Not the studies.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use lumbre_bake::{Bake, BakeOptions, BakeReport, Density, Probes, Progress, Samples, TexelErrors};
-use lumbre_scene::{GlobalTransform, Lightmap, LightmapImage, Mesh, StaticObject, hidden_entities};
+use lumbre_scene::{GlobalTransform, Lightmap, Mesh, StaticObject, hidden_entities};
 
+use crate::converged::Maps;
 use crate::scene_file::SceneFile;
 use crate::{Conditions, CostError, ErrorOf};
 
@@ -101,18 +101,13 @@ pub fn bake_world(
 }
 
 /// Tells how far a study is while something bakes; `told` are its shares before and after.
-fn telling(
-    conditions: &Conditions<'_>,
+fn telling<'a>(
+    conditions: &Conditions<'a>,
     [before, after]: [f64; 2],
-) -> impl FnMut(Progress) -> ControlFlow<()> + Send {
-    move |progress| match conditions.tell(before + f64::from(progress.fraction) * (after - before)) {
-        Ok(()) => ControlFlow::Continue(()),
-        Err(_) => ControlFlow::Break(()),
-    }
+) -> impl FnMut(Progress) -> ControlFlow<()> + Send + use<'a> {
+    let listener = conditions.listener;
+    move |progress| listener(Some(before + f64::from(progress.fraction) * (after - before)))
 }
-
-/// Lightmaps with the standard error of every texel, by name.
-pub type Maps = BTreeMap<String, (Arc<LightmapImage>, Arc<[f32]>)>;
 
 /// The lightmaps of a World that has just been baked.
 pub fn maps_of(world: &mut World) -> Maps {
@@ -165,7 +160,7 @@ pub fn texel_error(found: &Maps, reference: &Maps) -> Option<ErrorOf> {
 
 #[cfg(test)]
 mod tests {
-    use lumbre_scene::LightmapEncoding;
+    use lumbre_scene::{LightmapEncoding, LightmapImage};
 
     use super::*;
 

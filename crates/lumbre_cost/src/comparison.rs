@@ -33,6 +33,11 @@ pub enum What {
         /// In the second.
         after: f64,
     },
+    /// It is not counted any more.
+    Uncounted {
+        /// Its name.
+        name: String,
+    },
     /// The error is another one.
     Error {
         /// In the first, as a share.
@@ -56,7 +61,7 @@ impl Change {
     /// Whether the second report is the worse one by it: something is gone, a count or an error grew. Times are no failure by themselves.
     pub fn is_worse(&self) -> bool {
         match &self.what {
-            What::Gone => true,
+            What::Gone | What::Uncounted { .. } => true,
             What::New | What::Time { .. } => false,
             What::Count { before, after, .. } | What::Error { before, after } => after > before,
         }
@@ -81,6 +86,7 @@ impl fmt::Display for Change {
         match &self.what {
             What::Gone => write!(f, ": is not there any more"),
             What::New => write!(f, ": is new"),
+            What::Uncounted { name } => write!(f, ": {name} is not counted any more"),
             What::Count { name, before, after } => {
                 let factor = times(*before, *after);
                 write!(f, ": {name} {} instead of {}{factor}", rounded(*after), rounded(*before))
@@ -138,9 +144,12 @@ fn differences(before: &Point, after: &Point, factor: f64) -> Vec<What> {
     let beyond = |a: f64, b: f64| a != b && !(b <= a * factor && a <= b * factor);
     let mut found = Vec::new();
     for (name, &count) in &before.counts {
-        let now = after.counts.get(name).copied().unwrap_or(0.0);
-        if beyond(count, now) {
-            found.push(What::Count { name: name.clone(), before: count, after: now });
+        match after.counts.get(name) {
+            Some(&now) if beyond(count, now) => {
+                found.push(What::Count { name: name.clone(), before: count, after: now });
+            }
+            Some(_) => {}
+            None => found.push(What::Uncounted { name: name.clone() }),
         }
     }
     if let (Some(was), Some(is)) = (before.error, after.error) {

@@ -1,12 +1,14 @@
 //! What every study is run under: the device, the effort, the sizes, and who is told how far it is. Not what is studied.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use lumbre_render::Gpu;
+use lumbre_render::{Gpu, Renderer};
 
 use crate::CostError;
+use crate::converged::ConvergedBakes;
 use crate::rounds::Rounds;
 
 /// Who is told how much of a study is done, 0 to 1, or nothing new, and says whether to go on. Called from any thread.
@@ -17,8 +19,14 @@ pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;
 pub struct Conditions<'a> {
     /// The device that draws.
     pub gpu: &'a Gpu,
+    /// Draws all pictures of a study: what it has compiled for one serves the next.
+    pub pictures: &'a RefCell<Renderer>,
+    /// Bakes that a report has already, for studies that want the same.
+    pub converged: &'a ConvergedBakes,
     /// Fewer points and rounds.
     pub quick: bool,
+    /// Nothing is timed and nothing compared: whatever serves only that is done once, or cut short.
+    pub counts_only: bool,
     /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
     /// Of everything that draws random numbers.
@@ -48,12 +56,24 @@ impl Conditions<'_> {
         }
     }
 
-    /// Rounds for about so many seconds, a sixth of them if it has to be quick.
+    /// Rounds for about so many seconds, a sixth of them if it has to be quick; none for counts alone.
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
+            _ if self.counts_only => Rounds { warm_up: 0, fewest: 0, most: 0, time: Duration::ZERO },
             true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 6.0) },
             false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
         }
+    }
+
+    /// How often work is done that takes too long for rounds by time: once for counts alone.
+    pub fn repetitions(&self, usual: usize) -> usize {
+        if self.counts_only { 1 } else { usual }
+    }
+
+    /// How long a bake may take that others are compared with, in seconds of a full and of a quick report. For counts alone, which are not compared with it, hardly any time.
+    pub fn reference_time(&self, full: f64, quick: f64) -> Duration {
+        let seconds = if self.counts_only { 0.01 } else { self.unless_quick(full, quick) };
+        Duration::from_secs_f64(seconds)
     }
 
     /// The first of two in a full report, the second in a quick one.

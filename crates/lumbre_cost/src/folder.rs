@@ -1,8 +1,10 @@
 //! The folder of a report: `cost.json` with everything, `cost.csv` as a table, `index.html` to read, and pictures and scenes below it. Nothing
 //! stands half-written under its final name.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use image::{Rgb32FImage, RgbImage};
 use lumbre_trace::heat_color;
@@ -63,27 +65,45 @@ impl Folder {
             fs::remove_dir_all(&own).map_err(failed)?;
         }
         fs::create_dir_all(&own).map_err(failed)?;
-        for (name, picture) in &measured.pictures {
-            self.write_light(name, picture)?;
-        }
-        // What belongs together is shown with one exposure: that of the reference.
+        // What belongs together is shown with one exposure: that of the reference. Several points have the same reference, and that is one file.
+        let mut shown = BTreeMap::new();
         let points = measured.study.points.iter();
         for files in points.filter_map(|point| point.picture.as_ref()) {
-            let (Some(picture), Some(reference)) =
-                (measured.pictures.get(&files.picture), measured.pictures.get(&files.reference))
-            else {
-                continue;
-            };
-            let exposure = reference.exposure();
-            self.write_shown(&files.picture, picture, exposure)?;
-            self.write_shown(&files.reference, reference, exposure)?;
+            if let Some(reference) = measured.pictures.get(&files.reference) {
+                let exposure = reference.exposure();
+                shown.insert(&files.picture, exposure);
+                shown.insert(&files.reference, exposure);
+            }
         }
-        for (name, heat) in &measured.heat {
-            let width = measured.pictures.get(name).map_or(1, |picture| picture.width);
-            let bytes = heat.iter().flat_map(|value| heat_color(*value)).collect();
-            self.write_bytes(&format!("{name}.heat"), width, bytes)?;
-        }
-        Ok(())
+        let write = |name: &String, picture: &Picture| -> Result<(), CostError> {
+            self.write_light(name, picture)?;
+            if let Some(exposure) = shown.get(name) {
+                self.write_shown(name, picture, *exposure)?;
+            }
+            if let Some(heat) = measured.heat.get(name) {
+                let bytes = heat.iter().flat_map(|value| heat_color(*value)).collect();
+                self.write_bytes(&format!("{name}.heat"), picture.width, bytes)?;
+            }
+            Ok(())
+        };
+        // Compressing them takes longer than anything else here.
+        let next = Mutex::new(measured.pictures.iter());
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let work = || -> Result<(), CostError> {
+            loop {
+                let taken = next.lock().ok().and_then(|mut next| next.next());
+                let Some((name, picture)) = taken else { return Ok(()) };
+                write(name, picture)?;
+            }
+        };
+        std::thread::scope(|scope| {
+            let workers: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
+            let own = work();
+            let ended = workers
+                .into_iter()
+                .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            ended.fold(own, Result::and)
+        })
     }
 
     /// Writes the report, its table and its page.

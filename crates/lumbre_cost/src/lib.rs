@@ -29,11 +29,14 @@
 mod baked;
 mod comparison;
 mod conditions;
+mod converged;
+mod converged_bake;
 mod error;
 mod findings;
 mod folder;
 mod frames;
 mod fronts;
+mod lamps_in_pieces;
 mod machine;
 mod measured;
 mod page;

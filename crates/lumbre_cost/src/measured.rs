@@ -76,7 +76,7 @@ impl Measured {
     }
 
     /// Below `pictures/STUDY`, of letters, digits and hyphens.
-    fn file_name(&self, name: &str) -> String {
+    pub fn file_name(&self, name: &str) -> String {
         let mut plain = String::new();
         for c in name.to_lowercase().chars() {
             match c.is_ascii_alphanumeric() {

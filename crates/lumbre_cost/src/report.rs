@@ -38,6 +38,9 @@ pub struct Machine {
 pub struct Settings {
     /// Fewer points and rounds.
     pub quick: bool,
+    /// Nothing but counts.
+    #[serde(default)]
+    pub counts_only: bool,
     /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
     /// Of everything that draws random numbers.
@@ -206,6 +209,22 @@ impl Study {
             }
         }
         series
+    }
+
+    /// Its points with nothing but what was varied and counted. Those of which nothing was counted are left out.
+    pub fn counts_alone(self) -> Self {
+        let counted = self.points.into_iter().filter(|point| !point.counts.is_empty());
+        let counts = |Point { series, label, parameters, counts, command, .. }| Point {
+            series,
+            label,
+            parameters,
+            counts,
+            command,
+            ..Point::default()
+        };
+        let points = counted.map(counts).collect();
+        let Self { name, title, question, .. } = self;
+        Self { name, title, question, points, ..Self::default() }
     }
 
     /// The points of a series.

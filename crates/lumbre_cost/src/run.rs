@@ -1,15 +1,17 @@
 //! A report from end to end: which studies are still to be done, each of them, and what is kept after each.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use lumbre_render::Gpu;
+use lumbre_render::{Gpu, Renderer};
 
+use crate::converged::ConvergedBakes;
 use crate::folder::{Folder, has_pictures};
 use crate::machine::machine;
 use crate::studies::StudyKind;
-use crate::{Conditions, CostError, CostReport, Settings, Study};
+use crate::{Conditions, CostError, CostReport, Machine, Settings, Study};
 
 /// What a report is asked for.
 #[derive(Clone, Debug)]
@@ -20,6 +22,8 @@ pub struct CostOptions {
     pub studies: Vec<StudyKind>,
     /// Fewer points and rounds.
     pub quick: bool,
+    /// Counts alone, which are the same on every machine: nothing is timed, and no picture kept.
+    pub counts_only: bool,
     /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
     /// Of everything that draws random numbers.
@@ -53,10 +57,13 @@ pub fn measure(
     told: &(dyn Fn(CostProgress) -> ControlFlow<()> + Sync),
 ) -> Result<CostReport, CostError> {
     let folder = Folder::open(path)?;
-    let mut report = CostReport { machine: machine(gpu), settings: settings(options), studies: Vec::new() };
+    // Counts are nobody's: what they were counted on would be all that differs between two such reports.
+    let machine = if options.counts_only { Machine::default() } else { machine(gpu) };
+    let mut report = CostReport { machine, settings: settings(options), studies: Vec::new() };
     let former = if options.resume { folder.report()? } else { None };
     let former = former.filter(|kept| kept.machine == report.machine && kept.settings == report.settings);
     let of = options.studies.len();
+    let converged = ConvergedBakes::default();
     for (number, kind) in options.studies.iter().enumerate() {
         let kept = former.as_ref().and_then(|former| former.study(kind.name));
         if let Some(kept) = kept.filter(|study| study.points.iter().all(|p| has_pictures(folder.path(), p))) {
@@ -64,9 +71,14 @@ pub fn measure(
             continue;
         }
         let listener = |fraction| told(CostProgress { study: kind.name, number, of, fraction });
+        // One for each study: what it uploads does not depend on the studies before it.
+        let pictures = RefCell::new(Renderer::new(gpu));
         let conditions = Conditions {
             gpu,
+            pictures: &pictures,
+            converged: &converged,
             quick: options.quick,
+            counts_only: options.counts_only,
             size: options.size,
             seed: options.seed,
             folder: folder.path(),
@@ -76,9 +88,13 @@ pub fn measure(
         conditions.tell(0.0)?;
         let begun = Instant::now();
         let measured = (kind.run)(&conditions)?;
-        folder.write_pictures(&measured)?;
-        let seconds = begun.elapsed().as_secs_f64();
-        report.studies.push(Study { seconds, ..measured.study });
+        if options.counts_only {
+            report.studies.push(measured.study.counts_alone());
+        } else {
+            folder.write_pictures(&measured)?;
+            let seconds = begun.elapsed().as_secs_f64();
+            report.studies.push(Study { seconds, ..measured.study });
+        }
         folder.write(&report)?;
     }
     folder.write(&report)?;
@@ -89,6 +105,7 @@ fn settings(options: &CostOptions) -> Settings {
     let whole = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     Settings {
         quick: options.quick,
+        counts_only: options.counts_only,
         size: options.size,
         seed: options.seed,
         files: options.files.iter().map(|path| whole(path).display().to_string()).collect(),

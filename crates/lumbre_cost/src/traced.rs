@@ -1,5 +1,6 @@
 //! Reference pictures by rays, in f64. Not what is compared with them.
 
+use bevy_ecs::world::World;
 use lumbre_trace::{Integrator, Picture as Traced, TraceOptions, TraceReport, trace};
 
 use crate::picture::Picture;
@@ -29,9 +30,20 @@ pub fn traced(
     scene: &SceneFile,
     options: &TraceOptions,
 ) -> Result<(Picture, TraceReport), CostError> {
-    let mut world = scene.open(conditions.aspect())?;
+    traced_world(conditions, &mut scene.open(conditions.aspect())?, options)
+}
+
+/// The same of a World.
+///
+/// # Errors
+/// [`CostError::Trace`], [`CostError::Interrupted`].
+pub fn traced_world(
+    conditions: &Conditions<'_>,
+    world: &mut World,
+    options: &TraceOptions,
+) -> Result<(Picture, TraceReport), CostError> {
     // What the study tells of itself stays as it is; the listener is only asked whether to go on.
-    let (picture, report) = trace(&mut world, options, &|_| (conditions.listener)(None))?;
+    let (picture, report) = trace(world, options, &|_| (conditions.listener)(None))?;
     if report.ended == lumbre_trace::Ended::Interrupted {
         return Err(CostError::Interrupted);
     }

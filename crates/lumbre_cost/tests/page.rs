@@ -53,7 +53,13 @@ fn report() -> CostReport {
         ..Study::default()
     };
     CostReport {
-        settings: Settings { quick: true, size: (64, 48), seed: 3, files: vec!["room & board.glb".into()] },
+        settings: Settings {
+            quick: true,
+            counts_only: false,
+            size: (64, 48),
+            seed: 3,
+            files: vec!["room & board.glb".into()],
+        },
         studies: vec![study("first"), study("second")],
         ..CostReport::default()
     }

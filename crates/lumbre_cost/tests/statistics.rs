@@ -172,5 +172,7 @@ fn a_count_that_comes_from_nothing_or_goes_is_seen() {
     assert!(compare_reports(&before, &after, 1.1)[0].is_worse());
     let mut without = after.clone();
     without.studies[0].points[0].counts.clear();
-    assert!(!compare_reports(&after, &without, 1.1).is_empty());
+    let gone = compare_reports(&after, &without, 1.1);
+    assert!(gone.len() == 1 && gone[0].is_worse(), "{gone:?}");
+    assert_eq!(gone[0].to_string(), "bake, final, a: rays is not counted any more");
 }

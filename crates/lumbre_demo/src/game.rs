@@ -131,8 +131,8 @@ impl Game {
         schedule.add_systems((move_things, propagate_transforms).chain());
 
         let mut game = Self {
+            view: ViewSettings::of(&world),
             world,
-            view: ViewSettings::default(),
             schedule,
             level,
             clock: Clock::default(),

@@ -39,7 +39,7 @@ pub fn tour_of(
     let gpu = Gpu::headless()?;
     let mut renderer = Renderer::new(&gpu);
     let picture = Offscreen::new(&gpu, size.0, size.1, OffscreenFormat::Rgba8)?;
-    let options = FrameOptions { multisample: true, exposure, ..FrameOptions::default() };
+    let options = FrameOptions { multisample: Some(true), exposure, ..FrameOptions::default() };
     let mut paths = Vec::new();
     for frame in 0..frames {
         let part = f64::from(frame) / f64::from(frames.saturating_sub(1).max(1));

@@ -1,6 +1,8 @@
 //! How the player wants the level drawn. Not the drawing: that is the renderer's.
 
+use bevy_ecs::world::World;
 use lumbre_optics::{ReflectionModel, Shading};
+use lumbre_scene::SceneSettings;
 
 use crate::input::Action;
 
@@ -35,6 +37,13 @@ impl Default for ViewSettings {
 }
 
 impl ViewSettings {
+    /// As a level asks for it, where it does.
+    pub fn of(world: &World) -> Self {
+        let asked = world.get_resource::<SceneSettings>().and_then(|settings| settings.frame.multisample);
+        let usual = Self::default();
+        Self { multisample: asked.unwrap_or(usual.multisample), ..usual }
+    }
+
     /// Carries out an action; false if it is none of the view's.
     pub fn apply(&mut self, action: Action) -> bool {
         match action {

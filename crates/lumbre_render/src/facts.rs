@@ -24,6 +24,8 @@ pub struct SceneFacts {
     pub lights: u32,
     /// Of these, the lights that ask for a shadow.
     pub shadow_lights: u32,
+    /// Samples of a pixel.
+    pub samples: u32,
     /// What the scene sets: ambient light, fog, background, rates of evaluation.
     pub settings: SceneSettings,
 }
@@ -46,6 +48,7 @@ impl SceneFacts {
             transparent: objects.alpha_blend,
             lights: lights.every.all,
             shadow_lights: lights.every.shadows.lights,
+            samples: if options.multisample.or(settings.frame.multisample) == Some(true) { 4 } else { 1 },
             settings: *settings,
         }
     }

@@ -35,7 +35,7 @@ impl FramePlan {
         target: wgpu::TextureFormat,
         radiance: bool,
     ) -> Self {
-        let samples = if options.multisample { 4 } else { 1 };
+        let samples = facts.samples;
         let linear_format = wgpu::TextureFormat::Rgba16Float;
         // Of what is encoded neither a blend nor the mean of several samples would be right, and bytes hide what the probe looks for.
         let folded = !radiance && facts.transparent == 0 && samples == 1 && !options.probe;

@@ -78,7 +78,7 @@ impl LightMeter {
             display: Display::Linear,
             exposure: Some(1.0),
             full_precision: true,
-            multisample: false,
+            multisample: Some(false),
             measure: Measure::Nothing,
             ..options.clone()
         };

@@ -97,8 +97,8 @@ pub struct FrameOptions {
     pub irradiance_volumes: bool,
     /// Draws the shadows of lights that ask for them.
     pub shadows: bool,
-    /// Four samples per pixel instead of one.
-    pub multisample: bool,
+    /// Four samples per pixel instead of one, or not, whatever the scene says; one where neither says anything.
+    pub multisample: Option<bool>,
     /// From radiance to the target's numbers.
     pub display: Display,
     /// Factor on radiance, instead of the camera's.
@@ -128,7 +128,7 @@ impl Default for FrameOptions {
             lightmaps: true,
             irradiance_volumes: true,
             shadows: true,
-            multisample: false,
+            multisample: None,
             display: Display::Srgb,
             exposure: None,
             full_precision: false,

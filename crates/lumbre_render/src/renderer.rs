@@ -393,7 +393,8 @@ impl Renderer {
             shadows: options.shadows,
         });
         let by_need = is_shaded_by_need(&self.objects.census, options, settings);
-        let place = LightPlace { origin: self.objects.origin, known, lamps: by_need };
+        let place =
+            LightPlace { origin: self.objects.origin, known, lamps: by_need, settings: settings.frame };
         let mut lights = extract_lights(world, &mut self.emitters, &mut self.lights, place, left_out)?;
         if !options.lightmaps {
             lights.set = lights.set.without_lightmaps();
@@ -565,7 +566,8 @@ impl Renderer {
         let shadowed = !lights.shadows.is_empty();
         if shadowed {
             let depths = draws.depths.unwrap_or([0.0, 1.0]);
-            let view = ShadowedView { view: seen.view, height: seen.target.height, depths };
+            let resolution = decided.decision.settings.frame.shadow_resolution();
+            let view = ShadowedView { view: seen.view, height: seen.target.height, depths, resolution };
             self.shadows.plan(&lights.shadows, &self.objects, &view);
         }
         clock.lap(|cpu| &mut cpu.shadows_ms);

@@ -40,6 +40,7 @@ mod census;
 mod components;
 mod default_camera;
 mod default_light;
+mod frame_settings;
 mod gltf;
 mod hidden_cone;
 mod image;
@@ -65,6 +66,7 @@ pub use components::{
 };
 pub use default_camera::default_camera;
 pub use default_light::{add_default_light, is_without_light};
+pub use frame_settings::{FrameSettings, ShadowFilter};
 pub use gltf::{
     FileSettings, LightmapFile, LoadError, LoadLimits, LoadOptions, LoadProblem, LoadReport, Note,
     SUPPORTED_EXTENSIONS, SaveError, SaveOptions, SaveReport, SourceFile, load, load_slice,

@@ -4,6 +4,8 @@ use bevy_ecs::resource::Resource;
 use glam::Vec3;
 use lumbre_optics::{FlatRule, Fog, ReflectionModel, Shading};
 
+use crate::FrameSettings;
+
 /// Scene-wide choices.
 #[derive(Resource, Clone, Copy, Debug, PartialEq)]
 pub struct SceneSettings {
@@ -31,6 +33,8 @@ pub struct SceneSettings {
     pub specular_antialiasing: bool,
     /// Fog, if any.
     pub fog: Option<Fog>,
+    /// What frames of it are to spend.
+    pub frame: FrameSettings,
 }
 
 impl SceneSettings {
@@ -59,6 +63,7 @@ impl Default for SceneSettings {
             flat_rule: FlatRule::Centroid,
             specular_antialiasing: false,
             fog: None,
+            frame: FrameSettings::default(),
         }
     }
 }

@@ -502,6 +502,33 @@ fn scene_settings_and_cameras() {
 }
 
 #[test]
+fn what_a_level_asks_of_its_frames() {
+    let loaded = |frame: serde_json::Value| {
+        let mut file = File::new();
+        file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"frame": frame}});
+        file.load().map(|(world, _)| world.resource::<SceneSettings>().frame)
+    };
+    let all = json!({"multisample": true, "lightThreshold": 0.02, "shadowResolution": 0.25, "shadowFilter": "hard"});
+    let expected = FrameSettings {
+        multisample: Some(true),
+        light_threshold: 0.02,
+        shadow_resolution: 0.25,
+        shadow_filter: ShadowFilter::Hard,
+    };
+    assert_eq!(loaded(all).unwrap(), expected);
+    assert_eq!(loaded(json!({})).unwrap(), FrameSettings::default());
+    for (bad, words) in [
+        (json!({"lightThreshold": -0.1}), ["LUMBRE_scene.frame.lightThreshold", "at least 0"]),
+        (json!({"shadowResolution": 0.0}), ["LUMBRE_scene.frame.shadowResolution", "0.0625 to 4"]),
+        (json!({"shadowResolution": 5}), ["LUMBRE_scene.frame.shadowResolution", "0.0625 to 4"]),
+        (json!({"shadowFilter": "blurred"}), ["\"blurred\"", "hard, percentage-closer, soft"]),
+    ] {
+        let error = loaded(bad).unwrap_err().to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    }
+}
+
+#[test]
 fn the_census_says_what_is_not_called_for() {
     let mut file = File::new();
     file.square(|file, primitive| {

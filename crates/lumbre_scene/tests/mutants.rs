@@ -81,7 +81,7 @@ fn lit() -> Vec<u8> {
     file.root["nodes"][square]["children"] = json!([child]);
     file.root["nodes"][square]["matrix"] = json!([0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1]);
     file.root["scenes"][0]["extensions"] = json!({"LUMBRE_scene": {"ambient": [0.1, 0.2, 0.3], "reflection": "blinn",
-        "shading": "gouraud", "fog": {"mode": "linear", "color": [1, 1, 1], "start": 1, "end": 9}}});
+        "shading": "gouraud", "frame": {"multisample": true, "lightThreshold": 0.1, "shadowResolution": 0.5, "shadowFilter": "soft"}, "fog": {"mode": "linear", "color": [1, 1, 1], "start": 1, "end": 9}}});
     file.glb()
 }
 

@@ -73,6 +73,12 @@ fn everything() -> World {
             mode: FogMode::DepthCue { start: 1.1, end: 20.3, near_weight: 0.9, far_weight: 0.2 },
             color: Vec3::new(0.7, 0.1, 0.2),
         }),
+        frame: FrameSettings {
+            multisample: Some(true),
+            light_threshold: 0.0625,
+            shadow_resolution: 2.0,
+            shadow_filter: ShadowFilter::PercentageCloser,
+        },
     });
     let (shared, other) = (triangle(0.0), triangle(5.0));
     let lightmap = Arc::new(LightmapImage {

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let gpu = Gpu::headless()?;
     let frames = [(true, "direct light alone"), (false, "with all bounces")].map(|(direct, title)| {
         let (mut world, _) = baked(model, direct)?;
-        let options = FrameOptions { multisample: true, ..FrameOptions::default() };
+        let options = FrameOptions { multisample: Some(true), ..FrameOptions::default() };
         Ok::<_, Box<dyn Error>>((frame(&gpu, &mut world, &options)?, title))
     });
     let [direct, all] = frames;

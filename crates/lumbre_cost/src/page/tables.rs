@@ -11,7 +11,12 @@ use crate::{CostReport, Point, Study};
 pub fn conditions(report: &CostReport) -> Markup {
     let (machine, settings) = (&report.machine, &report.settings);
     let (width, height) = settings.size;
-    let effort = if settings.quick { "quick: fewer points and rounds" } else { "whole" };
+    let effort = match (settings.quick, settings.counts_only) {
+        (true, true) => "quick: fewer points; counts alone",
+        (true, false) => "quick: fewer points and rounds",
+        (false, true) => "counts alone",
+        (false, false) => "whole",
+    };
     let rows = [
         ("Processor", format!("{}, {} threads", machine.processor, machine.threads)),
         ("System", machine.system.clone()),

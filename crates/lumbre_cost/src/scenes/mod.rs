@@ -2,10 +2,12 @@
 
 mod ball;
 mod balls_and_lamps;
+mod fence;
 mod room;
 mod sheet;
 
 pub use ball::{Ball, ball, exact_ball};
 pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
+pub use fence::fence;
 pub use room::{Air, room};
 pub use sheet::{Sheet, sheet};

@@ -1,12 +1,11 @@
 //! Bakes that are asked for less and less error: what they take, what they state, and what is true by a converged bake of the same texels.
 
-use std::time::Duration;
-
 use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
 
 use super::over_scenes;
 use crate::baked::{bake_arguments, bake_options, bake_scene, maps_of, texel_error};
+use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{cheapest_by_error, error_of, percent, rounded, short};
 use crate::frames::draw_picture;
 use crate::measured::Measured;
@@ -19,6 +18,8 @@ const ERRORS: &[f64] = &[0.08, 0.04, 0.02, 0.01];
 const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.015];
 /// Bakes take seconds: each is done twice.
 const ROUNDS: usize = 2;
+/// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
+pub(super) const REFERENCE_SECONDS: f64 = 2.5;
 const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
 const FOUND: &str = "error found, % of the mean";
@@ -98,33 +99,26 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let options = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 1_500.0))?;
     let part = |share: f64| before + share * (after - before);
-    let converged = BakeOptions {
-        quality: Quality::Reference,
-        error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(25.0, 3.0))),
-        seed: conditions.seed.wrapping_add(99),
-        denoise: false,
-        ..options
-    };
-    let mut reference = bake_scene(conditions, scene, &converged, [part(0.0), part(0.4)])?;
-    let truth = maps_of(&mut reference.world);
+    let options_of_truth =
+        converged(conditions, &options, conditions.reference_time(25.0, REFERENCE_SECONDS));
+    let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.0), part(0.4)])?;
     measured.study.notes.push(format!(
         "The converged bake of the {} took {:.0} s and states {} of its mean for itself.",
         scene.name,
-        reference.report.seconds,
-        percent(reference.report.error_of_mean)
+        truth.report.seconds,
+        percent(truth.report.error_of_mean)
     ));
-    let picture = draw_picture(conditions, &mut reference.world, &FrameOptions::default())?;
-    let reference = measured.keep_reference(&format!("{} converged", scene.name), picture);
+    let reference = measured.keep_reference(&format!("{} converged", scene.name), truth.picture.clone());
 
     let all = asked(conditions, options);
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); all.len()];
     let mut last = Vec::new();
-    for round in 0..ROUNDS {
+    let rounds = conditions.repetitions(ROUNDS);
+    for round in 0..rounds {
         last.clear();
         for (place, asked) in all.iter().enumerate() {
             let share =
-                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (ROUNDS * all.len()) as f64;
+                |place: usize| 0.4 + 0.6 * (round * all.len() + place) as f64 / (rounds * all.len()) as f64;
             let told = [part(share(place)), part(share(place + 1))];
             let baked = bake_scene(conditions, scene, &asked.options, told)?;
             times[place].push(1e3 * baked.report.seconds);
@@ -133,7 +127,7 @@ fn of_scene(
     }
     let first = measured.study.points.len();
     for ((asked, mut baked), times) in all.iter().zip(last).zip(&times) {
-        let error = texel_error(&maps_of(&mut baked.world), &truth);
+        let error = texel_error(&maps_of(&mut baked.world), &truth.maps);
         let picture = draw_picture(conditions, &mut baked.world, &FrameOptions::default())?;
         let report = &baked.report;
         let mut figures: Vec<(&str, f64)> = vec![(STATED, 100.0 * report.error_of_mean)];

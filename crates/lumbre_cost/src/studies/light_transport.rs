@@ -84,10 +84,14 @@ fn of_scene(
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
     conditions.tell(part(0.5))?;
 
-    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 2_000.0))?;
+    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 1_500.0))?;
     let bake = BakeOptions { error: 0.02, ..bake };
     let baked = bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?;
-    let light = |shadows, multisample| FrameOptions { shadows, multisample, ..FrameOptions::default() };
+    let light = |shadows, multisample| FrameOptions {
+        shadows,
+        multisample: Some(multisample),
+        ..FrameOptions::default()
+    };
     let steps = [
         ("lamps alone", light(false, false), " --no-shadows"),
         ("with shadows", light(true, false), ""),
@@ -95,10 +99,10 @@ fn of_scene(
     ];
     let mut frames = Vec::new();
     for (_, options, _) in &steps {
-        frames.push(Frame::new(scene.open(conditions.aspect())?, options.clone()));
+        frames.push(Frame::new(scene.open(conditions.aspect())?, options.clone()).sharing("transport"));
     }
     let bake_time = 1e3 * baked.report.seconds;
-    frames.push(Frame::new(baked.world, light(true, true)));
+    frames.push(Frame::new(baked.world, light(true, true)).sharing("transport"));
     let drawn = draw_frames(conditions, frames, SECONDS, [part(0.6), part(0.7)])?;
     let labels = steps.iter().map(|(label, ..)| *label).chain(["and lightmaps"]);
     let more = steps.iter().map(|(.., more)| *more).chain([" --msaa"]);
@@ -137,7 +141,7 @@ fn of_scene(
         conditions.tell(part(0.7 + 0.3 * place as f64 / all.len() as f64))?;
         let mut times = Vec::new();
         let mut found = None;
-        for _ in 0..conditions.unless_quick(3, 2) {
+        for _ in 0..conditions.repetitions(conditions.unless_quick(3, 2)) {
             let begun = Instant::now();
             let one = traced(conditions, scene, options)?;
             times.push(milliseconds_since(begun));

@@ -10,6 +10,9 @@ mod preprocessing;
 mod reflection;
 mod shading;
 mod shading_by_need;
+mod shadows;
+
+use bevy_ecs::world::World;
 
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
@@ -32,6 +35,7 @@ pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "shading", about: "flat, Gouraud and Phong shading", run: shading::run },
     StudyKind { name: "need", about: "shading by need over the error allowed", run: shading_by_need::run },
     StudyKind { name: "lamps", about: "many lights, and how they are found", run: lamps::run },
+    StudyKind { name: "shadows", about: "shadow maps by size and filter, against rays", run: shadows::run },
     StudyKind { name: "effects", about: "every effect of a scene, switched off in turn", run: effects::run },
     StudyKind { name: "bake", about: "the error that a bake is asked for", run: bake::run },
     StudyKind {
@@ -53,8 +57,18 @@ fn over_scenes(
     (name, air): (&str, Air),
     of_scene: impl Fn(&SceneFile, [f64; 2], &mut Measured) -> Result<(), CostError>,
 ) -> Result<Measured, CostError> {
+    over_scenes_made(conditions, study, (name, || room(air)), of_scene)
+}
+
+/// The same with any other scene in the room's place.
+fn over_scenes_made(
+    conditions: &Conditions<'_>,
+    study: Study,
+    (name, make): (&str, impl FnOnce() -> World),
+    of_scene: impl Fn(&SceneFile, [f64; 2], &mut Measured) -> Result<(), CostError>,
+) -> Result<Measured, CostError> {
     let scenes = match conditions.files.is_empty() {
-        true => vec![SceneFile::made(conditions, name, room(air))?],
+        true => vec![SceneFile::made(conditions, name, make())?],
         false => SceneFile::given(conditions)?,
     };
     let mut measured = Measured { study, ..Measured::default() };

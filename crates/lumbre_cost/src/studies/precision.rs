@@ -55,7 +55,7 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
         conditions.tell(0.5 + 0.5 * place as f64 / CASES.len() as f64)?;
         let mut times = Vec::new();
         let mut exact = None;
-        for _ in 0..3 {
+        for _ in 0..conditions.repetitions(3) {
             let begun = Instant::now();
             exact = Some(lighting_of(conditions, scene)?);
             times.push(milliseconds_since(begun));

@@ -1,11 +1,9 @@
 //! Light that bounces, before the game or in it: what it costs a frame when it was baked, what baking takes, and what it takes again when something of the
 //! level has moved. Not how good a bake of which price is: that is `bake`.
 
-use std::time::Duration;
-
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
-use lumbre_bake::{BakeOptions, Quality, Samples};
+use lumbre_bake::{BakeOptions, Samples};
 use lumbre_optics::Material;
 use lumbre_render::FrameOptions;
 use lumbre_scene::{
@@ -13,8 +11,10 @@ use lumbre_scene::{
     hidden_entities,
 };
 
+use super::bake::REFERENCE_SECONDS;
 use super::over_scenes;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_world, maps_of, texel_error};
+use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{error_of, is_above_one, milliseconds, ratio_of, rounded};
 use crate::frames::{DrawnFrame, Frame, draw_frames, draw_picture};
 use crate::measured::Measured;
@@ -67,18 +67,13 @@ fn of_scene(
     let part = |share: f64| before + share * (after - before);
     let options = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 1_500.0))?;
     let options = BakeOptions { error: 0.02, ..options };
-    let converged = BakeOptions {
-        quality: Quality::Reference,
-        error: 1e-3,
-        time: Some(Duration::from_secs_f64(conditions.unless_quick(10.0, 2.0))),
-        seed: conditions.seed.wrapping_add(99),
-        denoise: false,
-        ..options
-    };
+    let time = conditions.reference_time(10.0, REFERENCE_SECONDS);
+    // Of what is asked for, `error` alone does not matter to it.
+    let options_of_truth = converged(conditions, &options, time);
     let open = || scene.open(conditions.aspect());
     let (baked, samples) = bake_world(conditions, open()?, &options, None, [part(0.0), part(0.1)])?;
-    let (mut truth, _) = bake_world(conditions, open()?, &converged, None, [part(0.1), part(0.3)])?;
-    let truth = draw_picture(conditions, &mut truth.world, &FrameOptions::default())?;
+    let truth = converged_bake(conditions, scene, &options_of_truth, [part(0.1), part(0.3)])?;
+    let truth = truth.picture.clone();
     let first = measured.study.points.len();
     let drawn = frames(conditions, scene, baked, &options, truth, [part(0.3), part(0.6)], measured)?;
     let findings = findings_of_frames(&scene.name, &measured.study.points[first..], &drawn);
@@ -102,12 +97,13 @@ fn of_scene(
         Ok(world)
     };
     let first = measured.study.points.len();
-    let (mut truth, _) = bake_world(conditions, changed()?, &converged, None, [part(0.6), part(0.8)])?;
+    let (mut truth, _) = bake_world(conditions, changed()?, &options_of_truth, None, [part(0.6), part(0.8)])?;
     let truth = maps_of(&mut truth.world);
     let (mut whole, mut kept) = (Vec::new(), Vec::new());
     let mut last = None;
-    for round in 0..ROUNDS {
-        let share = |step: usize| part(0.8 + 0.2 * (2 * round + step) as f64 / (2 * ROUNDS) as f64);
+    let rounds = conditions.repetitions(ROUNDS);
+    for round in 0..rounds {
+        let share = |step: usize| part(0.8 + 0.2 * (2 * round + step) as f64 / (2 * rounds) as f64);
         let bake = |former: Option<&Samples>, step| {
             let (baked, _) =
                 bake_world(conditions, changed()?, &options, former, [share(step), share(step + 1)])?;
@@ -165,7 +161,7 @@ fn frames(
     let ambient = best_ambient(&alone, &under_one, &truth);
     let bake_time = 1e3 * baked.report.seconds;
     let frames = [with_ambient(Vec3::ZERO)?, with_ambient(ambient)?, baked.world];
-    let frames = frames.map(|world| Frame::new(world, draw.clone()));
+    let frames = frames.map(|world| Frame::new(world, draw.clone()).sharing("preprocessing"));
     let drawn = draw_frames(conditions, frames.into(), SECONDS, told)?;
     let reference = measured.keep_reference(&format!("{} converged", scene.name), truth);
     let labels = ["by lamps alone", "with the best ambient light", "with lightmaps"];

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use lumbre_optics::Light;
 use lumbre_render::{FrameOptions, FrameReport, Measure, MissingPipelines};
+use lumbre_scene::SceneSettings;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::{DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, WindowEvent};
@@ -97,8 +98,11 @@ impl App {
             .as_ref()
             .is_some_and(|stage| stage.gpu().adapter.get_info().device_type == wgpu::DeviceType::Cpu);
         if software {
-            // Four samples cost a software rasterizer dearly; M turns them on.
-            self.viewing.opened.game.view.multisample = false;
+            // Four samples cost a software rasterizer dearly, unless the level asks for them; M turns them on.
+            let game = &mut self.viewing.opened.game;
+            let asked =
+                game.world.get_resource::<SceneSettings>().and_then(|settings| settings.frame.multisample);
+            game.view.multisample = asked.unwrap_or(false);
         }
         self.follow_size();
         if !self.viewing.opened.game.has_a_start() {
@@ -184,7 +188,7 @@ impl App {
             lightmaps: view.lightmaps,
             // What moves is lit as what stands still is: by the bake, or without it.
             irradiance_volumes: view.lightmaps,
-            multisample: view.multisample,
+            multisample: Some(view.multisample),
             missing_pipelines: MissingPipelines::Background,
             measure: match (view.overlay, view.count_lights) {
                 (false, _) => Measure::Nothing,

@@ -5,9 +5,10 @@ use std::borrow::Cow;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, SpotCone};
-use lumbre_scene::{GlobalTransform, LightCensus, Name, light_place, shines};
+use lumbre_scene::{FrameSettings, GlobalTransform, LightCensus, Name, SceneSettings, light_place, shines};
 
 use super::emitters::{EmissivePolygon, Emitters};
+use super::shown_light::shown_light;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{InverseSquareLightData, LightData};
 use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight, light_size};
@@ -150,18 +151,19 @@ impl LightSet {
     pub fn of(world: &mut World) -> Result<Self, RenderError> {
         let mut set = Self::default();
         Emitters::default().polygons(world)?.iter().for_each(|polygon| set.add_polygon(polygon));
+        let settings = frame_settings(world);
         let mut query = world.query::<(&Light, Option<&GlobalTransform>)>();
-        let mut found: Vec<&Light> = query
+        let mut found: Vec<Cow<'_, Light>> = query
             .iter(world)
             .filter(|(light, transform)| {
                 let shines = shines(light, *transform);
                 set.census.lights_off += usize::from(!shines);
                 shines
             })
-            .map(|(light, _)| light)
+            .map(|(light, _)| shown_light(light, &settings))
             .collect();
         found.sort_by_key(|light| light.bake == BakeMode::Static);
-        for light in found {
+        for light in &found {
             set.add(light);
         }
         Ok(set)
@@ -388,13 +390,15 @@ impl Lamp {
     /// [`RenderError::TooManyEmissiveFaces`].
     pub fn of(world: &mut World, lightmaps: bool, shadows: bool) -> Result<Vec<Self>, RenderError> {
         let polygons = Emitters::default().polygons(world)?;
+        let settings = frame_settings(world);
         let mut query = world.query::<(&Light, Option<&GlobalTransform>)>();
         let shining = query
             .iter(world)
             .filter(|(light, transform)| light.kind != LightKind::Ambient && shines(light, *transform));
         let mut lamps: Vec<Self> = shining
             .filter_map(|(light, transform)| {
-                let light = Light { shadow: light.shadow && shadows, ..light.clone() };
+                let light = shown_light(light, &settings);
+                let light = Light { shadow: light.shadow && shadows, ..light.into_owned() };
                 let transform = transform?;
                 let reach = LightReach::new(&light, transform, LightClass::of(&light));
                 Some(Self::new(&light, transform, reach))
@@ -444,6 +448,8 @@ pub(crate) struct LightPlace<'a> {
     pub known: Option<KnownLights<'a>>,
     /// [`SceneLights::lamps`] are wanted.
     pub lamps: bool,
+    /// Where lights end, and whether their size shows.
+    pub settings: FrameSettings,
 }
 
 /// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
@@ -455,7 +461,7 @@ pub(crate) fn extract_lights(
     world: &mut World,
     emitters: &mut Emitters,
     buffer: &mut GrowableBuffer<LightData>,
-    LightPlace { origin, known, lamps }: LightPlace<'_>,
+    LightPlace { origin, known, lamps, settings }: LightPlace<'_>,
     left_out: &mut Vec<String>,
 ) -> Result<SceneLights, RenderError> {
     let mut scene = SceneLights::default();
@@ -470,7 +476,7 @@ pub(crate) fn extract_lights(
             left_out.extend(fault(world, entity, light, place.as_ref()));
             let shines = shines(light, transform);
             scene.set.census.lights_off += usize::from(!shines);
-            place.filter(|_| shines).map(|place| (entity, light, place))
+            place.filter(|_| shines).map(|place| (entity, shown_light(light, &settings), place))
         })
         .collect();
     found.sort_by_key(|(entity, _, _)| entity.index_u32());
@@ -484,7 +490,7 @@ pub(crate) fn extract_lights(
         for (entity, light, place) in lights {
             let shown = match &known {
                 Some(known) => known.shown(light, &scene.set),
-                None => Some(Cow::Borrowed(*light)),
+                None => Some(Cow::Borrowed(&**light)),
             };
             let Some(light) = &shown else { continue };
             let Some(class) = scene.set.add(light) else { continue };
@@ -521,6 +527,11 @@ pub(crate) fn extract_lights(
     }
     buffer.replace(data);
     Ok(scene)
+}
+
+/// What a World asks of its frames.
+fn frame_settings(world: &World) -> FrameSettings {
+    world.get_resource::<SceneSettings>().map_or_else(FrameSettings::default, |settings| settings.frame)
 }
 
 /// What is wrong with a light that is on, by name; nothing as a rule.

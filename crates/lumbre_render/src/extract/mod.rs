@@ -6,6 +6,7 @@ mod emitters;
 mod lights;
 mod lit_pass;
 mod objects;
+mod shown_light;
 
 pub(crate) use camera::{CameraView, ViewVolume, find_camera};
 pub(crate) use emitters::Emitters;

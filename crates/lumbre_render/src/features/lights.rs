@@ -31,5 +31,6 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
         variant.set(Feature::ShadowCubes, kinds.shadows.cubes);
         variant.set(Feature::ShadowCascades, kinds.shadows.cascades);
         variant.set(Feature::SoftShadows, kinds.shadows.soft);
+        variant.set(Feature::HardShadows, kinds.shadows.lights > 0 && frame.hard_shadows);
     }
 }

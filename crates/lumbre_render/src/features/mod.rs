@@ -14,7 +14,7 @@ mod textures;
 mod two_sided;
 
 use lumbre_optics::{ReflectionModel, Shading};
-use lumbre_scene::{ObjectTraits, SceneSettings};
+use lumbre_scene::{ObjectTraits, SceneSettings, ShadowFilter};
 
 use crate::extract::LightSet;
 use crate::facts::SceneFacts;
@@ -36,6 +36,8 @@ pub(crate) struct FrameFeatures {
     /// The frame is kept in half floats.
     pub half: bool,
     pub lights: LightSet,
+    /// A surface reads one texel of a shadow map.
+    pub hard_shadows: bool,
     /// Fragments find lights with a range by clusters.
     pub clustered: bool,
     /// Colours are made as the target holds them.
@@ -63,6 +65,7 @@ impl FrameFeatures {
             clamp: options.display == Display::Clamp,
             half,
             lights,
+            hard_shadows: settings.frame.shadow_filter == ShadowFilter::Hard,
             clustered: lights.are_clustered(options.light_lists),
             display: (ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target)),
             counted: CountedStages::default(),

@@ -138,6 +138,8 @@ features! {
     IrradianceVolume = 54 => "IRRADIANCE_VOLUME",
     /// Counts the lights that it tests and those that contribute.
     CountLights = 55 => "COUNT_LIGHTS",
+    /// Reads one texel of a shadow map.
+    HardShadows = 56 => "HARD_SHADOWS",
 }
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
@@ -172,6 +174,7 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::ShadowCubes as u64
     | Feature::ShadowCascades as u64
     | Feature::SoftShadows as u64
+    | Feature::HardShadows as u64
     | Feature::CountLights as u64;
 
 /// Features that make a colour differ from place to place on a surface, or from its front to its back.

@@ -1,6 +1,6 @@
 //! Where the maps of a frame's shadows lie in one square texture: sides by what each light contributes to the picture, places without gaps.
 
-/// Largest and least side of a map, in texels.
+/// Largest side of a map at the usual resolution, and least one at any, in texels.
 pub(super) const MOST: u32 = 1024;
 pub(super) const LEAST: u32 = 64;
 
@@ -13,11 +13,12 @@ pub(super) struct Tile {
     pub side: u32,
 }
 
-/// The tiles for maps that want these sides, and the side of the atlas, at most `limit`. If they do not fit all are halved, down to [`LEAST`]; what does not fit even
+/// The tiles for maps that want these sides, `most` of them at most, and the side of the atlas, at most `limit`. If they do not fit all are halved, down to [`LEAST`]; what does not fit even
 /// then, from the end, has none.
-pub(super) fn pack(wanted: &[f64], limit: u32) -> (u32, Vec<Option<Tile>>) {
+pub(super) fn pack(wanted: &[f64], most: f64, limit: u32) -> (u32, Vec<Option<Tile>>) {
     let limit = if limit.is_power_of_two() { limit } else { limit.next_power_of_two() / 2 };
-    let mut sides: Vec<u32> = wanted.iter().map(|side| power_of_two(*side)).collect();
+    let mut sides: Vec<u32> =
+        wanted.iter().map(|side| power_of_two(*side, most.min(f64::from(limit)))).collect();
     let area = |sides: &[u32]| sides.iter().map(|side| u64::from(*side).pow(2)).sum::<u64>();
     while area(&sides) > u64::from(limit).pow(2) && sides.iter().any(|side| *side > LEAST) {
         sides.iter_mut().for_each(|side| *side = (*side / 2).max(LEAST));
@@ -44,9 +45,9 @@ pub(super) fn pack(wanted: &[f64], limit: u32) -> (u32, Vec<Option<Tile>>) {
     (atlas, tiles)
 }
 
-fn power_of_two(side: f64) -> u32 {
+fn power_of_two(side: f64, most: f64) -> u32 {
     // NaN is the least.
-    let side = side.clamp(f64::from(LEAST), f64::from(MOST)).max(f64::from(LEAST));
+    let side = side.max(f64::from(LEAST)).min(most.max(f64::from(LEAST)));
     1 << (side.log2().round() as u32)
 }
 
@@ -64,7 +65,7 @@ mod tests {
     fn tiles_lie_in_the_atlas_and_never_upon_each_other() {
         let wanted: Vec<f64> = (0..60).map(|number| f64::from(37 * number % 900) + 40.0).collect();
         for limit in [512, 1024, 4096] {
-            let (side, tiles) = pack(&wanted, limit);
+            let (side, tiles) = pack(&wanted, f64::from(MOST), limit);
             assert!(side <= limit && side.is_power_of_two());
             let placed: Vec<Tile> = tiles.iter().flatten().copied().collect();
             for (index, a) in placed.iter().enumerate() {
@@ -80,15 +81,15 @@ mod tests {
             // 512 holds 64 tiles of the least size.
             assert_eq!(placed.len(), 60, "in {limit}");
         }
-        let (_, tiles) = pack(&[2000.0; 70], 512);
+        let (_, tiles) = pack(&[2000.0; 70], f64::from(MOST), 512);
         assert_eq!(tiles.iter().flatten().count(), 64);
         assert!(tiles[63].is_some() && tiles[64].is_none());
     }
 
     #[test]
     fn an_atlas_is_no_larger_than_its_maps() {
-        assert_eq!(pack(&[256.0], 4096), (256, vec![Some(Tile { x: 0, y: 0, side: 256 })]));
-        assert_eq!(pack(&[1000.0, 512.0], 4096).0, 2048);
-        assert_eq!(pack(&[f64::NAN], 4096).1[0].map(|tile| tile.side), Some(LEAST));
+        assert_eq!(pack(&[256.0], f64::from(MOST), 4096), (256, vec![Some(Tile { x: 0, y: 0, side: 256 })]));
+        assert_eq!(pack(&[1000.0, 512.0], f64::from(MOST), 4096).0, 2048);
+        assert_eq!(pack(&[f64::NAN], f64::from(MOST), 4096).1[0].map(|tile| tile.side), Some(LEAST));
     }
 }

@@ -56,6 +56,8 @@ pub(crate) struct ShadowedView {
     pub height: u32,
     /// Nearest and farthest depth of what is in view, in metres.
     pub depths: [f64; 2],
+    /// Texels of the maps beside the usual number, along a side.
+    pub resolution: f32,
 }
 
 /// The shadow maps of a renderer.
@@ -157,6 +159,7 @@ impl ShadowMaps {
             depths: seen.depths,
             height: seen.height,
             casters: around,
+            resolution: f64::from(seen.resolution),
         };
         let mut found = Vec::new();
         for light in lights {
@@ -170,7 +173,7 @@ impl ShadowMaps {
             found.extend(views::views(&lamp, &seen).into_iter().map(|view| (light, view)));
         }
         let wanted: Vec<f64> = found.iter().map(|(_, view)| view.wanted).collect();
-        let (side, tiles) = atlas::pack(&wanted, MOST_TEXELS);
+        let (side, tiles) = atlas::pack(&wanted, seen.most_texels(), MOST_TEXELS);
         if side != self.side {
             self.side = side;
             self.drawn.clear();

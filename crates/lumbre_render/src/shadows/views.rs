@@ -53,6 +53,15 @@ pub(super) struct Seen {
     pub height: u32,
     /// A ball that holds all casters, in frame space.
     pub casters: (DVec3, f64),
+    /// Texels of a map beside the usual number, along a side.
+    pub resolution: f64,
+}
+
+impl Seen {
+    /// The largest side of a map, in texels.
+    pub fn most_texels(&self) -> f64 {
+        self.resolution * f64::from(super::atlas::MOST)
+    }
 }
 
 /// The views of a light, as many as its kind has.
@@ -93,7 +102,7 @@ fn wanted(lamp: &Lamp, seen: &Seen) -> f64 {
         ViewVolume::Orthographic { half_height, .. } => half_height.abs(),
     };
     let reach = if lamp.range.is_finite() { lamp.range } else { seen.casters.1 };
-    f64::from(seen.height) * (reach / half_height).min(1.0)
+    seen.resolution * f64::from(seen.height) * (reach / half_height).min(1.0)
 }
 
 fn cone(lamp: &Lamp, seen: &Seen) -> View {
@@ -136,7 +145,7 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
             let finish = end(number as f64 / CASCADES as f64);
             let (center, radius) = slice(&seen.view, seen.origin, begin, finish);
             begin = finish;
-            let texel = 2.0 * radius * (1.0 + BORDER) / f64::from(super::atlas::MOST);
+            let texel = 2.0 * radius * (1.0 + BORDER) / seen.most_texels();
             // In a grid that is fixed in the world.
             let snap = |axis: DVec3| {
                 let along = axis.dot(center + seen.origin);
@@ -161,7 +170,7 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
                 width: 2.0 * half,
                 near_or_depth: -depth,
                 end: finish,
-                wanted: f64::from(super::atlas::MOST),
+                wanted: seen.most_texels(),
             }
         })
         .collect()
@@ -197,7 +206,14 @@ mod tests {
         let camera = (lumbre_scene::Camera::default(), lumbre_scene::GlobalTransform(transform.affine()));
         let camera = world.spawn(camera).id();
         let view = CameraView::new(&world, camera, 1.5).unwrap();
-        Seen { view, origin: DVec3::ZERO, depths: [0.5, 60.0], height: 720, casters: (DVec3::ZERO, 40.0) }
+        Seen {
+            view,
+            origin: DVec3::ZERO,
+            depths: [0.5, 60.0],
+            height: 720,
+            casters: (DVec3::ZERO, 40.0),
+            resolution: 1.0,
+        }
     }
 
     fn lamp(kind: ShadowKind) -> Lamp {

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::export::SaveError;
 use super::export_material::color;
 use super::extensions::{FogExtension, SceneExtension};
+use super::frame_settings;
 use crate::{Camera, Projection, SceneSettings};
 
 /// LUMBRE_scene; nothing where the World has only the default settings.
@@ -60,6 +61,7 @@ pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
         flat_rule: (settings.flat_rule != FlatRule::default()).then(|| settings.flat_rule.name().to_owned()),
         specular_antialiasing: settings.specular_antialiasing.then_some(true),
         fog,
+        frame: frame_settings::written(&settings.frame)?,
     };
     serde_json::to_value(written).map(Some).map_err(|source| SaveError::Json { source })
 }

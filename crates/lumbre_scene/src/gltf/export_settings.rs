@@ -8,7 +8,8 @@ use serde_json::{Map, Value, json};
 use super::error::{LoadError, LoadProblem, Notes};
 use super::export::{SaveError, SaveReport, is_glb};
 use super::export_files::Files;
-use super::{beside, container, document, uri};
+use super::{beside, container, document, frame_settings, uri};
+use crate::FrameSettings;
 
 /// What [`save_settings`] changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +18,8 @@ pub struct FileSettings {
     pub shading: Shading,
     /// Whether lights that cast shadows in frames go on to do so (`LUMBRE_lights_phong.shadow`).
     pub shadows: bool,
+    /// What frames are to spend (`LUMBRE_scene.frame`), in place of what the file says of that.
+    pub frame: FrameSettings,
 }
 
 /// Writes a .glb or .gltf again with these settings. In another folder the files that it names are copied beside it.
@@ -34,7 +37,10 @@ pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Resu
     if binary != bytes.starts_with(container::MAGIC) {
         return Err(SaveError::Container { path: path.to_owned() });
     }
-    set_shading(&mut root, settings.shading).ok_or_else(|| SaveError::NoScene { path: source.to_owned() })?;
+    let frame = frame_settings::written(&settings.frame)?;
+    let frame = frame.map(serde_json::to_value).transpose().map_err(|source| SaveError::Json { source })?;
+    set_scene(&mut root, settings.shading, frame)
+        .ok_or_else(|| SaveError::NoScene { path: source.to_owned() })?;
     if !settings.shadows {
         without_shadows(&mut root);
     }
@@ -63,11 +69,15 @@ pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Resu
 }
 
 /// In the scene that is shown; nothing where there is none.
-fn set_shading(root: &mut Value, shading: Shading) -> Option<()> {
+fn set_scene(root: &mut Value, shading: Shading, frame: Option<Value>) -> Option<()> {
     let shown = root.get("scene").and_then(Value::as_u64).unwrap_or(0);
     let scene = root.pointer_mut(&format!("/scenes/{shown}"))?.as_object_mut()?;
     let extension = object_in(object_in(scene, "extensions")?, "LUMBRE_scene")?;
     extension.insert("shading".to_owned(), shading.to_string().into());
+    match frame {
+        Some(frame) => extension.insert("frame".to_owned(), frame),
+        None => extension.remove("frame"),
+    };
     let used = root.as_object_mut()?.entry("extensionsUsed").or_insert_with(|| json!([])).as_array_mut()?;
     if !used.iter().any(|name| name == "LUMBRE_scene") {
         used.push("LUMBRE_scene".into());

@@ -5,6 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::frame_settings::FrameExtension;
+
 type Color = [f64; 3];
 
 /// `materials[i].extensions.LUMBRE_materials_phong`.
@@ -130,6 +132,8 @@ pub(crate) struct SceneExtension {
     pub specular_antialiasing: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fog: Option<FogExtension>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<FrameExtension>,
 }
 
 /// `LUMBRE_scene.fog`.

@@ -8,6 +8,7 @@ use lumbre_optics::{FlatRule, Fog, FogMode, NoShading, ReflectionModel, Shading}
 use super::document::{Document, extension, shortened};
 use super::error::LoadProblem;
 use super::extensions::{FogExtension, SceneExtension};
+use super::frame_settings;
 use super::value::{color, number};
 use crate::{Projection, SceneSettings};
 
@@ -52,8 +53,11 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     settings.specular_antialiasing = found.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
     if let Some(source) = &found.fog {
         let fog = fog(source, &place)?;
-        fog.validate(&place).map_err(|source| LoadProblem::Fog { place, source })?;
+        fog.validate(&place).map_err(|source| LoadProblem::Fog { place: place.clone(), source })?;
         settings.fog = Some(fog);
+    }
+    if let Some(source) = &found.frame {
+        settings.frame = frame_settings::read(source, &place)?;
     }
     Ok(settings)
 }

@@ -25,6 +25,7 @@ mod export_nodes;
 mod export_scene;
 mod export_settings;
 mod extensions;
+mod frame_settings;
 mod guarded;
 mod hierarchy;
 mod import;

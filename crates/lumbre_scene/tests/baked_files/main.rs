@@ -260,18 +260,30 @@ fn settings_change_and_baked_light_stays_in_any_folder() {
     let light = |path: &Path| {
         let mut world = World::new();
         load(&mut world, path).unwrap();
-        let shading = world.resource::<SceneSettings>().shading;
+        let SceneSettings { shading, frame, .. } = *world.resource::<SceneSettings>();
         let maps: Vec<Vec<Vec3>> =
             world.query::<&Lightmap>().iter(&world).map(|map| map.image.texels.clone()).collect();
-        (shading, maps)
+        (shading, frame, maps)
     };
-    let (_, maps) = light(&output);
+    let (_, usual, maps) = light(&output);
+    assert_eq!(usual, FrameSettings::default());
     assert!(!maps.is_empty());
-    let settings = FileSettings { shading: Shading::Gouraud, shadows: false };
+    let frame = FrameSettings {
+        multisample: Some(false),
+        light_threshold: 0.25,
+        shadow_resolution: 0.5,
+        shadow_filter: ShadowFilter::PercentageCloser,
+    };
+    let settings = FileSettings { shading: Shading::Gouraud, shadows: false, frame };
     for folder in [folder.path(), other.path()] {
         let tuned = folder.join("tuned.glb");
         save_settings(&output, &tuned, settings).unwrap();
-        assert_eq!(light(&tuned), (Shading::Gouraud, maps.clone()));
+        assert_eq!(light(&tuned), (Shading::Gouraud, frame, maps.clone()));
+        // Taken back, nothing is left of them.
+        let again = folder.join("again.glb");
+        save_settings(&tuned, &again, FileSettings { frame: usual, ..settings }).unwrap();
+        assert_eq!(light(&again), (Shading::Gouraud, usual, maps.clone()));
+        assert!(!String::from_utf8_lossy(&fs::read(&again).unwrap()).contains("shadowFilter"));
     }
     let packed = |folder: &Path| fs::read_dir(folder.join("room.baked.lightmaps")).unwrap().count();
     assert_eq!(

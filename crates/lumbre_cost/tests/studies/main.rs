@@ -2,6 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
+mod counts;
+mod planted;
+mod shadows;
+
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,11 +14,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use bevy_ecs::world::World;
 use glam::{DVec3, Vec3};
 use lumbre_cost::{
-    CostError, CostOptions, CostReport, ErrorOver, Goal, PAGE, Picture, Point, TABLE, TuneOptions, measure,
-    read_picture, read_report, studies_named, tune,
+    CostError, CostOptions, CostReport, ErrorOver, PAGE, Picture, Point, TABLE, measure, read_picture,
+    read_report, studies_named,
 };
 use lumbre_mesh::{TriangleMesh, shapes};
-use lumbre_optics::{BakeMode, Light, Material, Shading, Surface};
+use lumbre_optics::{BakeMode, Light, Material, Surface};
 use lumbre_render::Gpu;
 use lumbre_scene::{Camera, Mesh, Name, StaticObject, Transform, save};
 
@@ -24,6 +28,7 @@ fn options(studies: &[&str], files: Vec<PathBuf>) -> CostOptions {
         files,
         studies: studies_named(&names).unwrap(),
         quick: true,
+        counts_only: false,
         size: (48, 32),
         seed: 1,
         resume: false,
@@ -149,52 +154,6 @@ fn lightmaps_beat_ambient_light_and_a_far_room_is_not_baked_again() {
     // Half of the level is another room; form factors take as many rays in any case.
     assert!(changed.counts["rays"] < 0.85 * whole.counts["rays"], "{changed:?} {whole:?}");
     assert!(study.findings.len() == 3 && study.notes.is_empty(), "{:?} {:?}", study.findings, study.notes);
-}
-
-/// A matt plane of 16 x 16 squares that fills the frame, under lamps that are far beside its squares: for every vertex there are a hundred pixels and more, and between
-/// vertices light hardly bends.
-fn smooth_light() -> World {
-    let mut world = World::new();
-    let plane = Mesh(Arc::new(shapes::plane(24.0, 24.0, 16, 16)));
-    world.spawn((Name::new("plane"), plane, Material::matt(Vec3::splat(0.6))));
-    for lamp in 0..24 {
-        let (x, z) = (f64::from(lamp % 6) - 2.5, f64::from(lamp / 6) - 1.5);
-        let light = Light { radius: 0.0, ..Light::point(Vec3::splat(4.0)) };
-        world.spawn((Name::new("lamp"), light, Transform::from_xyz(3.0 * x, 5.0, 3.0 * z)));
-    }
-    let eye = Transform::from_xyz(0.0, 6.0, 0.5).looking_at(DVec3::ZERO, DVec3::Y);
-    world.spawn((Name::new("eye"), Camera::default(), eye));
-    world
-}
-
-#[test]
-fn tuning_finds_a_planted_optimum() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = saved(folder.path(), "smooth.glb", smooth_light());
-    let gpu = Gpu::headless().expect("a Vulkan driver; the software one will do");
-    let tuned = |goal: Goal, report: Option<&Path>| {
-        let options = TuneOptions { file: file.clone(), goal, quick: true, size: (256, 160) };
-        tune(&gpu, &options, report, &|_| ControlFlow::Continue(())).unwrap()
-    };
-    let report = folder.path().join("report");
-    let cheap = tuned(Goal { milliseconds: None, error: Some(0.01) }, Some(&report));
-    let chosen = cheap.settings[cheap.chosen.unwrap()];
-    assert_eq!((chosen.shading, chosen.multisample), (Shading::Gouraud, false), "{:?}", cheap.study.findings);
-    let flat = cheap.settings.iter().position(|settings| settings.shading == Shading::Flat).unwrap();
-    assert!(cheap.study.points[flat].error.unwrap().relative_rmse > 0.01, "{:?}", cheap.study.points[flat]);
-    // No lamp asks for a shadow.
-    assert!(cheap.settings.iter().all(|settings| settings.shadows));
-    assert_eq!(read_report(&report).unwrap().study("tune"), Some(&cheap.study));
-    let exact = tuned(Goal { milliseconds: Some(1e6), error: Some(1e-4) }, None);
-    // By need it may be Phong shading all the same, and is then as good.
-    let shading = exact.settings[exact.chosen.unwrap()].shading;
-    assert!(matches!(shading, Shading::Phong | Shading::Auto { .. }), "{:?}", exact.study.findings);
-    let none = tuned(Goal { milliseconds: Some(1e-6), error: None }, None);
-    assert!(
-        none.chosen.is_none() && none.study.findings[0].contains("Nothing keeps"),
-        "{:?}",
-        none.study.findings
-    );
 }
 
 /// Root mean square difference over that of the reference, by the plain formula.

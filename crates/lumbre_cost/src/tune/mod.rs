@@ -1,5 +1,7 @@
-//! Which settings to draw a level with: all are measured side by side at every camera, those that another one beats are dropped, and of what is left the one is taken
-//! that keeps a goal. Not the studies, which explain; this decides.
+//! Which settings to draw a level with: one choice after another is measured side by side at every camera, what another way beats is dropped, and of what is left the one is
+//! taken that keeps a goal. Not the studies, which explain; this decides.
+
+mod draw_settings;
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -7,10 +9,13 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use bevy_ecs::prelude::*;
-use lumbre_optics::{ErrorBound, Light, Shading};
-use lumbre_render::{FrameOptions, Gpu};
-use lumbre_scene::{ActiveCamera, Camera, Name, SceneSettings};
+use lumbre_optics::Shading;
+use lumbre_render::{FrameOptions, Gpu, Renderer};
+use lumbre_scene::{ActiveCamera, Camera, Name};
 
+pub use self::draw_settings::DrawSettings;
+use self::draw_settings::{Choices, Stage};
+use crate::converged::ConvergedBakes;
 use crate::findings::{cost_of, percent, short};
 use crate::folder::Folder;
 use crate::frames::{DrawnFrame, Frame, draw_frames};
@@ -31,17 +36,6 @@ pub struct Goal {
     pub error: Option<f64>,
 }
 
-/// A way to draw a level.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DrawSettings {
-    /// How often the lighting equation is evaluated, for objects that do not choose for themselves.
-    pub shading: Shading,
-    /// Shadows of lights that ask for them.
-    pub shadows: bool,
-    /// Four samples a pixel.
-    pub multisample: bool,
-}
-
 /// What was found.
 #[derive(Clone, Debug, Default)]
 pub struct Tuned {
@@ -54,60 +48,6 @@ pub struct Tuned {
     /// The point that keeps the goal best; none where none keeps it.
     pub chosen: Option<usize>,
     pictures: Measured,
-}
-
-impl DrawSettings {
-    /// The most accurate: the others are measured against it.
-    pub const REFERENCE: Self = Self { shading: Shading::Phong, shadows: true, multisample: true };
-
-    /// Every combination, the most accurate first. What no light asks for is not varied.
-    fn all(has_shadows: bool) -> Vec<Self> {
-        let mut all = Vec::new();
-        for multisample in [true, false] {
-            for shadows in [true, false] {
-                for shading in rates() {
-                    if shadows || has_shadows {
-                        all.push(Self { shading, shadows, multisample });
-                    }
-                }
-            }
-        }
-        all
-    }
-
-    fn label(&self) -> String {
-        let shadows = if self.shadows { "" } else { ", no shadows" };
-        let samples = if self.multisample { ", four samples" } else { "" };
-        format!("{}{shadows}{samples}", self.shading)
-    }
-
-    /// As `lumbre render` is asked for them.
-    pub fn arguments(&self) -> String {
-        let shadows = if self.shadows { "" } else { " --no-shadows" };
-        let samples = if self.multisample { " --msaa" } else { "" };
-        format!("--shading {}{shadows}{samples}", self.shading)
-    }
-
-    /// What of them is the World's: objects that choose their shading keep it.
-    fn set(&self, world: &mut World) {
-        world.get_resource_or_insert_with(SceneSettings::default).shading = self.shading;
-    }
-
-    /// What of them is the frame's.
-    fn options(&self) -> FrameOptions {
-        let Self { shadows, multisample, .. } = *self;
-        FrameOptions { shadows, multisample, ..FrameOptions::default() }
-    }
-}
-
-/// Errors that shading by need is tried with.
-const BOUNDS: [f32; 4] = [0.003, 0.01, 0.03, 0.1];
-
-/// Rates of evaluation that are tried, the most accurate first.
-fn rates() -> Vec<Shading> {
-    let by_need = BOUNDS.into_iter().filter_map(ErrorBound::new);
-    let by_need = by_need.map(|max_error| Shading::Auto { max_error });
-    [Shading::Phong].into_iter().chain(by_need).chain([Shading::Gouraud, Shading::Flat]).collect()
 }
 
 /// Seconds for frames of all settings, and of those at the front once more.
@@ -139,9 +79,13 @@ pub fn tune(
 ) -> Result<Tuned, CostError> {
     let begun = Instant::now();
     let files = [options.file.clone()];
+    let (pictures, converged) = (RefCell::new(Renderer::new(gpu)), ConvergedBakes::default());
     let conditions = Conditions {
         gpu,
+        pictures: &pictures,
+        converged: &converged,
         quick: options.quick,
+        counts_only: false,
         size: options.size,
         seed: 0,
         folder: report.unwrap_or(Path::new(".")),
@@ -155,7 +99,8 @@ pub fn tune(
         let measured = Measured { study: tuned.study.clone(), ..std::mem::take(&mut tuned.pictures) };
         folder.write_pictures(&measured)?;
         let files = vec![options.file.display().to_string()];
-        let settings = Settings { quick: options.quick, size: options.size, seed: 0, files };
+        let settings =
+            Settings { quick: options.quick, counts_only: false, size: options.size, seed: 0, files };
         folder.write(&CostReport { machine: machine(gpu), settings, studies: vec![measured.study] })?;
     }
     Ok(tuned)
@@ -166,39 +111,138 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let Some(scene) = scenes.first() else { return Ok(Tuned::default()) };
     let mut world = scene.open(conditions.aspect())?;
     let cameras = cameras(&mut world);
-    let mut lights = world.query::<&Light>();
-    let has_shadows = lights.iter(&world).any(|light| light.enabled && light.shadow);
+    let choices = Choices::of(&mut world);
     let mut own = world.query::<&Shading>();
     let choosers = own.iter(&world).count();
 
-    let settings = DrawSettings::all(has_shadows);
-    let everything: Vec<usize> = (0..settings.len()).collect();
-    let mut drawn =
-        draw_at_cameras(conditions, scene, &cameras, settings.iter().copied(), SECONDS[0], [0.0, 0.6])?;
     let mut measured = Measured { study: study(&scene.name), ..Measured::default() };
-    let points = points(conditions, scene, &cameras, &settings, &drawn, &mut measured)?;
-    // Only what may be the best is worth more rounds.
-    let contenders: Vec<usize> = everything.into_iter().filter(|&one| !is_beaten(one, &points)).collect();
-    let some = contenders.iter().map(|&one| settings[one]);
-    let again = draw_at_cameras(conditions, scene, &cameras, some, SECONDS[1], [0.6, 1.0])?;
-    for (&place, again) in contenders.iter().zip(again) {
-        for (own, again) in drawn[place].iter_mut().zip(again) {
-            own.times.extend(again.times);
+    let mut found = Candidates::default();
+    let stages = Stage::ALL.len() as f64;
+    for (place, stage) in Stage::ALL.into_iter().enumerate() {
+        let share = |place: usize| 0.6 * place as f64 / stages;
+        let ways = found.next(stage, &choices);
+        if ways.len() > 1 {
+            let told = [share(place), share(place + 1)];
+            let drawn = draw_at_cameras(conditions, scene, &cameras, &ways, SECONDS[0] / stages, told)?;
+            found.take(conditions, scene, &cameras, ways, drawn, &mut measured)?;
         }
     }
-    let timed = |(point, drawn): (Point, &Vec<DrawnFrame>)| Point { milliseconds: longest(drawn), ..point };
-    let mut study = std::mem::take(&mut measured.study);
-    study.points = points.into_iter().zip(&drawn).map(timed).collect();
+    // Only what may be the best is worth more rounds.
+    let contenders = found.contenders();
+    let ways: Vec<DrawSettings> = contenders.iter().map(|&one| found.settings[one]).collect();
+    let again = draw_at_cameras(conditions, scene, &cameras, &ways, SECONDS[1], [0.6, 1.0])?;
+    for (&place, again) in contenders.iter().zip(&again) {
+        found.points[place].milliseconds = longest(again);
+    }
+    let Candidates { settings, points, .. } = found;
+    let mut study = Study { points, ..std::mem::take(&mut measured.study) };
     if choosers > 0 {
         study.notes.push(format!(
             "{choosers} objects choose their shading themselves and keep it; --shading of the commands asks nobody."
         ));
     }
-    let place = |point: &Point| study.points.iter().position(|other| std::ptr::eq(other, point));
-    let front: Vec<usize> = pareto_front(&study.points).into_iter().filter_map(place).collect();
-    let chosen = choose(&study.points, goal);
+    // The others were timed at another hour, and are beaten.
+    let last: Vec<Point> = contenders.iter().map(|&place| study.points[place].clone()).collect();
+    let place = |point: &Point| Some(contenders[last.iter().position(|other| std::ptr::eq(other, point))?]);
+    let front: Vec<usize> = pareto_front(&last).into_iter().filter_map(place).collect();
+    let chosen = choose(&last, goal).map(|place| contenders[place]);
     study.findings = findings(&study.points, &front, chosen, goal, cameras.len());
     Ok(Tuned { study, settings, front, chosen, pictures: measured })
+}
+
+/// What is known of the ways to draw a level so far.
+#[derive(Default)]
+struct Candidates {
+    settings: Vec<DrawSettings>,
+    /// A point for each of them.
+    points: Vec<Point>,
+    /// Those that were measured last, side by side: only their times can be compared.
+    latest: Vec<usize>,
+}
+
+/// Ways from which a stage goes on, at most: those that no other one beats, spread evenly over them if there are more.
+const CARRIED_ON: usize = 5;
+
+impl Candidates {
+    /// What a stage has to measure: those that are still in the running, and what differs from the best of them in what the stage chooses.
+    fn next(&self, stage: Stage, choices: &Choices) -> Vec<DrawSettings> {
+        if self.latest.is_empty() {
+            let reference = choices.reference();
+            let others = stage.others(reference, choices);
+            return [reference].into_iter().chain(others).collect();
+        }
+        let running: Vec<DrawSettings> = self.contenders().iter().map(|&one| self.settings[one]).collect();
+        let points: Vec<Point> = self.contenders().iter().map(|&one| self.points[one].clone()).collect();
+        let place = |point: &Point| points.iter().position(|other| std::ptr::eq(other, point));
+        let front: Vec<usize> = pareto_front(&points).into_iter().filter_map(place).collect();
+        let mut ways = running.clone();
+        for from in evenly(&front, CARRIED_ON) {
+            for other in stage.others(running[from], choices) {
+                if !ways.contains(&other) {
+                    ways.push(other);
+                }
+            }
+        }
+        // Nothing to choose: what is known is known.
+        if ways.len() == running.len() { Vec::new() } else { ways }
+    }
+
+    /// Takes what was measured of some ways, with their pictures if they are new.
+    fn take(
+        &mut self,
+        conditions: &Conditions<'_>,
+        scene: &SceneFile,
+        cameras: &[(Entity, String)],
+        ways: Vec<DrawSettings>,
+        drawn: Vec<Vec<DrawnFrame>>,
+        measured: &mut Measured,
+    ) -> Result<(), CostError> {
+        if self.settings.is_empty() {
+            for (number, ((_, name), exact)) in cameras.iter().zip(drawn.iter().flatten()).enumerate() {
+                measured.keep_reference(&reference_name(number, name), exact.picture.clone());
+            }
+        }
+        self.latest.clear();
+        for (way, drawn) in ways.into_iter().zip(&drawn) {
+            let place = match self.settings.iter().position(|known| *known == way) {
+                Some(place) => place,
+                None => {
+                    let label = way.label(self.settings.first().unwrap_or(&way));
+                    let Some(point) = point(conditions, scene, cameras, (&way, label), drawn, measured)?
+                    else {
+                        continue;
+                    };
+                    self.settings.push(way);
+                    self.points.push(point);
+                    self.points.len() - 1
+                }
+            };
+            self.points[place].milliseconds = longest(drawn);
+            self.latest.push(place);
+        }
+        Ok(())
+    }
+
+    /// Those of the last that no other one of them beats.
+    fn contenders(&self) -> Vec<usize> {
+        let latest: Vec<&Point> = self.latest.iter().map(|&one| &self.points[one]).collect();
+        let kept = (0..latest.len()).filter(|&one| !is_beaten(one, &latest));
+        kept.map(|one| self.latest[one]).collect()
+    }
+}
+
+/// At most so many of them, the first and the last among them.
+fn evenly(all: &[usize], most: usize) -> Vec<usize> {
+    let last = all.len().saturating_sub(1);
+    match all.len() <= most {
+        true => all.to_vec(),
+        false => (0..most).map(|place| all[place * last / (most - 1)]).collect(),
+    }
+}
+
+/// What the picture of a camera under the most accurate settings is called.
+fn reference_name(number: usize, camera: &str) -> String {
+    format!("reference {number} {camera}")
 }
 
 /// Errors that are no farther apart look alike: a quarter of a step of eight bits, in a picture of half grey.
@@ -221,9 +265,9 @@ fn choose(points: &[Point], goal: Goal) -> Option<usize> {
 }
 
 /// Whether another one is as accurate and takes less time, quartiles and all.
-fn is_beaten(one: usize, points: &[Point]) -> bool {
+fn is_beaten(one: usize, points: &[&Point]) -> bool {
     let known = |point: &Point| Some((point.milliseconds?, point.error?.relative_rmse));
-    let Some((time, error)) = known(&points[one]) else { return true };
+    let Some((time, error)) = known(points[one]) else { return true };
     let others = points.iter().enumerate().filter(|(place, _)| *place != one);
     others.filter_map(|(_, other)| known(other)).any(|(other, its)| its <= error && other.is_below(&time))
 }
@@ -251,12 +295,12 @@ fn draw_at_cameras(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     cameras: &[(Entity, String)],
-    settings: impl Iterator<Item = DrawSettings>,
+    ways: &[DrawSettings],
     seconds: f64,
     told: [f64; 2],
 ) -> Result<Vec<Vec<DrawnFrame>>, CostError> {
     let mut frames = Vec::new();
-    for settings in settings {
+    for settings in ways {
         let mut world = scene.open(conditions.aspect())?;
         settings.set(&mut world);
         let world = Rc::new(RefCell::new(world));
@@ -273,61 +317,45 @@ fn draw_at_cameras(
     Ok(found)
 }
 
-/// A point for each of the settings: the longest time and the largest error of all cameras, with the picture of that camera.
-fn points(
+/// A way's point: the longest time and the largest error of all cameras, with the picture of that camera. Nothing without a camera.
+fn point(
     conditions: &Conditions<'_>,
     scene: &SceneFile,
     cameras: &[(Entity, String)],
-    all: &[DrawSettings],
-    drawn: &[Vec<DrawnFrame>],
+    (way, label): (&DrawSettings, String),
+    drawn: &[DrawnFrame],
     measured: &mut Measured,
-) -> Result<Vec<Point>, CostError> {
-    let Some(exact) = all.iter().position(|settings| *settings == DrawSettings::REFERENCE) else {
-        return Ok(Vec::new());
-    };
-    let references: Vec<String> = cameras
-        .iter()
-        .enumerate()
-        .zip(&drawn[exact])
-        .map(|((number, (_, name)), drawn)| {
-            measured.keep_reference(&format!("reference {number} {name}"), drawn.picture.clone())
-        })
-        .collect();
-    let mut points = Vec::new();
-    for (settings, drawn) in all.iter().zip(drawn) {
-        let mut worst: Option<Measured> = None;
-        for (camera, (reference, drawn)) in references.iter().zip(drawn).enumerate() {
-            let mut one = Measured { study: study(&scene.name), ..Measured::default() };
-            let kept = measured.pictures.get(reference).cloned();
-            one.pictures.extend(kept.map(|picture| (reference.clone(), picture)));
-            let name = &cameras[camera].1;
-            let point = Point {
-                series: settings.shading.name().to_owned(),
-                label: settings.label(),
-                counts: drawn.counts(),
-                command: format!(
-                    "lumbre render {} -o frame.png --camera '{name}' --size {} {}",
-                    scene.in_commands(),
-                    conditions.size_text(),
-                    settings.arguments()
-                ),
-                ..Point::default()
-            };
-            one.add_picture(point, drawn.picture.clone(), reference, ErrorOver::Picture)?;
-            let error = |of: &Measured| {
-                of.study.points.first().and_then(|point| point.error).map_or(0.0, |error| error.relative_rmse)
-            };
-            if worst.as_ref().is_none_or(|worst| error(&one) > error(worst)) {
-                worst = Some(one);
-            }
+) -> Result<Option<Point>, CostError> {
+    let mut worst: Option<Measured> = None;
+    for (number, ((_, camera), drawn)) in cameras.iter().zip(drawn).enumerate() {
+        let mut one = Measured { study: study(&scene.name), ..Measured::default() };
+        let reference = one.file_name(&reference_name(number, camera));
+        let kept = measured.pictures.get(&reference).cloned();
+        one.pictures.extend(kept.map(|picture| (reference.clone(), picture)));
+        let point = Point {
+            series: way.shading.name().to_owned(),
+            label: label.clone(),
+            counts: drawn.counts(),
+            command: format!(
+                "lumbre render {} -o frame.png --camera '{camera}' --size {} {}",
+                scene.in_commands(),
+                conditions.size_text(),
+                way.arguments()
+            ),
+            ..Point::default()
+        };
+        one.add_picture(point, drawn.picture.clone(), &reference, ErrorOver::Picture)?;
+        let error = |of: &Measured| {
+            of.study.points.first().and_then(|point| point.error).map_or(0.0, |error| error.relative_rmse)
+        };
+        if worst.as_ref().is_none_or(|worst| error(&one) > error(worst)) {
+            worst = Some(one);
         }
-        let Some(mut worst) = worst else { continue };
-        measured.pictures.append(&mut worst.pictures);
-        measured.heat.append(&mut worst.heat);
-        let milliseconds = longest(drawn);
-        points.extend(worst.study.points.into_iter().map(|point| Point { milliseconds, ..point }));
     }
-    Ok(points)
+    let Some(mut worst) = worst else { return Ok(None) };
+    measured.pictures.append(&mut worst.pictures);
+    measured.heat.append(&mut worst.heat);
+    Ok(worst.study.points.pop())
 }
 
 fn study(scene: &str) -> Study {
@@ -335,7 +363,7 @@ fn study(scene: &str) -> Study {
         name: "tune".into(),
         title: format!("Settings for {scene}"),
         question: "Which settings draw it with the least error within a time, or in the least time within an error?".into(),
-        reference: "the most accurate of them: Phong shading with shadows and four samples a pixel; time and error are those of the camera that is the worst".into(),
+        reference: "the most accurate of them: Phong shading with soft shadows of twice the usual resolution, lamps without an end, and four samples a pixel; time and error are those of the camera that is the worst".into(),
         plots: vec![Plot {
             title: "Error against time".into(),
             across: Quantity::Milliseconds,
@@ -413,10 +441,16 @@ mod tests {
         assert_eq!(within(Some(4.0), None), None);
         assert_eq!(within(Some(30.0), Some(0.001)), None);
         // A clear winner beats; one that lies within the quartiles does not.
-        assert!(is_beaten(
-            4,
-            &[point(40.0, 0.0), point(20.0, 0.01), point(9.0, 0.5), point(9.0, 0.5), point(30.0, 0.01)]
-        ));
-        assert!(!is_beaten(4, &points));
+        let slower =
+            [point(40.0, 0.0), point(20.0, 0.01), point(9.0, 0.5), point(9.0, 0.5), point(30.0, 0.01)];
+        let beaten = |points: &[Point]| is_beaten(4, &points.iter().collect::<Vec<_>>());
+        assert!(beaten(&slower) && !beaten(&points));
+    }
+
+    #[test]
+    fn a_few_of_many_are_spread_over_them() {
+        assert_eq!(evenly(&[3, 1, 2], 5), [3, 1, 2]);
+        assert_eq!(evenly(&[0, 1, 2, 3, 4, 5, 6, 7, 8], 5), [0, 2, 4, 6, 8]);
+        assert_eq!(evenly(&[0, 1, 2, 3, 4, 5], 5), [0, 1, 2, 3, 5]);
     }
 }

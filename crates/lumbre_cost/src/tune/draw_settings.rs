@@ -1,0 +1,186 @@
+//! A way to draw a level, and those that differ from it in one respect. Not their measuring.
+
+use bevy_ecs::prelude::*;
+use lumbre_optics::{ErrorBound, Light, LightKind, Shading};
+use lumbre_render::FrameOptions;
+use lumbre_scene::{Camera, FrameSettings, SceneSettings, ShadowFilter};
+
+use crate::findings::short;
+
+/// A way to draw a level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawSettings {
+    /// How often the lighting equation is evaluated, for objects that do not choose for themselves.
+    pub shading: Shading,
+    /// Shadows of lights that ask for them.
+    pub shadows: bool,
+    /// How their maps are read.
+    pub shadow_filter: ShadowFilter,
+    /// Texels of their maps beside the usual number, along a side.
+    pub shadow_resolution: f32,
+    /// Radiance on a white surface below which a lamp ends; 0 where lamps end as the level says.
+    pub light_threshold: f32,
+    /// Four samples a pixel.
+    pub multisample: bool,
+}
+
+/// What there is in a level to choose about.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Choices {
+    /// A light asks for a shadow.
+    shadows: bool,
+    /// There are lamps that may end, and this is the radiance that the level's camera shows as white.
+    white: Option<f32>,
+}
+
+/// What is chosen at once, one after another: what they cost has little to do with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// How often light is evaluated, and how often a pixel is.
+    Evaluations,
+    Shadows,
+    Lamps,
+}
+
+/// Errors that shading by need is tried with.
+const BOUNDS: [f32; 4] = [0.003, 0.01, 0.03, 0.1];
+/// Shadows that are tried, the most accurate first.
+const SHADOWS: [(ShadowFilter, f32); 6] = [
+    (ShadowFilter::Soft, 2.0),
+    (ShadowFilter::Soft, 1.0),
+    (ShadowFilter::Soft, 0.5),
+    (ShadowFilter::PercentageCloser, 1.0),
+    (ShadowFilter::Hard, 1.0),
+    (ShadowFilter::Hard, 0.5),
+];
+/// Parts of white at which lamps are tried to end.
+const THRESHOLDS: [f32; 3] = [0.002, 0.01, 0.05];
+
+impl DrawSettings {
+    /// The most accurate of a level with shadows.
+    const MOST_ACCURATE: Self = Self {
+        shading: Shading::Phong,
+        shadows: true,
+        shadow_filter: SHADOWS[0].0,
+        shadow_resolution: SHADOWS[0].1,
+        light_threshold: 0.0,
+        multisample: true,
+    };
+
+    /// What it is called beside the most accurate of its level.
+    pub(super) fn label(&self, reference: &Self) -> String {
+        let of_maps = (self.shadow_filter, self.shadow_resolution);
+        let shadows = match self.shadows {
+            false => ", no shadows".to_owned(),
+            true if of_maps == (reference.shadow_filter, reference.shadow_resolution) => String::new(),
+            true => format!(
+                ", {} shadows at {}",
+                self.shadow_filter.name(),
+                short(f64::from(self.shadow_resolution))
+            ),
+        };
+        let lamps = match self.light_threshold {
+            0.0 => String::new(),
+            threshold => format!(", lamps to {}", short(f64::from(threshold))),
+        };
+        let samples = if self.multisample { ", four samples" } else { "" };
+        format!("{}{shadows}{lamps}{samples}", self.shading)
+    }
+
+    /// As `lumbre render` is asked for them.
+    pub fn arguments(&self) -> String {
+        let shadows = match self.shadows {
+            true => format!(
+                " --shadow-filter {} --shadow-resolution {}",
+                self.shadow_filter.name(),
+                self.shadow_resolution
+            ),
+            false => " --no-shadows".to_owned(),
+        };
+        let samples = if self.multisample { " --msaa" } else { " --no-msaa" };
+        format!("--shading {}{shadows} --light-threshold {}{samples}", self.shading, self.light_threshold)
+    }
+
+    /// What a level's file holds of them for its frames.
+    pub fn frame(&self) -> FrameSettings {
+        FrameSettings {
+            multisample: Some(self.multisample),
+            light_threshold: self.light_threshold,
+            shadow_resolution: self.shadow_resolution,
+            shadow_filter: self.shadow_filter,
+        }
+    }
+
+    /// What of them is the World's: objects that choose their shading keep it.
+    pub(super) fn set(&self, world: &mut World) {
+        let mut settings = world.get_resource_or_insert_with(SceneSettings::default);
+        (settings.shading, settings.frame) = (self.shading, self.frame());
+    }
+
+    /// What of them is the frame's.
+    pub(super) fn options(&self) -> FrameOptions {
+        FrameOptions { shadows: self.shadows, ..FrameOptions::default() }
+    }
+}
+
+impl Choices {
+    /// The most accurate way: the others are measured against it. Where nothing casts a shadow, maps are as usual.
+    pub fn reference(&self) -> DrawSettings {
+        let usual = FrameSettings::default();
+        let most = DrawSettings::MOST_ACCURATE;
+        let shadow_resolution = if self.shadows { most.shadow_resolution } else { usual.shadow_resolution };
+        DrawSettings { shadow_resolution, ..most }
+    }
+
+    /// Of a level.
+    pub fn of(world: &mut World) -> Self {
+        let mut lights = world.query::<&Light>();
+        let shining: Vec<&Light> = lights.iter(world).filter(|light| light.enabled).collect();
+        let shadows = shining.iter().any(|light| light.shadow);
+        let lamps = shining.iter().any(|light| light.kind == LightKind::Point);
+        let exposures: Vec<f32> =
+            world.query::<&Camera>().iter(world).map(|camera| camera.exposure).collect();
+        let brightest = exposures.into_iter().filter(|exposure| *exposure > 0.0).fold(0.0, f32::max);
+        Self { shadows, white: (lamps && brightest > 0.0).then(|| brightest.recip()) }
+    }
+}
+
+impl Stage {
+    /// In their order.
+    pub const ALL: [Self; 3] = [Self::Evaluations, Self::Shadows, Self::Lamps];
+
+    /// The settings that differ from these in what is chosen here, these themselves left out.
+    pub fn others(self, from: DrawSettings, choices: &Choices) -> Vec<DrawSettings> {
+        let mut others = Vec::new();
+        match self {
+            Self::Evaluations => {
+                for multisample in [true, false] {
+                    others.extend(rates().map(|shading| DrawSettings { shading, multisample, ..from }));
+                }
+            }
+            Self::Shadows if choices.shadows => {
+                let read = SHADOWS.into_iter().map(|(shadow_filter, shadow_resolution)| DrawSettings {
+                    shadow_filter,
+                    shadow_resolution,
+                    ..from
+                });
+                others.extend(read.chain([DrawSettings { shadows: false, ..from }]));
+            }
+            Self::Lamps => {
+                let thresholds =
+                    choices.white.into_iter().flat_map(|white| THRESHOLDS.map(|part| part * white));
+                others.extend(thresholds.map(|light_threshold| DrawSettings { light_threshold, ..from }));
+            }
+            Self::Shadows => {}
+        }
+        others.retain(|other| *other != from);
+        others
+    }
+}
+
+/// Rates of evaluation that are tried, the most accurate first.
+fn rates() -> impl Iterator<Item = Shading> {
+    let by_need = BOUNDS.into_iter().filter_map(ErrorBound::new);
+    let by_need = by_need.map(|max_error| Shading::Auto { max_error });
+    [Shading::Phong].into_iter().chain(by_need).chain([Shading::Gouraud, Shading::Flat])
+}

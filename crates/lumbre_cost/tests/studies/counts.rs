@@ -1,0 +1,88 @@
+//! The regression gate: the counts of cheap studies against those that were kept, by what `lumbre cost --compare` compares with. Counts of the processor alone, which are
+//! the same on every machine: triangles, draws, bytes that are uploaded, lamps in lists, rays, texels, patches.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use lumbre_cost::{Change, CostOptions, CostReport, What, compare_reports, read_report};
+
+use super::{measured, options};
+
+/// What is counted.
+const WATCHED: &[&str] = &["shading", "need", "lamps", "bake", "preprocessing", "reflection"];
+/// By which factor a count may grow: the last digits of f32 decide whether a lamp reaches a cluster, and where a bake has rays enough.
+const FACTOR: f64 = 1.1;
+const RENEWED_BY: &str = "LUMBRE_WRITE_GOLDENS=1 cargo test --workspace --test studies counts";
+
+fn kept() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/studies/counts.json")
+}
+
+/// What is wrong with counts beside those that are kept: what grew or is gone, and what nobody watches over yet.
+fn faults(kept: &CostReport, counted: &CostReport) -> Vec<String> {
+    let is_fault = |change: &Change| change.is_worse() || change.what == What::New;
+    let changes = compare_reports(kept, counted, FACTOR);
+    changes.iter().filter(|change| is_fault(change)).map(Change::to_string).collect()
+}
+
+#[test]
+fn counts_have_not_grown() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = CostOptions { counts_only: true, size: (96, 54), ..options(WATCHED, Vec::new()) };
+    let counted = measured(&asked, folder.path());
+    if std::env::var_os("LUMBRE_WRITE_GOLDENS").is_some() {
+        fs::copy(folder.path().join(lumbre_cost::REPORT), kept()).unwrap();
+    }
+    let before = read_report(&kept()).unwrap();
+    assert_eq!(before.settings, counted.settings, "the counts that are kept are of something else");
+    let better = compare_reports(&before, &counted, FACTOR);
+    for change in better.iter().filter(|change| !change.is_worse()) {
+        println!("{change}");
+    }
+    let found = faults(&before, &counted);
+    assert!(
+        found.is_empty(),
+        "{}\nIf it is meant to be so, `{RENEWED_BY}` keeps the new counts.",
+        found.join("\n")
+    );
+
+    // What would be found: every count of every point, and every point.
+    for (place, study) in before.studies.iter().enumerate() {
+        for (number, point) in study.points.iter().enumerate() {
+            for (name, count) in &point.counts {
+                let mut grown = before.clone();
+                let planted = if *count > 0.0 { 1.2 * count } else { 1.0 };
+                grown.studies[place].points[number].counts.insert(name.clone(), planted);
+                let found = faults(&before, &grown);
+                assert!(found.len() == 1 && found[0].contains(name.as_str()), "{name}: {found:?}");
+            }
+            let mut fewer = before.clone();
+            fewer.studies[place].points.remove(number);
+            assert_eq!(faults(&before, &fewer).len(), 1, "{}", point.label);
+            assert_eq!(faults(&fewer, &before).len(), 1, "{}", point.label);
+        }
+    }
+    // None is empty, and nothing of them is a time or this machine's.
+    for name in WATCHED {
+        let study = before.study(name).unwrap();
+        assert!(!study.points.is_empty(), "nothing was counted of {name}");
+        for point in &study.points {
+            assert!(point.milliseconds.is_none() && point.error.is_none() && !point.counts.is_empty());
+            assert!(point.counts.keys().all(|name| !name.contains("invocations")), "{:?}", point.counts);
+        }
+    }
+    assert_eq!(before.machine, lumbre_cost::Machine::default());
+}
+
+#[test]
+fn counts_are_the_same_each_time() {
+    let asked = CostOptions { counts_only: true, size: (64, 36), ..options(&["lamps"], Vec::new()) };
+    let [first, second] = [0, 1].map(|_| {
+        let folder = tempfile::tempdir().unwrap();
+        let report = measured(&asked, folder.path());
+        let text = fs::read_to_string(folder.path().join(lumbre_cost::REPORT)).unwrap();
+        assert!(!folder.path().join("pictures").exists(), "a picture is kept of what is counted");
+        (report, text)
+    });
+    assert_eq!(first, second);
+}

@@ -1,0 +1,170 @@
+//! `tune` on levels whose best settings are known: for each choice one where it costs much and gives nothing, and one where it has to be paid for.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+
+use bevy_ecs::world::World;
+use glam::{DVec3, Vec3};
+use lumbre_cost::{DrawSettings, Goal, TuneOptions, Tuned, read_report, tune};
+use lumbre_mesh::shapes;
+use lumbre_optics::{Light, Material, Shading, SpotCone, Surface};
+use lumbre_render::Gpu;
+use lumbre_scene::{Camera, Mesh, Name, ShadowFilter, Transform};
+
+use super::saved;
+
+fn tuned(world: World, goal: Goal, report: Option<&Path>) -> Tuned {
+    let folder = tempfile::tempdir().unwrap();
+    let file = saved(folder.path(), "level.glb", world);
+    let gpu = Gpu::headless().expect("a Vulkan driver; the software one will do");
+    let options = TuneOptions { file, goal, quick: true, size: (192, 120) };
+    tune(&gpu, &options, report, &|_| ControlFlow::Continue(())).unwrap()
+}
+
+/// The settings with the least time within an error.
+fn cheapest_within(error: f64, world: World) -> (DrawSettings, Tuned) {
+    let tuned = tuned(world, Goal { milliseconds: None, error: Some(error) }, None);
+    (tuned.settings[tuned.chosen.unwrap()], tuned)
+}
+
+fn error_of(tuned: &Tuned, which: impl Fn(&DrawSettings) -> bool) -> f64 {
+    let place = tuned.settings.iter().position(which).expect("it was tried");
+    tuned.study.points[place].error.unwrap().relative_rmse
+}
+
+fn seen_from_above(world: &mut World) {
+    let eye = Transform::from_xyz(0.0, 6.0, 0.5).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("eye"), Camera::default(), eye));
+}
+
+fn floor(world: &mut World, pieces: u32) {
+    let plane = Mesh(Arc::new(shapes::plane(24.0, 24.0, pieces, pieces)));
+    world.spawn((Name::new("floor"), plane, Material::matt(Vec3::splat(0.6))));
+}
+
+/// A matt plane of 16 x 16 squares that fills the frame, under lamps that are far beside its squares: for every vertex there are a hundred pixels and more, and between
+/// vertices light hardly bends.
+fn smooth_light() -> World {
+    let mut world = World::new();
+    floor(&mut world, 16);
+    for lamp in 0..24 {
+        let (x, z) = (f64::from(lamp % 6) - 2.5, f64::from(lamp / 6) - 1.5);
+        let light = Light { radius: 0.0, ..Light::point(Vec3::splat(4.0)) };
+        world.spawn((Name::new("lamp"), light, Transform::from_xyz(3.0 * x, 5.0, 3.0 * z)));
+    }
+    seen_from_above(&mut world);
+    world
+}
+
+#[test]
+fn tuning_finds_a_planted_optimum() {
+    let folder = tempfile::tempdir().unwrap();
+    let tuned = |goal: Goal, report: Option<&Path>| tuned(smooth_light(), goal, report);
+    let report = folder.path().join("report");
+    let cheap = tuned(Goal { milliseconds: None, error: Some(0.01) }, Some(&report));
+    let chosen = cheap.settings[cheap.chosen.unwrap()];
+    assert_eq!((chosen.shading, chosen.multisample), (Shading::Gouraud, false), "{:?}", cheap.study.findings);
+    let flat = cheap.settings.iter().position(|settings| settings.shading == Shading::Flat).unwrap();
+    assert!(cheap.study.points[flat].error.unwrap().relative_rmse > 0.01, "{:?}", cheap.study.points[flat]);
+    // No lamp asks for a shadow.
+    assert!(cheap.settings.iter().all(|settings| settings.shadows));
+    assert_eq!(read_report(&report).unwrap().study("tune"), Some(&cheap.study));
+    let exact = tuned(Goal { milliseconds: Some(1e6), error: Some(1e-4) }, None);
+    // By need it may be Phong shading all the same, and is then as good.
+    let shading = exact.settings[exact.chosen.unwrap()].shading;
+    assert!(matches!(shading, Shading::Phong | Shading::Auto { .. }), "{:?}", exact.study.findings);
+    let none = tuned(Goal { milliseconds: Some(1e-6), error: None }, None);
+    assert!(
+        none.chosen.is_none() && none.study.findings[0].contains("Nothing keeps"),
+        "{:?}",
+        none.study.findings
+    );
+}
+
+/// Slats that glow, and so cost nothing to shade: all that can be wrong is their edges.
+fn glowing_slats() -> World {
+    let mut world = World::new();
+    let front = Surface { emission: Vec3::ONE, ..Surface::default() };
+    let material = Material { front, ..Material::matt(Vec3::ZERO) };
+    let slat = Mesh(Arc::new(shapes::plane(0.05, 8.0, 1, 1)));
+    for number in 0..60 {
+        let place = Transform::from_xyz(0.13 * f64::from(number) - 3.9, 0.0, 0.0);
+        world.spawn((Name::new("slat"), slat.clone(), material.clone(), place));
+    }
+    let lamp = Transform::from_xyz(0.0, 3.0, 0.0);
+    world.spawn((Name::new("lamp"), Light::point(Vec3::splat(0.01)), lamp));
+    seen_from_above(&mut world);
+    world
+}
+
+#[test]
+fn samples_are_taken_where_edges_want_them() {
+    let (chosen, tuned) = cheapest_within(0.05, glowing_slats());
+    assert!(chosen.multisample, "{:?}", tuned.study.findings);
+    let one = error_of(&tuned, |settings| !settings.multisample && settings.shading == Shading::Phong);
+    assert!(one > 0.05, "without them it is off by {one}");
+}
+
+/// Lamps without an end: some of this brightness over the floor that is seen, and many faint ones far beside it.
+fn lamps_afar((near, color): (u32, f32), far: u32) -> World {
+    let mut world = World::new();
+    // Of few vertices, so that only fragments are right about the light.
+    floor(&mut world, 1);
+    let lamp = |color: f32| Light { radius: 0.0, ..Light::point(Vec3::splat(color)) };
+    for number in 0..near {
+        let x = 0.5 * f64::from(number) - 0.25 * f64::from(near);
+        world.spawn((Name::new("near lamp"), lamp(color), Transform::from_xyz(x, 5.0, 0.0)));
+    }
+    for number in 0..far {
+        let around = f64::from(number);
+        let place = Transform::from_xyz(60.0 * around.cos(), 4.0, 60.0 * around.sin());
+        world.spawn((Name::new("far lamp"), lamp(0.05), place));
+    }
+    seen_from_above(&mut world);
+    world
+}
+
+#[test]
+fn lamps_end_where_they_bring_nothing_and_go_on_where_they_do() {
+    // 120 lamps of 0.05 / 60² each: together a hundredth of what one lamp brings.
+    let (chosen, tuned) = cheapest_within(0.05, lamps_afar((1, 4.0), 120));
+    assert!(chosen.light_threshold > 0.0, "{:?}", tuned.study.findings);
+    // Lamps that bring 0.4 % of white each, and all of the light between them: wherever they end, it shows.
+    let (chosen, tuned) = cheapest_within(0.05, lamps_afar((20, 0.1), 0));
+    assert_eq!(chosen.light_threshold, 0.0, "{:?}", tuned.study.findings);
+    assert!(error_of(&tuned, |settings| settings.light_threshold > 0.0) > 0.05);
+}
+
+/// A block under a spotlight whose shadow falls into the picture, or beside it.
+fn block_in_the_light(beside: f64, radius: f32) -> World {
+    let mut world = World::new();
+    floor(&mut world, 1);
+    let block = Mesh(Arc::new(shapes::cuboid(Vec3::new(2.2, 0.4, 1.4), 1)));
+    world.spawn((
+        Name::new("block"),
+        block,
+        Material::matt(Vec3::splat(0.4)),
+        Transform::from_xyz(beside, 1.0, 0.0),
+    ));
+    let cone = SpotCone::Smooth { inner: 1.0, outer: 1.1 };
+    let lamp = Light { shadow: true, radius, ..Light::spot(Vec3::splat(20.0), cone) };
+    let above =
+        Transform::from_xyz(beside + 1.0, 5.0, 1.0).looking_at(DVec3::new(0.6 * beside, 0.0, 0.0), DVec3::Z);
+    world.spawn((Name::new("lamp"), lamp, above));
+    seen_from_above(&mut world);
+    world
+}
+
+#[test]
+fn shadows_go_where_nobody_sees_them_and_lose_what_they_do_not_need() {
+    let (chosen, tuned) = cheapest_within(0.01, block_in_the_light(9.0, 0.3));
+    assert!(!chosen.shadows, "{:?}", tuned.study.findings);
+    // A lamp of a millimetre: looking for its penumbra is in vain.
+    let (chosen, tuned) = cheapest_within(0.08, block_in_the_light(0.0, 0.001));
+    assert!(chosen.shadows && chosen.shadow_filter != ShadowFilter::Soft, "{:?}", tuned.study.findings);
+    assert!(error_of(&tuned, |settings| !settings.shadows) > 0.08);
+    // A wide one: without its penumbra the picture is wrong.
+    let (chosen, tuned) = cheapest_within(0.02, block_in_the_light(0.0, 0.3));
+    assert!(chosen.shadows && chosen.shadow_filter == ShadowFilter::Soft, "{:?}", tuned.study.findings);
+}
