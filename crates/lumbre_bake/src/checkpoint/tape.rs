@@ -214,7 +214,7 @@ impl OpenTape {
         }
         let (at, seconds, values): (Place, f64, Vec<T>) = record::read(&content).ok_or(OTHER)?;
         let fits = at == place && values.len() <= place.of - place.start;
-        if !fits || !(seconds.is_finite() && seconds >= 0.0) {
+        if !(fits && seconds.is_finite() && seconds >= 0.0) {
             return Err(OTHER);
         }
         self.chain = chain;

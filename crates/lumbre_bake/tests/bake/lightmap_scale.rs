@@ -19,7 +19,7 @@ fn bake(density: Density, scale: f64) -> BakedScene {
     let objects = vec![floor("plain", -1.5, 1.0), floor("scaled", 1.5, scale)];
     let scene = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() };
     let options = BakeOptions { density, quality: Quality::Draft, ..BakeOptions::default() };
-    Bake::new(&options).run_scene(scene).unwrap()
+    Bake::new(&options).run_scene(scene).expect("the scene bakes")
 }
 
 /// Texels along one metre of an object, by the area of its coordinates.

@@ -58,7 +58,7 @@ fn scene(reflectance: f32, mode: BakeMode) -> StaticScene {
 }
 
 fn bake(scene: StaticScene, options: BakeOptions) -> BakedScene {
-    Bake::new(&options).run_scene(scene).unwrap()
+    Bake::new(&options).run_scene(scene).expect("the scene bakes")
 }
 
 #[test]
