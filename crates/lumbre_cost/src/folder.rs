@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use image::{Rgb32FImage, RgbImage};
 use lumbre_trace::heat_color;
+use rayon::prelude::*;
 
 use crate::measured::Measured;
 use crate::page::{Images, page};
@@ -87,23 +87,7 @@ impl Folder {
             Ok(())
         };
         // Compressing them takes longer than anything else here.
-        let next = Mutex::new(measured.pictures.iter());
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let work = || -> Result<(), CostError> {
-            loop {
-                let taken = next.lock().ok().and_then(|mut next| next.next());
-                let Some((name, picture)) = taken else { return Ok(()) };
-                write(name, picture)?;
-            }
-        };
-        std::thread::scope(|scope| {
-            let workers: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
-            let own = work();
-            let ended = workers
-                .into_iter()
-                .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            ended.fold(own, Result::and)
-        })
+        measured.pictures.par_iter().try_for_each(|(name, picture)| write(name, picture))
     }
 
     /// Writes the report, its table and its page.

@@ -1,89 +1,47 @@
-//! How samples of a finished bake are written: without the weights, which follow from the rest once they are settled. Not what they are.
+//! How samples of a finished bake are written: without the weights, which follow from the rest once they are settled, and without the rays. Not what they are.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::texels::gather::{Gathered, REPLICATES, Weights};
 
-/// Of serde's `with`.
+/// Of serde's `with`: the fields that are kept, in the order in which [`deserialize`] takes them.
 pub(super) fn serialize<S: Serializer>(own: &Gathered, serializer: S) -> Result<S::Ok, S::Error> {
-    Settled::from(own).serialize(serializer)
+    // Whoever adds a field decides here whether it is kept.
+    let Gathered {
+        sums,
+        weights: _,
+        patch_errors,
+        texel_variances,
+        texel_reads,
+        checks,
+        differences,
+        squared_differences,
+        inverse_distances,
+        samples,
+        rays: _,
+    } = own;
+    let rays = (patch_errors, texel_variances, texel_reads, inverse_distances);
+    (sums, samples, rays, (checks, differences, squared_differences)).serialize(serializer)
 }
 
 /// Of serde's `with`.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Gathered, D::Error> {
-    Settled::deserialize(deserializer).map(Gathered::from)
-}
-
-/// What a texel has gathered, weights and rays apart.
-#[derive(Serialize, Deserialize)]
-struct Settled {
-    sums: [Vec3; REPLICATES],
-    patch_errors: Vec2,
-    texel_variances: f32,
-    texel_reads: u32,
-    checks: u32,
-    differences: Vec3,
-    squared_differences: f32,
-    inverse_distances: f32,
-    samples: u32,
-}
-
-impl From<&Gathered> for Settled {
-    fn from(own: &Gathered) -> Self {
-        let Gathered {
-            sums,
-            weights: _,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-            rays: _,
-        } = *own;
-        Self {
-            sums,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-        }
-    }
-}
-
-impl From<Settled> for Gathered {
-    fn from(own: Settled) -> Self {
-        let Settled {
-            sums,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-        } = own;
-        let weights = sums.map(|sum| Weights::of_equal(sum, samples));
-        Self {
-            sums,
-            weights,
-            patch_errors,
-            texel_variances,
-            texel_reads,
-            checks,
-            differences,
-            squared_differences,
-            inverse_distances,
-            samples,
-            rays: 0,
-        }
-    }
+    let (sums, samples, rays, of_checks) = Deserialize::deserialize(deserializer)?;
+    let (patch_errors, texel_variances, texel_reads, inverse_distances) = rays;
+    let (checks, differences, squared_differences) = of_checks;
+    let weights = <[Vec3; REPLICATES]>::map(sums, |sum| Weights::of_equal(sum, samples));
+    Ok(Gathered {
+        sums,
+        weights,
+        patch_errors,
+        texel_variances,
+        texel_reads,
+        checks,
+        differences,
+        squared_differences,
+        inverse_distances,
+        samples,
+        rays: 0,
+    })
 }
