@@ -82,7 +82,12 @@ fn divisions(
     }
     let mut found = Vec::new();
     for segment in contacts(scene, tree, index as u32, &frame, side as f32) {
+        let Some(segment) = inside([p, q, r], segment) else { continue };
         let [start, end] = segment.map(|point| a + to_texels * (point - p));
+        // What touches with a corner only.
+        if start.distance(end) < MARGIN {
+            continue;
+        }
         let Some((from, to)) =
             within(start, end, DVec2::ZERO, DVec2::new(map.width.into(), map.height.into()))
         else {
@@ -108,6 +113,26 @@ fn divisions(
         }
     }
     found
+}
+
+/// The part of a line inside of a triangle: beyond its edges the plane is not what anything stands on.
+fn inside([p, q, r]: [DVec2; 3], [start, end]: [DVec2; 2]) -> Option<[DVec2; 2]> {
+    let turn = (q - p).perp_dot(r - p).signum();
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for (corner, next) in [(p, q), (q, r), (r, p)] {
+        let height = |point: DVec2| turn * (next - corner).perp_dot(point - corner);
+        let (s, e) = (height(start), height(end));
+        if s < 0.0 && e < 0.0 {
+            return None;
+        }
+        if s < 0.0 {
+            from = from.max(s / (s - e));
+        }
+        if e < 0.0 {
+            to = to.min(s / (s - e));
+        }
+    }
+    (from < to).then(|| [start.lerp(end, from), start.lerp(end, to)])
 }
 
 /// The part of a line's parameter, in [0, 1], within a box.
@@ -143,4 +168,67 @@ fn is_divided(texel: &Texel, [from, to]: [DVec2; 2]) -> bool {
         Footprint::Points(points) => points.iter().any(|point| beyond(point.offset.as_dvec2(), sign)),
         Footprint::Hidden => false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DAffine3, DVec3, Vec3};
+    use lumbre_mesh::{TriangleMesh, shapes};
+
+    use super::*;
+    use crate::cancel_token::CancelToken;
+    use crate::scene::{PlacedPrimitive, SceneObject, StaticScene, lay_out};
+    use crate::{BakeOptions, Density};
+
+    /// How many texels are crossed in a scene of meshes at their places.
+    fn crossed_texels(meshes: Vec<(TriangleMesh, DVec3)>) -> usize {
+        let object = |(mesh, place): (TriangleMesh, DVec3)| {
+            let transform = DAffine3::from_translation(place);
+            let mesh = Arc::new(mesh);
+            SceneObject::new("", vec![PlacedPrimitive { mesh, transform, ..PlacedPrimitive::default() }])
+        };
+        let objects = meshes.into_iter().map(object).collect();
+        let input = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() }.checked().unwrap();
+        let options = BakeOptions { density: Density::TexelsPerMeter(8.0), ..BakeOptions::default() };
+        let (space, stop) = (input.space(), CancelToken::default());
+        let layout = lay_out(&input.objects, space, &options, &mut Vec::new()).unwrap();
+        let scene = BakeScene::new(&input.objects, &layout, space, &stop, &mut Vec::new()).unwrap();
+        let mut texels: Vec<MapTexel> =
+            crossed(&scene, &layout).into_iter().map(|(texel, _)| texel).collect();
+        texels.dedup();
+        texels.len()
+    }
+
+    #[test]
+    fn folds_of_one_surface_cross_nothing_and_what_stands_on_it_does() {
+        // A room seen from inside: every corner of it is an edge that two of its triangles share.
+        let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 4);
+        room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
+        room.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        assert_eq!(crossed_texels(vec![(room.clone(), DVec3::ZERO)]), 0);
+        // A block of 1 m stands on its floor: 4 m of outline there and 4 m along the feet of its sides cross some 8 texels a metre.
+        let block = shapes::cuboid(Vec3::ONE, 1);
+        let standing = crossed_texels(vec![(room, DVec3::ZERO), (block, DVec3::new(0.3, -1.0, 0.4))]);
+        assert!((56..90).contains(&standing), "{standing}");
+    }
+
+    #[test]
+    fn a_line_ends_where_its_triangle_does() {
+        let corners = [DVec2::ZERO, DVec2::new(4.0, 0.0), DVec2::new(0.0, 4.0)];
+        let backwards = [corners[0], corners[2], corners[1]];
+        let line = |a: [f64; 2], b: [f64; 2]| [DVec2::from(a), DVec2::from(b)];
+        for corners in [corners, backwards] {
+            let crossing = inside(corners, line([-1.0, 1.0], [9.0, 1.0])).expect("it crosses");
+            assert!(crossing[0].distance(DVec2::new(0.0, 1.0)) < 1e-12, "{crossing:?}");
+            assert!(crossing[1].distance(DVec2::new(3.0, 1.0)) < 1e-12, "{crossing:?}");
+            let within = line([0.5, 0.5], [1.0, 2.0]);
+            assert_eq!(inside(corners, within), Some(within));
+            // Beside an edge, past a corner, and along the prolonged edge.
+            assert_eq!(inside(corners, line([1.0, -0.1], [2.0, -0.1])), None);
+            assert_eq!(inside(corners, line([3.9, 2.0], [2.0, 3.9])), None);
+            assert_eq!(inside(corners, line([5.0, 0.0], [6.0, 0.0])), None);
+        }
+    }
 }

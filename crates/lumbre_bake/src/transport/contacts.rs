@@ -43,7 +43,8 @@ const LEVEL: f64 = 1.0 / 64.0;
 /// Cosine between the normals of surfaces above which one lies on the other instead of standing on it.
 const LYING: f64 = 0.98;
 
-/// The segments in which others meet a triangle, in its plane's frame; what is `side` wide counts as a patch.
+/// The segments in which others meet a triangle's plane near it, in that plane's frame; what is `side` wide counts as a patch. A mesh's next
+/// triangle, beyond an edge that both share, meets it nowhere else.
 pub(crate) fn contacts(
     scene: &BakeScene,
     tree: &BoxTree,
@@ -66,7 +67,10 @@ pub(crate) fn contacts(
         let corners = other_triangle.corners.map(|corner| corner.as_dvec3());
         let cosine = f64::from(other_triangle.normal.dot(triangle.normal));
         if cosine.abs() <= LYING {
-            found.extend(contact(frame, &corners, reach, triangle.two_sided));
+            // What rises from one of its edges stands beside it and not on it.
+            if common_corners(&triangle.corners, &other_triangle.corners) < 2 {
+                found.extend(contact(frame, &corners, reach, triangle.two_sided));
+            }
         } else if lies_on(frame, &corners, reach, cosine, triangle.two_sided) {
             for i in 0..3 {
                 let (a, b) = (i, (i + 1) % 3);
@@ -83,6 +87,11 @@ pub(crate) fn contacts(
     outlines.sort_unstable_by_key(|(ends, _)| *ends);
     found.extend(outlines.into_iter().map(|(_, line)| line));
     found
+}
+
+/// How many corners of a triangle are in one place with one of another's, bit by bit.
+fn common_corners(own: &[Vec3; 3], other: &[Vec3; 3]) -> usize {
+    own.iter().filter(|corner| other.contains(corner)).count()
 }
 
 /// Whether a triangle about parallel to a plane lies on it, and is no part of the same surface.
