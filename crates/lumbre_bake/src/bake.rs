@@ -20,6 +20,7 @@ use crate::scene::{StaticScene, density_of, from_world};
 use crate::texels::covered_texels::CoveredTexels;
 use crate::texels::direct_light::direct_light;
 use crate::texels::fill::fill;
+use crate::texels::patch_light::patch_light;
 use crate::texels::radiance_cache::RadianceCache;
 use crate::texels::resolution_error::{compare, dense_points};
 use crate::texels::rounds::{self, Bounced};
@@ -27,6 +28,7 @@ use crate::texels::seams::{Maps, close_seams};
 use crate::texels::separate_light::separate;
 use crate::texels::worst_places::worst_places;
 use crate::transport::exchange::Exchange;
+use crate::transport::patches::Patches;
 use crate::{
     BakeError, BakeOptions, BakeReport, CancelToken, Checkpoint, Ended, ErrorAtTime, Progress, preparing,
 };
@@ -252,7 +254,8 @@ fn run(
     let known = changes.as_ref().map_or(&[][..], |changes| &changes.known_direct);
     let direct = direct_light(&sources, &texels, known, options, watch, report)?;
 
-    let exchange = Exchange::new(&scene, &sources, &for_patches, resolution, watch, report)?;
+    let of_patches = |patches: &Patches| patch_light(&scene, &texels, &direct, patches);
+    let exchange = Exchange::new(&scene, &sources, &for_patches, resolution, of_patches, watch, report)?;
     let (exchange, kept) = match (exchange, &changes) {
         (None, _) => (None, None),
         (Some((exchange, _)), None) => (Some(exchange), None),

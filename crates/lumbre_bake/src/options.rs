@@ -164,7 +164,7 @@ impl Quality {
                 form_factor_rays: 600_000,
                 patch_texels: 6.0,
                 direct: [4, 16, 16],
-                shared: [16, 64],
+                shared: [8, 64],
                 gather: [16, 16],
                 mean: 16,
             },
@@ -173,7 +173,7 @@ impl Quality {
                 form_factor_rays: 1_500_000,
                 patch_texels: 4.0,
                 direct: [8, 64, 1024],
-                shared: [16, 1024],
+                shared: [8, 1024],
                 gather: [16, 8192],
                 mean: 64,
             },
@@ -213,7 +213,6 @@ impl BakeOptions {
             _ => samples,
         };
         effort.gather[0] = fewer(effort.gather[0]);
-        effort.shared[0] = fewer(effort.shared[0]);
         if self.error >= COARSE {
             effort.patches = effort.patches.min(4_000);
             effort.form_factor_rays = effort.form_factor_rays.min(500_000);

@@ -21,6 +21,11 @@ const INSIDE: f32 = 0.25;
 /// So many times more samples where the first ones told nothing.
 const AGAIN: u32 = 16;
 
+/// Of the samples to the emitters, one in so many tells whether the others are worth casting: where its standard error is more than this share of
+/// the side's light.
+const FEWER: u32 = 4;
+const ENOUGH: f32 = 0.02;
+
 /// What lights probes.
 pub(crate) struct ProbeLight<'a> {
     pub scene: &'a BakeScene,
@@ -65,23 +70,28 @@ impl ProbeLight<'_> {
             let squares: Vec3 = runs.iter().map(|run| (run[side] - *light).powf(2.0)).sum();
             let of_mean = squares / (count * (count - 1.0));
             let sequence = Sequence::new(seed, Stream::ProbeSide(side as u32), index);
-            let direct = self.shining(position, normal, sequence);
+            let few = self.shining(position, normal, sequence, self.effort.shadow / FEWER);
+            let uncertain = few.variance.sqrt() / PI > ENOUGH * (*light + few.baked / PI).element_sum() / 3.0;
+            let direct = match uncertain {
+                true => self.shining(position, normal, sequence, self.effort.shadow),
+                false => Direct { rays: 0, ..few },
+            };
             *light += direct.baked / PI;
-            seen.rays += u64::from(direct.rays);
+            seen.rays += u64::from(few.rays + direct.rays);
             let variance = of_mean.element_sum() / 3.0 + direct.variance / (PI * PI);
             seen.variance += variance / SIDES.len() as f32;
         }
         seen
     }
 
-    /// Irradiance by the emissive faces.
-    fn shining(&self, position: Vec3, normal: Vec3, sequence: Sequence) -> Direct {
+    /// Irradiance by the emissive faces, by so many samples.
+    fn shining(&self, position: Vec3, normal: Vec3, sequence: Sequence, samples: u32) -> Direct {
         let receiver = Receiver { position, origin: position, geometric_normal: normal, normal };
         let point = |_: f32, _: f32| Some(receiver);
-        let direct = self.emitters.irradiance(sequence, self.effort.shadow, &point);
+        let direct = self.emitters.irradiance(sequence, samples, &point);
         // Where every sample fell below the side's horizon, nothing is known of what shines just above it.
         let few = direct.rays == 0 && !self.emitters.is_empty();
-        if few { self.emitters.irradiance(sequence, AGAIN * self.effort.shadow, &point) } else { direct }
+        if few { self.emitters.irradiance(sequence, AGAIN * samples, &point) } else { direct }
     }
 
     /// Adds E/π by bounces to each side, and counts the rays that met a back.

@@ -15,17 +15,17 @@ pub(crate) fn sample(texture: &TextureReference, uv: Vec2, srgb: bool) -> Vec4 {
     let at = uv * size - 0.5;
     let low = at.floor();
     let fraction = at - low;
-    let read = |dx: f32, dy: f32| {
-        let x = wrap(low.x + dx, image.width, texture.sampler.wrap_u);
-        let y = wrap(low.y + dy, image.height, texture.sampler.wrap_v);
+    let [left, right] = [0.0, 1.0].map(|dx| wrap(low.x + dx, image.width, texture.sampler.wrap_u));
+    let [upper, lower] = [0.0, 1.0].map(|dy| wrap(low.y + dy, image.height, texture.sampler.wrap_v));
+    let read = |x: usize, y: usize| {
         let first = 4 * (y * image.width as usize + x);
         let Some(&[r, g, b, a]) = image.rgba.get(first..first + 4) else { return Vec4::ONE };
         let channel =
             |value: u8| if srgb { decode_srgb_byte(value) as f32 } else { f32::from(value) / 255.0 };
         Vec4::new(channel(r), channel(g), channel(b), f32::from(a) / 255.0)
     };
-    let top = read(0.0, 0.0).lerp(read(1.0, 0.0), fraction.x);
-    let bottom = read(0.0, 1.0).lerp(read(1.0, 1.0), fraction.x);
+    let top = read(left, upper).lerp(read(right, upper), fraction.x);
+    let bottom = read(left, lower).lerp(read(right, lower), fraction.x);
     top.lerp(bottom, fraction.y)
 }
 

@@ -20,9 +20,9 @@ pub(crate) mod lanes;
 pub(crate) mod late;
 mod light_cuts;
 mod light_visibility;
-
 pub(crate) mod local_light;
 pub(crate) mod neighbours;
+pub(crate) mod patch_light;
 pub(crate) mod plane;
 pub(crate) mod radiance_cache;
 pub(crate) mod resolution_error;

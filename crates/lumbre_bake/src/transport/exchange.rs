@@ -53,7 +53,7 @@ const SHADOW_RAYS: u32 = 8;
 
 impl Exchange {
     /// With the form factors that it came from, which a change since a former bake is estimated by. `None` where nothing bounces; the report then
-    /// says why.
+    /// says why. `direct_light` tells the direct irradiance of patches by two halves of what is known of it; where it tells none, rays do.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -62,6 +62,7 @@ impl Exchange {
         sources: &Sources<'_>,
         options: &BakeOptions,
         resolution: Resolution,
+        direct_light: impl FnOnce(&Patches) -> Vec<Option<[Vec3; 2]>>,
         watch: &mut Watch<'_>,
         report: &mut BakeReport,
     ) -> Result<Option<(Self, FormFactors)>, BakeError> {
@@ -89,9 +90,14 @@ impl Exchange {
         report.energy_lost = factors.energy_lost;
 
         watch.stage(Stage::Radiosity, report)?;
+        let known = watch.during(0.1, || direct_light(&patches))?;
         let mut direct_halves = [Vec::new(), Vec::new()];
         for (half, of_half) in (0..).zip(&mut direct_halves) {
             let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |index| {
+                match known.get(index) {
+                    Some(Some(halves)) if factors.open[index] > 0.0 => return (halves[half as usize], 0),
+                    _ => {}
+                }
                 let sequence = Sequence::new(options.seed, Stream::PatchLight(half), index as u32);
                 patch_direct(scene, sources, &patches, index, factors.open[index], sequence)
             })?;

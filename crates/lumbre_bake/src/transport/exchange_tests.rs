@@ -10,6 +10,7 @@ use super::direct::Sources;
 use super::emitters::emitters;
 use super::exchange::{Exchange, Resolution};
 use super::method_study::form_factor_errors;
+use super::patches::Patches;
 use crate::cancel_token::CancelToken;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
@@ -49,7 +50,9 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
     let mut report = BakeReport::default();
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let resolution = Resolution { patch_side: (2.0 * area / 2000.0).sqrt(), form_factor_rays: 200_000 };
-    let exchange = Exchange::new(&scene, &sources, &options, resolution, &mut watch, &mut report).unwrap();
+    let by_rays = |_: &Patches| Vec::new();
+    let exchange =
+        Exchange::new(&scene, &sources, &options, resolution, by_rays, &mut watch, &mut report).unwrap();
     (exchange.expect("light bounces").0.indirect, report)
 }
 

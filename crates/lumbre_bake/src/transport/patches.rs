@@ -63,7 +63,8 @@ pub(crate) struct Patches {
     pub warnings: Vec<String>,
 }
 
-/// Points along a patch's edge at which textures are averaged: two for each texel, so that none is left out, but not more than so many.
+/// Points along a patch's edge at which textures are averaged: one for each texel, so that bilinear filtering leaves none out, but not more than
+/// so many.
 const TEXTURE_POINTS: u32 = 64;
 
 impl Patches {
@@ -364,7 +365,7 @@ fn mean_reflectance(scene: &BakeScene, index: usize, side: Side, corners: &Corne
     let triangle = &scene.triangles[index];
     let surface = &scene.surfaces[triangle.surface as usize];
     let texels = surface.reflectance_texels(triangle.vertices, *corners);
-    let points = if surface.varies() { ((2.0 * texels).ceil() as u32).clamp(2, TEXTURE_POINTS) } else { 1 };
+    let points = if surface.varies() { (texels.ceil() as u32).clamp(2, TEXTURE_POINTS) } else { 1 };
     let mean = mean_of_points(points, |(u, v)| {
         let (u, v) = point_between(corners, u, v);
         surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
