@@ -8,6 +8,7 @@ use std::f32::consts::PI;
 use glam::{DVec3, Mat3, Vec3};
 
 use super::direct::Receiver;
+use super::emitter_bounds::EmitterBounds;
 use super::emitters::Emitter;
 use super::polygon::point_to_triangle;
 
@@ -16,6 +17,8 @@ use super::polygon::point_to_triangle;
 pub(crate) struct EmitterTree {
     /// Children after their parents; the first is the root.
     nodes: Vec<Node>,
+    /// Of each node, apart from what samples do not ask for.
+    bounds: Vec<EmitterBounds>,
     /// The emitters, those of each part side by side.
     order: Vec<u32>,
 }
@@ -23,16 +26,8 @@ pub(crate) struct EmitterTree {
 /// Some emitters.
 #[derive(Clone, Debug)]
 struct Node {
-    /// By power.
-    center: Vec3,
-    /// Around the centre, of all corners.
-    radius: f32,
-    /// Unit, or zero: by power, where it shines to; no normal differs from it by more than `spread`, a chord.
-    axis: Vec3,
-    spread: f32,
-    /// Σ radiance · area, the sum of its channels, and Σ area.
+    /// Σ radiance · area, and Σ area.
     light: Vec3,
-    power: f32,
     area: f32,
     /// Σ radiance · area · normal: a column for each channel.
     moments: Mat3,
@@ -66,13 +61,12 @@ const NARROW: f32 = 0.02;
 /// Parts that are opened at most to tell how much of what a receiver sees shines.
 const MOST_OPENED: usize = 64;
 
-/// Least share of a cosine in a weight, so that none is 0 where light may arrive.
-pub(super) const LEAST_COSINE: f32 = 0.02;
-
 impl EmitterTree {
     /// Over all emitters; `lamps[i]` numbers the lamp of emitter i.
     pub fn new(emitters: &[Emitter], lamps: &[u32]) -> Self {
-        let mut tree = Self { nodes: Vec::with_capacity(2 * emitters.len()), order: Vec::new() };
+        let room = 2 * emitters.len();
+        let (nodes, bounds) = (Vec::with_capacity(room), Vec::with_capacity(room));
+        let mut tree = Self { nodes, bounds, order: Vec::new() };
         if emitters.is_empty() {
             return tree;
         }
@@ -95,8 +89,7 @@ impl EmitterTree {
         let mut all: Vec<u32> =
             lamps.iter().flat_map(|&lamp| members[lamp as usize].iter().copied()).collect();
         all.sort_unstable();
-        let index = self.nodes.len() as u32;
-        self.nodes.push(Node::over(emitters, &all, lamps.len() as u32, self.order.len() as u32));
+        let index = self.push(emitters, &all, lamps.len() as u32);
         let place = |lamp: &u32| middle(emitters, &members[*lamp as usize]);
         let half = split(lamps, place);
         let (near, far) = lamps.split_at_mut(half);
@@ -107,8 +100,7 @@ impl EmitterTree {
 
     /// A node over some emitters of one lamp.
     fn add(&mut self, emitters: &[Emitter], some: &mut [u32]) -> u32 {
-        let index = self.nodes.len() as u32;
-        self.nodes.push(Node::over(emitters, some, 1, self.order.len() as u32));
+        let index = self.push(emitters, some, 1);
         if let [emitter] = *some {
             self.order.push(emitter);
         } else {
@@ -118,6 +110,20 @@ impl EmitterTree {
             self.nodes[index as usize].kind = Kind::Inner(children);
         }
         index
+    }
+
+    /// Adds a node without children.
+    fn push(&mut self, emitters: &[Emitter], some: &[u32], lamps: u32) -> u32 {
+        let index = self.nodes.len() as u32;
+        let (node, bounds) = over(emitters, some, lamps, self.order.len() as u32);
+        self.nodes.push(node);
+        self.bounds.push(bounds);
+        index
+    }
+
+    /// Where the emitters of a part are, where they shine to and how much.
+    pub fn bounds(&self, part: u32) -> EmitterBounds {
+        self.bounds[part as usize]
     }
 
     /// The part that holds all emitters; none where there are none.
@@ -145,9 +151,9 @@ impl EmitterTree {
 
     /// The sine under which a part's ball, larger by `reach`, appears from a receiver, at most 1.
     pub fn sine(&self, part: u32, receiver: &Receiver, reach: f32) -> f32 {
-        let node = &self.nodes[part as usize];
-        let distance = node.center.distance(receiver.position);
-        let size = node.radius + reach;
+        let bounds = &self.bounds[part as usize];
+        let distance = bounds.center.distance(receiver.position);
+        let size = bounds.radius + reach;
         if size < distance { size / distance } else { 1.0 }
     }
 
@@ -164,12 +170,12 @@ impl EmitterTree {
                     open.extend(halves);
                 }
                 None => {
-                    let node = &self.nodes[part as usize];
-                    let direction = (node.center - receiver.position).normalize_or_zero();
+                    let bounds = &self.bounds[part as usize];
+                    let direction = (bounds.center - receiver.position).normalize_or_zero();
                     let receives = (direction.dot(receiver.normal) + sine).clamp(0.0, 1.0);
-                    let emits = (node.spread - direction.dot(node.axis)).clamp(0.0, 1.0);
-                    let squared = (node.center - receiver.position).length_squared();
-                    let of_area = node.area / (PI * squared.max(f32::MIN_POSITIVE));
+                    let emits = (bounds.spread - direction.dot(bounds.axis)).clamp(0.0, 1.0);
+                    let squared = (bounds.center - receiver.position).length_squared();
+                    let of_area = self.nodes[part as usize].area / (PI * squared.max(f32::MIN_POSITIVE));
                     sum += receives * emits * of_area.min(sine * sine);
                 }
             }
@@ -210,7 +216,7 @@ impl EmitterTree {
         let mut open = Vec::with_capacity(64);
         open.push(part);
         while let Some(index) = open.pop() {
-            let node = &self.nodes[index as usize];
+            let (node, bounds) = (&self.nodes[index as usize], &self.bounds[index as usize]);
             let children = match node.kind {
                 Kind::Leaf(emitter) => {
                     let emitter = &emitters[emitter as usize];
@@ -220,15 +226,16 @@ impl EmitterTree {
                 }
                 Kind::Inner(children) => children,
             };
-            let towards = node.center - receiver.position;
+            let towards = bounds.center - receiver.position;
             let height = towards.dot(receiver.normal);
-            if height <= -node.radius {
+            if height <= -bounds.radius {
                 continue;
             }
             let distance = towards.length();
-            if node.radius < opening * distance && height > node.radius {
+            if bounds.radius < opening * distance && height > bounds.radius {
                 let direction = towards / distance;
-                let (faces, may_differ) = (-direction.dot(node.axis), node.spread + node.radius / distance);
+                let (faces, may_differ) =
+                    (-direction.dot(bounds.axis), bounds.spread + bounds.radius / distance);
                 if faces + may_differ <= 0.0 {
                     continue;
                 }
@@ -238,11 +245,11 @@ impl EmitterTree {
                     sum += moment.as_dvec3() * f64::from(per_power);
                     continue;
                 }
-                let most = node.power * per_power * (faces + may_differ).min(1.0);
+                let most = bounds.power * per_power * (faces + may_differ).min(1.0);
                 if f64::from(most) < f64::from(NEGLIGIBLE) * sum.element_sum() {
                     // The mean of max(0, cosine) over cosines spread evenly.
-                    let mean = match node.spread > faces.abs() {
-                        true => (faces + node.spread).powi(2) / (4.0 * node.spread),
+                    let mean = match bounds.spread > faces.abs() {
+                        true => (faces + bounds.spread).powi(2) / (4.0 * bounds.spread),
                         false => faces.max(0.0),
                     };
                     sum += (node.light * (per_power * mean)).as_dvec3();
@@ -251,7 +258,7 @@ impl EmitterTree {
             }
             // The brighter first: it tells what is negligible.
             let [a, b] = children.map(|child| {
-                let child = &self.nodes[child as usize];
+                let child = &self.bounds[child as usize];
                 child.power * (child.spread * distance + (receiver.position - child.center).dot(child.axis))
             });
             let [near, far] = children;
@@ -279,50 +286,41 @@ impl EmitterTree {
 
     /// About what a part brings receivers within `reach` of one (irradiance, sum of the channels); positive.
     pub fn weight(&self, index: u32, receiver: &Receiver, reach: f32) -> f32 {
-        let node = &self.nodes[index as usize];
-        let towards = node.center - receiver.position;
-        let size = node.radius + reach;
-        let squared = towards.length_squared() + size * size;
-        // Directions are a little short where the part is near: all of it counts there anyway.
-        let inverse = 1.0 / squared.sqrt();
-        let subtends = size * inverse;
-        let receives = (towards.dot(receiver.normal) * inverse + subtends).clamp(LEAST_COSINE, 1.0);
-        let emits = (node.spread + subtends - towards.dot(node.axis) * inverse).clamp(LEAST_COSINE, 1.0);
-        node.power * receives * emits * inverse * inverse
+        self.bounds[index as usize].weight(receiver, reach)
     }
 }
 
-impl Node {
-    fn over(emitters: &[Emitter], some: &[u32], lamps: u32, first: u32) -> Self {
-        let of = |&index: &u32| &emitters[index as usize];
-        let (mut power, mut area, mut sum) = (0.0f64, 0.0f64, DVec3::ZERO);
-        let (mut center, mut axis) = (DVec3::ZERO, DVec3::ZERO);
-        let mut moments = [DVec3::ZERO; 3];
-        for emitter in some.iter().map(of) {
-            let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
-            let own = light.element_sum();
-            power += own;
-            area += f64::from(emitter.area);
-            sum += light;
-            for (channel, moment) in moments.iter_mut().enumerate() {
-                *moment += light[channel] * emitter.normal.as_dvec3();
-            }
-            center += own * emitter.middle().as_dvec3();
-            axis += own * emitter.normal.as_dvec3();
+/// What a node holds, without children.
+fn over(emitters: &[Emitter], some: &[u32], lamps: u32, first: u32) -> (Node, EmitterBounds) {
+    let of = |&index: &u32| &emitters[index as usize];
+    let (mut power, mut area, mut sum) = (0.0f64, 0.0f64, DVec3::ZERO);
+    let (mut center, mut axis) = (DVec3::ZERO, DVec3::ZERO);
+    let mut moments = [DVec3::ZERO; 3];
+    for emitter in some.iter().map(of) {
+        let light = emitter.radiance.as_dvec3() * f64::from(emitter.area);
+        let own = light.element_sum();
+        power += own;
+        area += f64::from(emitter.area);
+        sum += light;
+        for (channel, moment) in moments.iter_mut().enumerate() {
+            *moment += light[channel] * emitter.normal.as_dvec3();
         }
-        let middle = middle(emitters, some).as_dvec3();
-        let center = if power > 0.0 { center / power } else { middle }.as_vec3();
-        let axis = axis.normalize_or_zero().as_vec3();
-        let corners = some.iter().map(of).flat_map(|emitter| emitter.corners);
-        let radius = corners.map(|corner| corner.distance(center)).fold(0.0, f32::max);
-        let spread = some.iter().map(of).map(|e| e.normal.distance(axis)).fold(0.0, f32::max);
-        let kind = Kind::Leaf(some.first().copied().unwrap_or(0));
-        let emitters = some.len() as u32;
-        let [red, green, blue] = moments.map(|moment| moment.as_vec3());
-        let moments = Mat3::from_cols(red, green, blue);
-        let (light, power, area) = (sum.as_vec3(), power as f32, area as f32);
-        Self { center, radius, axis, spread, light, power, area, moments, lamps, first, emitters, kind }
+        center += own * emitter.middle().as_dvec3();
+        axis += own * emitter.normal.as_dvec3();
     }
+    let middle = middle(emitters, some).as_dvec3();
+    let center = if power > 0.0 { center / power } else { middle }.as_vec3();
+    let axis = axis.normalize_or_zero().as_vec3();
+    let corners = some.iter().map(of).flat_map(|emitter| emitter.corners);
+    let radius = corners.map(|corner| corner.distance(center)).fold(0.0, f32::max);
+    let spread = some.iter().map(of).map(|e| e.normal.distance(axis)).fold(0.0, f32::max);
+    let kind = Kind::Leaf(some.first().copied().unwrap_or(0));
+    let emitters = some.len() as u32;
+    let [red, green, blue] = moments.map(|moment| moment.as_vec3());
+    let moments = Mat3::from_cols(red, green, blue);
+    let (light, power, area) = (sum.as_vec3(), power as f32, area as f32);
+    let bounds = EmitterBounds { center, radius, axis, spread, power };
+    (Node { light, area, moments, lamps, first, emitters, kind }, bounds)
 }
 
 /// Mean of the emitters' middles.

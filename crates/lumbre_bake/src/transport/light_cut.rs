@@ -6,6 +6,7 @@
 use std::collections::BinaryHeap;
 
 use super::direct::{Receiver, Sources};
+use super::emitter_bounds::BoundsLanes;
 
 /// How the sources are divided at a piece of surface: what is in none of the lists brings nothing there.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,6 +28,8 @@ pub(crate) struct Rest {
     branches: Vec<(Branch, f32)>,
     /// Whether some are so near that each receiver has probabilities of its own.
     near: bool,
+    /// Of those that are near, the first branches: the parts of the emissive surfaces.
+    bounds: BoundsLanes,
 }
 
 /// A part of one of the trees.
@@ -48,13 +51,12 @@ impl Sources<'_> {
     pub(super) fn pick_branch(&self, rest: &Rest, receiver: &Receiver, u: f32) -> Option<(Branch, f32, f32)> {
         let last = rest.branches.len().checked_sub(1)?;
         if rest.near {
-            let weight = |(branch, _): &(Branch, f32)| self.weight(*branch, receiver, 0.0);
             let mut weights = [0.0f32; MOST_NEAR_BRANCHES];
-            let mut sum = 0.0;
-            for (weight_of, branch) in weights.iter_mut().zip(&rest.branches) {
-                *weight_of = weight(branch);
-                sum += *weight_of;
+            rest.bounds.weights(receiver, &mut weights);
+            for (weight, (branch, _)) in weights.iter_mut().zip(&rest.branches).skip(rest.bounds.len()) {
+                *weight = self.weight(*branch, receiver, 0.0);
             }
+            let sum = weights[..rest.branches.len()].iter().sum::<f32>();
             let wanted = u * sum;
             let mut running = 0.0;
             for (weight, (branch, _)) in weights.iter().zip(&rest.branches) {
@@ -190,6 +192,13 @@ impl Sources<'_> {
             running += f64::from(part.weight);
             let end = if place == last { 1.0 } else { (running / sum) as f32 };
             cut.rest.branches.push((part.branch, end));
+        }
+        if cut.rest.near {
+            let bounds = |part: &Weighted| match part.branch {
+                Branch::Emitters(part) => Some(self.emitter_tree.bounds(part)),
+                Branch::Lights(_) => None,
+            };
+            cut.rest.bounds = BoundsLanes::new(&closed.iter().map_while(bounds).collect::<Vec<_>>());
         }
         cut
     }

@@ -8,7 +8,8 @@ use glam::{DVec3, Vec3};
 use lumbre_optics::LightKind;
 
 use super::direct::Receiver;
-use super::emitter_tree::{LEAST_COSINE, split};
+use super::emitter_bounds::LEAST_COSINE;
+use super::emitter_tree::split;
 use crate::scene::{Canonical, PlacedLight};
 
 /// Lights as a hierarchy.

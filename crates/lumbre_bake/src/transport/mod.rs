@@ -10,7 +10,8 @@ mod cosine_rays;
 pub(crate) mod cut_out;
 pub(crate) mod cuts;
 pub(crate) mod direct;
-pub(crate) mod emitter_tree;
+mod emitter_bounds;
+mod emitter_tree;
 pub(crate) mod emitters;
 pub(crate) mod exchange;
 #[cfg(test)]
