@@ -17,8 +17,9 @@ use super::polygon::point_to_triangle;
 pub(crate) struct EmitterTree {
     /// Children after their parents; the first is the root.
     nodes: Vec<Node>,
-    /// Of each node, apart from what samples do not ask for.
     bounds: Vec<EmitterBounds>,
+    /// Of each node what a sample asks on its way down, side by side: it is one read from memory for each step.
+    steps: Vec<Step>,
     /// The emitters, those of each part side by side.
     order: Vec<u32>,
 }
@@ -37,6 +38,15 @@ struct Node {
     first: u32,
     emitters: u32,
     kind: Kind,
+}
+
+/// The two children of a node: nothing where it has none.
+#[derive(Clone, Copy, Debug, Default)]
+struct Step {
+    bounds: [EmitterBounds; 2],
+    children: [u32; 2],
+    /// Of a child that is one emitter, its number.
+    leaves: [Option<u32>; 2],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +76,7 @@ impl EmitterTree {
     pub fn new(emitters: &[Emitter], lamps: &[u32]) -> Self {
         let room = 2 * emitters.len();
         let (nodes, bounds) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        let mut tree = Self { nodes, bounds, order: Vec::new() };
+        let mut tree = Self { nodes, bounds, order: Vec::new(), steps: Vec::new() };
         if emitters.is_empty() {
             return tree;
         }
@@ -78,6 +88,21 @@ impl EmitterTree {
         members.retain(|members| !members.is_empty());
         let mut order: Vec<u32> = (0..members.len() as u32).collect();
         tree.add_lamps(emitters, &members, &mut order);
+        let step = |node: &Node| match node.kind {
+            Kind::Leaf(_) => Step::default(),
+            Kind::Inner(children) => {
+                let leaf = |child: u32| match tree.nodes[child as usize].kind {
+                    Kind::Leaf(emitter) => Some(emitter),
+                    Kind::Inner(_) => None,
+                };
+                Step {
+                    bounds: children.map(|child| tree.bounds(child)),
+                    children,
+                    leaves: children.map(leaf),
+                }
+            }
+        };
+        tree.steps = tree.nodes.iter().map(step).collect();
         tree
     }
 
@@ -270,17 +295,23 @@ impl EmitterTree {
     /// An emitter of a part at `u` in [0, 1), the place within its interval stretched to [0, 1), and its probability: about in
     /// proportion to what it brings a receiver.
     pub fn pick(&self, part: u32, receiver: &Receiver, mut u: f32) -> (usize, f32, f32) {
+        if let Kind::Leaf(emitter) = self.nodes[part as usize].kind {
+            return (emitter as usize, u, 1.0);
+        }
         let (mut index, mut probability) = (part, 1.0f32);
         loop {
-            let [near, far] = match self.nodes[index as usize].kind {
-                Kind::Leaf(emitter) => return (emitter as usize, u, probability),
-                Kind::Inner(children) => children,
-            };
-            let [a, b] = [near, far].map(|child| self.weight(child, receiver, 0.0));
+            let step = &self.steps[index as usize];
+            let [a, b] = step.bounds.each_ref().map(|bounds| bounds.weight(receiver, 0.0));
             let first = if a + b > 0.0 && (a + b).is_finite() { a / (a + b) } else { 0.5 };
-            (index, u) = if u < first { (near, u / first) } else { (far, (u - first) / (1.0 - first)) };
-            probability *= if index == near { first } else { 1.0 - first };
+            let is_first = u < first;
+            u = if is_first { u / first } else { (u - first) / (1.0 - first) };
             u = u.clamp(0.0, 1.0 - f32::EPSILON);
+            probability *= if is_first { first } else { 1.0 - first };
+            let child = usize::from(!is_first);
+            if let Some(emitter) = step.leaves[child] {
+                return (emitter as usize, u, probability);
+            }
+            index = step.children[child];
         }
     }
 
