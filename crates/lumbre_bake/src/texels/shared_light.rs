@@ -155,8 +155,9 @@ impl<'a> SharedLight<'a> {
         direct.par_iter().zip(&self.found).map(both).collect()
     }
 
-    /// More rounds, and what they bring, added to `direct`. `goal` is the sum over all texels of squared errors, relative to the light around
-    /// them, that may be left.
+    /// More rounds, and what they bring, added to `direct`. `goal` tells for a share of the squared error asked for the sum over all texels of
+    /// squared errors, relative to the light around them, that may then be left; `share` tells that share, for so many samples for each texel
+    /// as are foreseen for the `least` one.
     ///
     /// # Errors
     /// [`BakeError::Cancelled`].
@@ -164,10 +165,11 @@ impl<'a> SharedLight<'a> {
         mut self,
         direct: &mut [Direct],
         local: &LocalLight,
-        goal: f64,
+        (least, share): (f64, &impl Fn(f64) -> f64),
+        goal: &impl Fn(f64) -> f64,
         watch: &mut Watch<'_>,
     ) -> Result<(), BakeError> {
-        let mut before = f64::INFINITY;
+        let (mut before, mut chosen) = (f64::INFINITY, None);
         let (estimates, variances) = loop {
             let raw: Vec<Estimates> = self.found.par_iter().map(Shared::estimates).collect();
             let (estimates, bias) = watch.during(1.0, || match self.options.denoise {
@@ -186,19 +188,29 @@ impl<'a> SharedLight<'a> {
                 |squares: &[f32]| asking.clone().map(|texel| f64::from(squares[texel.place()])).sum::<f64>();
             let left = summed(&relative.expected);
             let stalled = left > STALLED * before;
+            let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
+            let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
+            let count = asking.clone().count() as u64;
+            let budget = self.options.effort().budget(count) / REPLICATES as u64;
+            let budget = budget.saturating_sub(taken);
+            // Samples are given out by the cautious figures; the goal is one of expected ones.
+            let feared = summed(&relative.cautious) / left;
+            let allot = |goal: f64| -> Vec<Allotment> {
+                let asking = asking.clone();
+                allot_within(budget, asking, &relative.cautious, &samples, self.most, ORDER, feared * goal)
+            };
+            // Before the least share is in reach of a round, a few texels of which little is known hide what the others take.
+            if chosen.is_none() && left <= MOST_OF_A_ROUND * goal(least) {
+                let more = |own: &Allotment| u64::from(own.samples - samples[own.texel.place()]);
+                let foreseen = taken + allot(goal(least)).iter().map(more).sum::<u64>();
+                chosen = Some(share((foreseen * REPLICATES as u64) as f64 / count.max(1) as f64));
+            }
+            let goal = goal(chosen.unwrap_or(least));
             if left <= goal * ENOUGH || stalled || watch.clock().late() {
                 break (estimates, variances);
             }
             before = left;
-            let samples: Vec<u32> = self.found.iter().map(|own| own.samples).collect();
-            let taken: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
-            let budget = self.options.effort().budget(asking.clone().count() as u64) / REPLICATES as u64;
-            let budget = budget.saturating_sub(taken);
-            // Samples are given out by the cautious figures; the goal is one of expected ones.
-            let feared = summed(&relative.cautious) / left;
-            let goal = feared * goal.max(left / MOST_OF_A_ROUND);
-            let wanted: Vec<Allotment> =
-                allot_within(budget, asking, &relative.cautious, &samples, self.most, ORDER, goal);
+            let wanted = allot(goal.max(left / MOST_OF_A_ROUND));
             watch.pass(PASS);
             let more = in_chunks_in_time(wanted.len(), watch, |index| {
                 let Allotment { texel, samples } = wanted[index];
