@@ -208,12 +208,8 @@ impl BakeOptions {
         if self.quality == Quality::Reference {
             return effort;
         }
-        let fewer = |samples: u32| match self.error {
-            error if error >= COARSE => (samples / 2).max(4),
-            _ => samples,
-        };
-        effort.gather[0] = fewer(effort.gather[0]);
         if self.error >= COARSE {
+            effort.gather[0] = (effort.gather[0] / 2).max(4);
             effort.patches = effort.patches.min(4_000);
             effort.form_factor_rays = effort.form_factor_rays.min(500_000);
             effort.direct[1] = effort.direct[1].min(16);
