@@ -63,3 +63,72 @@ fn for_each_point(scene: &BakeScene, texel: &Texel, mut visit: impl FnMut(u32, (
         Footprint::Hidden => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::sync::Arc;
+
+    use glam::{DAffine3, DVec3};
+    use lumbre_mesh::shapes;
+    use lumbre_optics::{BakeMode, Light};
+
+    use super::super::direct_light::direct_light;
+    use super::super::footprint::{FootprintPoint, receiver};
+    use super::*;
+    use crate::cancel_token::CancelToken;
+    use crate::progress::Watch;
+    use crate::sampling::{Sequence, Stream, triangle_point};
+    use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, lay_out};
+    use crate::transport::direct::Sources;
+    use crate::{BakeOptions, BakeReport, Density};
+
+    /// A block stands in a room under a lamp: what texels tell of its patches is what 1,024 rays to the lamp find from each.
+    #[test]
+    fn texels_tell_what_rays_from_the_patch_find() {
+        let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 2);
+        room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
+        room.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        let object = |mesh, x: f64, y: f64, z: f64| {
+            let transform = DAffine3::from_translation(DVec3::new(x, y, z));
+            let placed = PlacedPrimitive { mesh: Arc::new(mesh), transform, ..PlacedPrimitive::default() };
+            SceneObject::new("", vec![placed])
+        };
+        let objects = vec![object(room, 0.0, 0.0, 0.0), object(shapes::cuboid(Vec3::ONE, 1), 0.3, -1.0, 0.4)];
+        let lamp = Light { radius: 0.1, bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
+        let lights =
+            vec![PlacedLight { light: lamp, position: DVec3::new(-0.5, 1.0, 0.2), axis: DVec3::NEG_Y }];
+        let input = StaticScene { objects, lights, ..StaticScene::default() }.checked().unwrap();
+        let options = BakeOptions { density: Density::TexelsPerMeter(14.0), ..BakeOptions::default() };
+        let (space, stop) = (input.space(), CancelToken::default());
+        let layout = lay_out(&input.objects, space, &options, &mut Vec::new()).unwrap();
+        let scene = BakeScene::new(&input.objects, &layout, space, &stop, &mut Vec::new()).unwrap();
+        let sources = Sources::new(&scene, Vec::new(), input.lights.clone(), Vec3::ZERO);
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let (mut watch, mut report) = (Watch::new(&mut carry_on, None), BakeReport::default());
+        let texels = CoveredTexels::new(&scene, &layout, &mut watch, &mut report).unwrap();
+        let direct = direct_light(&sources, &texels, &[], &options, &mut watch, &mut report).unwrap();
+        let patches = Patches::new(&scene, 6.0 * texels.side);
+        let told = patch_light(&scene, &texels, &direct, &patches);
+
+        let (mut known, mut squares, mut sum) = (0.0, 0.0, 0.0);
+        for (index, (patch, told)) in patches.list.iter().zip(&told).enumerate() {
+            let Some(halves) = told else { continue };
+            let point = |x: f32, y: f32| {
+                let (triangle, at) = (patch.triangle, patches.point(patch, triangle_point(x, y)));
+                Some(receiver(&scene, &FootprintPoint { triangle, at, offset: Vec2::ZERO }))
+            };
+            let sequence = Sequence::new(1, Stream::Test(92), index as u32);
+            let expected = sources.irradiance(sequence, 1024, &point).total().x;
+            let found = 0.5 * (halves[0].x + halves[1].x);
+            known += 1.0;
+            squares += (found - expected).powi(2);
+            sum += expected;
+        }
+        let relative = (squares / known).sqrt() / (sum / known);
+        println!("{known} of {} patches, {:.2} % apart", told.len(), 100.0 * relative);
+        assert!(known > 0.8 * told.len() as f32, "{known} of {}", told.len());
+        // What the border's texels have of the patch beside it: a shadow's edge that lies there.
+        assert!(relative < 0.03, "{relative}");
+    }
+}
