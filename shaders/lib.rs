@@ -41,6 +41,7 @@ modules!(
     "lighting",
     "lightmap",
     "material_textures",
+    "mirror",
     "normal_map",
     "occlusion_map",
     "shadow_caster",

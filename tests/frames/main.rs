@@ -24,6 +24,7 @@ mod level;
 mod light_counts;
 mod light_lists;
 mod materials;
+mod mirrors;
 mod missing_pipelines;
 mod models;
 mod multisampling;

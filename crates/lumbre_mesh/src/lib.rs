@@ -31,6 +31,7 @@ pub mod flat;
 mod grid;
 pub mod normals;
 mod planar_overlap;
+mod plane;
 pub mod shapes;
 mod surface_spread;
 pub mod surfaces;
@@ -42,6 +43,7 @@ mod vertex_split;
 mod weld;
 
 pub use adjacency::Adjacency;
+pub use plane::MeshPlane;
 pub use surface_spread::{MOST_PATCHES, NormalCone, SurfacePatch, SurfaceSpread};
 pub use tangents::TextureCoordinateSet;
 pub use triangle_mesh::{MeshError, TriangleMesh};

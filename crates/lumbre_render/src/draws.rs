@@ -25,11 +25,11 @@ pub(crate) struct Batch {
     pub texture_set: Option<Arc<TextureSet>>,
     /// Group 2: a lightmap or an irradiance volume.
     pub baked_light: Option<Arc<wgpu::BindGroup>>,
-    /// Into the frame's instances.
+    /// Into the instances of its view.
     pub instances: Range<u32>,
 }
 
-/// The draws of a frame, by pass.
+/// The draws of a view, by pass.
 #[derive(Debug, Default)]
 pub(crate) struct Draws {
     pub lightmapped: Vec<Batch>,
@@ -37,6 +37,8 @@ pub(crate) struct Draws {
     pub transparent: Vec<Batch>,
     /// In the order of the draws.
     pub instances: Vec<InstanceData>,
+    /// Where they begin among those of all views of the frame.
+    pub first_instance: u32,
     /// Objects outside the view.
     pub outside: usize,
     /// From the nearest to the farthest point of what is in view, along the line of sight, in metres.
@@ -64,10 +66,10 @@ struct Visible<'a> {
 }
 
 impl<'a> VisibleObjects<'a> {
-    /// What `view` sees, each with the pipeline that `choose` answers with for the one that it calls for. What asks to be shaded by need is shaded as `need` says.
+    /// What `view` sees but for the objects in the slots `without`, each with the pipeline that `choose` answers with for the one that it calls for. What asks to be shaded by need is shaded as `need` says.
     pub fn new(
         objects: &'a Objects,
-        view: &CameraView,
+        (view, without): (&CameraView, &[usize]),
         settings: &SceneSettings,
         frame: &FrameFeatures,
         (format, samples): (wgpu::TextureFormat, u32),
@@ -84,6 +86,9 @@ impl<'a> VisibleObjects<'a> {
         let mut known: Option<(ObjectTraits, Shading, Variant)> = None;
         let mut known_key: Option<(PipelineKey, Option<PipelineKey>)> = None;
         for (slot, object) in objects.iter() {
+            if without.contains(&slot) {
+                continue;
+            }
             if !inside(object) {
                 seen.outside += 1;
                 continue;
@@ -103,7 +108,7 @@ impl<'a> VisibleObjects<'a> {
                 variant,
                 format,
                 samples,
-                mirrored: object.mirrored,
+                mirrored: object.mirrored != view.is_mirrored(),
                 double_sided: traits.double_sided,
                 blend: pass == LitPass::Transparent,
                 texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
@@ -131,15 +136,17 @@ impl<'a> VisibleObjects<'a> {
 }
 
 impl Draws {
-    /// The draws of what is seen.
+    /// The draws of what is seen, with instances that come after so many of other views.
     pub fn new(
         seen: &VisibleObjects<'_>,
         lights: &mut ObjectLightLists,
         volumes: &IrradianceVolumes,
+        first_instance: u32,
     ) -> Self {
         let VisibleObjects { visible, outside, depths, clustered_depths } = seen;
         let mut draws = Self {
             outside: *outside,
+            first_instance,
             depths: *depths,
             clustered_depths: *clustered_depths,
             ..Self::default()
@@ -204,6 +211,11 @@ impl Draws {
             LitPass::Forward => &self.opaque,
             LitPass::Transparent => &self.transparent,
         }
+    }
+
+    /// A batch's instances among those of all views of the frame.
+    pub fn instances_of(&self, batch: &Batch) -> Range<u32> {
+        self.first_instance + batch.instances.start..self.first_instance + batch.instances.end
     }
 
     /// Every batch, in the order of the passes.

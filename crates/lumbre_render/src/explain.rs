@@ -11,7 +11,7 @@ use lumbre_scene::{
 };
 
 use crate::effect_costs::{BY_NEED, FrameCost};
-use crate::effects::{self, Effect, Stage};
+use crate::effects::{self, Effect};
 use crate::extract::LightSet;
 use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
@@ -96,7 +96,7 @@ fn explain_with(
     let mut radiance = false;
     for effect in effects.iter_mut() {
         let called_for = effect.extract(world, &facts, options);
-        radiance |= called_for && effect.stage() == Stage::Radiance;
+        radiance |= called_for && effect.needs_radiance();
     }
     let plan = FramePlan::new(&facts, options, target_format, radiance);
     let half = plan.ending == Ending::DisplayPass && !options.full_precision;

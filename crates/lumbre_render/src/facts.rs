@@ -53,6 +53,11 @@ impl SceneFacts {
         }
     }
 
+    /// Whether what mirrors show is drawn as views of their own, where any is in sight.
+    pub(crate) fn calls_for_mirrors(&self, options: &FrameOptions) -> bool {
+        options.mirror_depth > 0 && self.census.planar_mirrors > 0
+    }
+
     /// Whether anything of a frame is lit by an irradiance volume.
     pub(crate) fn calls_for_irradiance_volumes(&self, options: &FrameOptions) -> bool {
         options.irradiance_volumes && self.census.lit_by_volume > 0

@@ -14,6 +14,7 @@ use crate::extract::{CameraView, SceneLights};
 use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
+use crate::mirror_views::MirrorView;
 use crate::shader::Feature;
 use crate::shading_need::ShadingNeeds;
 use crate::{
@@ -52,6 +53,8 @@ pub(crate) struct Decided {
     pub called_for: Vec<bool>,
     pub lights: SceneLights,
     pub draws: Draws,
+    /// What is seen in mirrors.
+    pub mirrors: Vec<MirrorView>,
     pub light_list: Vec<u32>,
     /// On average.
     pub lights_per_object: f32,
@@ -136,6 +139,16 @@ impl Decided {
         self.draws.batches().any(|batch| batch.pipeline.variant.has(Feature::CountLights))
     }
 
+    /// The draws of each view: the camera's first, then those of mirrors.
+    pub fn every_draws(&self) -> impl Iterator<Item = &Draws> {
+        std::iter::once(&self.draws).chain(self.mirrors.iter().map(|mirror| &mirror.draws))
+    }
+
+    /// Every batch of every view.
+    pub fn batches(&self) -> impl Iterator<Item = &Batch> {
+        self.every_draws().flat_map(Draws::batches)
+    }
+
     /// What each of its lit passes draws and tests.
     pub fn lit_passes(&self) -> LitPasses {
         LitPasses {
@@ -177,7 +190,7 @@ impl Decided {
 
     /// The buffers of group 0 that any of its draws reads.
     pub fn bindings(&self) -> FrameBindings {
-        let of = self.draws.batches().map(|batch| FrameBindings::of(&batch.pipeline.variant));
+        let of = self.batches().map(|batch| FrameBindings::of(&batch.pipeline.variant));
         of.fold(FrameBindings::default(), FrameBindings::and)
     }
 }

@@ -1,6 +1,7 @@
 //! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
 
 use crate::facts::SceneFacts;
+use crate::mirror_views::{MirrorSurface, MirrorView};
 use crate::rehearsal::Rehearsals;
 use crate::statistics::Uploads;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
@@ -63,7 +64,8 @@ impl FramePlan {
             && flags.sample_count_supported(plan.samples)
             && flags.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
         let blends = features.contains(wgpu::Features::FLOAT32_BLENDABLE);
-        let wide_works = (facts.transparent == 0 || blends) && (plan.samples == 1 || resolves);
+        let blended = facts.transparent > 0 || facts.calls_for_mirrors(options);
+        let wide_works = (!blended || blends) && (plan.samples == 1 || resolves);
         if wide_works && (options.full_precision || target.format == wide) {
             plan.linear_format = wide;
         }
@@ -94,6 +96,7 @@ impl FramePlan {
             exposure,
             display_pass: self.ending == Ending::DisplayPass,
             shadow_atlas: None,
+            mirrors: None,
             uploads: Uploads::default(),
             rehearsals: None,
         }
@@ -124,6 +127,8 @@ pub struct FrameShape {
     pub display_pass: bool,
     /// The atlas of shadow maps, where the frame has any.
     pub(crate) shadow_atlas: Option<ShadowAtlas>,
+    /// What mirrors show, parents before children; unknown before the frame is decided.
+    pub(crate) mirrors: Option<Vec<MirrorShape>>,
     /// What has been uploaded for the frame.
     pub(crate) uploads: Uploads,
     /// First draws where no frame waits for them, if the frame is to have any.
@@ -136,4 +141,28 @@ pub(crate) struct ShadowAtlas {
     pub view: wgpu::TextureView,
     pub stale: bool,
     pub pipelines: usize,
+}
+
+/// What the effect of mirrors needs to know of one of their views.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MirrorShape {
+    /// The view that sees the mirrors: 0 is the camera's, 1 the first of the mirrors'.
+    pub parent: usize,
+    /// The part of the frame in which they are: the corner of the least numbers, width and height in texels.
+    pub pixels: [u32; 4],
+    /// Whether anything is blended in it.
+    pub transparent: bool,
+    pub surfaces: Vec<MirrorSurface>,
+}
+
+impl MirrorShape {
+    /// Of a view in a frame of this size.
+    pub fn new(mirror: &MirrorView, size: [u32; 2]) -> Self {
+        Self {
+            parent: mirror.parent,
+            pixels: mirror.view.window.pixels(size),
+            transparent: !mirror.draws.transparent.is_empty(),
+            surfaces: mirror.mirrors.clone(),
+        }
+    }
 }

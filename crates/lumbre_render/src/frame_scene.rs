@@ -1,18 +1,17 @@
 //! What the passes of a frame draw with: its draws, their pipelines and buffers, and the view. Every pass is lent it; what is drawn was decided before.
 
-use std::collections::HashMap;
-
 use bevy_ecs::entity::Entity;
 use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
 use lumbre_optics::FlatRule;
 
-use crate::draws::{Batch, Draws};
+use crate::draws::Draws;
 use crate::extract::{CameraView, LitPass, Objects};
-use crate::frame_bindings::FrameBindings;
 use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
+use crate::mirror_views::MirrorView;
 use crate::pipelines::Pipelines;
 use crate::shader::Feature;
 use crate::shadows::ShadowMaps;
+use crate::view_buffers::{FrameGroup, ViewBuffers};
 
 /// A frame's scene, as its passes find it in `context.user`.
 pub struct FrameScene<'a> {
@@ -21,25 +20,12 @@ pub struct FrameScene<'a> {
     pub(crate) pipelines: &'a Pipelines,
     pub(crate) meshes: &'a MeshBuffers,
     pub(crate) flat_rule: FlatRule,
-    /// Of group 0.
-    pub(crate) frame_groups: &'a HashMap<FrameGroup, wgpu::BindGroup>,
+    /// What is seen in mirrors.
+    pub(crate) mirrors: &'a [MirrorView],
+    /// The buffers of each view: the camera's first, then those of mirrors.
+    pub(crate) views: &'a [ViewBuffers],
     pub(crate) view: CameraView,
     pub(crate) shadows: &'a ShadowMaps,
-}
-
-/// A group 0: the buffers that are bound in it, and for which pass, where lights are counted by pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct FrameGroup {
-    pub bindings: FrameBindings,
-    pub counted_in: Option<LitPass>,
-}
-
-impl FrameGroup {
-    /// What a batch is drawn with in a pass.
-    pub fn of(batch: &Batch, pass: LitPass) -> Self {
-        let bindings = FrameBindings::of(&batch.pipeline.variant);
-        Self { bindings, counted_in: bindings.count_lights().then_some(pass) }
-    }
 }
 
 /// The camera of a frame.
@@ -114,10 +100,41 @@ impl<'a> FrameScene<'a> {
         }
     }
 
-    /// Draws the lit surfaces of a pass.
+    /// What shaders of a view of their own bind in group 0, as the lit surfaces do: what they know of the view (0 is the camera's, 1 the first of those in mirrors), and the
+    /// transforms of all objects.
+    pub(crate) fn view_and_transforms(&self, view: usize) -> Option<[&wgpu::Buffer; 2]> {
+        Some([self.views.get(view)?.frame(), self.objects.transforms.buffer()?])
+    }
+
+    /// Draws the shape of an object once, as instance `slot`: vertex buffer 0 has positions in the mesh's space.
+    pub(crate) fn draw_shape(&self, pass: &mut wgpu::RenderPass<'static>, slot: usize) {
+        let object = self.objects.objects.get(slot).and_then(Option::as_ref);
+        let Some(mesh) = object.and_then(|object| self.meshes.get(object.mesh)) else { return };
+        let slices = mesh.slices(&[Attribute::Position], None);
+        let (Some(positions), Some(indices), Ok(instance)) =
+            (slices.attributes.first(), slices.indices, u32::try_from(slot))
+        else {
+            return;
+        };
+        pass.set_vertex_buffer(0, positions.slice(..));
+        pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..slices.count, 0, instance..instance + 1);
+    }
+
+    /// Draws the lit surfaces of a pass that the camera sees.
     pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass) {
+        self.draw_view(pass, lit_pass, 0);
+    }
+
+    /// Draws the lit surfaces of a pass that a view shows: 0 is the camera's, 1 the first of those in mirrors.
+    pub(crate) fn draw_view(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass, view: usize) {
+        let draws = match view {
+            0 => Some(self.draws),
+            mirrored => self.mirrors.get(mirrored - 1).map(|mirror| &mirror.draws),
+        };
+        let (Some(draws), Some(buffers)) = (draws, self.views.get(view)) else { return };
         let mut bound = None;
-        for batch in self.draws.of(lit_pass) {
+        for batch in draws.of(lit_pass) {
             let (Some(pipeline), Some(mesh)) =
                 (self.pipelines.get(&batch.pipeline), self.meshes.get(batch.mesh))
             else {
@@ -130,7 +147,7 @@ impl<'a> FrameScene<'a> {
             pass.set_pipeline(&pipeline.pipeline);
             let wanted = FrameGroup::of(batch, lit_pass);
             if bound != Some(wanted) {
-                let Some(group) = self.frame_groups.get(&wanted) else { continue };
+                let Some(group) = buffers.group(&wanted) else { continue };
                 pass.set_bind_group(0, group, &[]);
                 bound = Some(wanted);
             }
@@ -157,9 +174,9 @@ impl<'a> FrameScene<'a> {
             match slices.indices {
                 Some(indices) => {
                     pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-                    pass.draw_indexed(0..slices.count, 0, batch.instances.clone());
+                    pass.draw_indexed(0..slices.count, 0, draws.instances_of(batch));
                 }
-                None => pass.draw(0..slices.count, batch.instances.clone()),
+                None => pass.draw(0..slices.count, draws.instances_of(batch)),
             }
         }
     }

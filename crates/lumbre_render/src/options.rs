@@ -97,6 +97,9 @@ pub struct FrameOptions {
     pub irradiance_volumes: bool,
     /// Draws the shadows of lights that ask for them.
     pub shadows: bool,
+    /// How often light is mirrored on its way to the camera, at most, where it meets flat mirrors: 1 shows a mirror, 2 a mirror in a mirror, 0 none. What a mirror shows is
+    /// drawn like the frame; it costs as much as what is in it, in as many pixels as the mirror has.
+    pub mirror_depth: u32,
     /// Four samples per pixel instead of one, or not, whatever the scene says; one where neither says anything.
     pub multisample: Option<bool>,
     /// From radiance to the target's numbers.
@@ -128,6 +131,7 @@ impl Default for FrameOptions {
             lightmaps: true,
             irradiance_volumes: true,
             shadows: true,
+            mirror_depth: 2,
             multisample: None,
             display: Display::Srgb,
             exposure: None,

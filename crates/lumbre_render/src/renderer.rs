@@ -1,7 +1,7 @@
 //! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
 //! these has its own file.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,29 +11,27 @@ use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{SceneSettings, propagate_transforms};
 
 use crate::accounting::FrameShares;
-use crate::cluster_buffers::ClusterBuffers;
 use crate::draws::{Draws, VisibleObjects};
 use crate::effect_shares::EffectShares;
 use crate::effects::{self, BuiltIn, Effect, Stage};
 use crate::extract::{
-    CameraView, Emitters, KnownLights, LightPlace, LightSet, LitPass, Object, Objects, extract_lights,
-    find_camera,
+    CameraView, Emitters, KnownLights, LightPlace, Object, Objects, extract_lights, find_camera,
 };
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
-use crate::frame_bindings::FrameBuffer;
 use crate::frame_decision::{AskedFrame, Decided, Decision, Decisions, LastFrame, Seen, with_camera};
 use crate::frame_graph::{Last, Overlay, run_graph};
-use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
-use crate::frame_scene::{FrameGroup, FrameScene};
+use crate::frame_plan::{Ending, FramePlan, MirrorShape, ShadowAtlas};
+use crate::frame_scene::FrameScene;
 use crate::growable_buffer::GrowableBuffer;
 use crate::irradiance_volumes::IrradianceVolumes;
-use crate::layout::{FrameData, InstanceData, LightData, radiance};
+use crate::layout::{InstanceData, LightData, radiance};
 use crate::ledger::{Ledger, OpenFrame};
 use crate::light_clusters::ClusteredView;
 use crate::light_counter::{CountedStages, LightCounter};
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
+use crate::mirror_views::{MirrorView, mirror_views};
 use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
 use crate::rehearsal::Rehearsals;
 use crate::shader::Variant;
@@ -43,6 +41,7 @@ use crate::shadows::{CasterPipelines, ShadowMaps, ShadowedView};
 use crate::stage_clock::{StageClock, timed};
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
+use crate::view_buffers::{SharedBuffers, ViewBuffers};
 use crate::world_watch::WorldWatch;
 use crate::{
     Accounting, CpuStages, FrameOptions, FrameReport, FrameTarget, Gpu, LightListing, LightLists, LitPasses,
@@ -60,7 +59,8 @@ pub struct Renderer {
     lights: GrowableBuffer<LightData>,
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
-    clusters: ClusterBuffers,
+    /// The camera's first, then those of mirrors.
+    views: Vec<ViewBuffers>,
     shadows: ShadowMaps,
     meshes: MeshBuffers,
     textures: Textures,
@@ -79,8 +79,6 @@ pub struct Renderer {
     decisions: Decisions,
     /// None after a frame that failed.
     last: Option<LastFrame>,
-    frame_uniform: wgpu::Buffer,
-    frame_groups: HashMap<FrameGroup, wgpu::BindGroup>,
     /// Of the last frame.
     left_out: Vec<String>,
     /// Of the last frame: variants with the objects that each drew, in the order of the draws.
@@ -138,7 +136,7 @@ impl Renderer {
             lights: GrowableBuffer::new("lights"),
             instances: GrowableBuffer::new("instances"),
             light_list: GrowableBuffer::new("light list"),
-            clusters: ClusterBuffers::new(),
+            views: vec![ViewBuffers::new(gpu)],
             shadows: ShadowMaps::new(),
             meshes: MeshBuffers::default(),
             textures: Textures::default(),
@@ -155,13 +153,6 @@ impl Renderer {
             watch: WorldWatch::default(),
             decisions: Decisions::default(),
             last: None,
-            frame_uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("frame"),
-                size: size_of::<FrameData>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
-            frame_groups: HashMap::new(),
             left_out: Vec::new(),
             drawn: Vec::new(),
         }
@@ -414,11 +405,15 @@ impl Renderer {
             effects.map(|(effect, ms)| timed(ms, || effect.extract(world, &facts, options))).collect();
         clock.lap(|cpu| &mut cpu.effects_ms);
         let called = || self.effects.iter().zip(&called_for).filter(|(_, called)| **called);
-        let radiance = called().any(|(effect, _)| effect.stage() == Stage::Radiance);
+        let needs_radiance = called().any(|(effect, _)| effect.needs_radiance());
         let draws_objects = called().any(|(effect, _)| effect.draws_objects());
         let decision = former.cloned().unwrap_or_else(|| {
-            let plan =
-                FramePlan::for_device(&facts, options, radiance, (&self.gpu, seen.target, seen.exposure));
+            let plan = FramePlan::for_device(
+                &facts,
+                options,
+                needs_radiance,
+                (&self.gpu, seen.target, seen.exposure),
+            );
             let half = plan.lit_format == wgpu::TextureFormat::Rgba16Float;
             let ending = (plan.ending, seen.target.format, half);
             let counted = match options.measure {
@@ -468,7 +463,7 @@ impl Renderer {
         };
         let visible = VisibleObjects::new(
             &self.objects,
-            &seen.view,
+            (&seen.view, &[]),
             settings,
             &decision.features,
             (decision.plan.lit_format, decision.plan.samples),
@@ -476,7 +471,30 @@ impl Renderer {
             &mut need,
         );
         clock.lap(|cpu| &mut cpu.visibility_ms);
-        let draws = Draws::new(&visible, &mut lists, &self.volumes);
+        let draws = Draws::new(&visible, &mut lists, &self.volumes, 0);
+        let mut mirrors = Vec::new();
+        if facts.calls_for_mirrors(options) && decision.plan.ending == Ending::DisplayPass {
+            let look = (settings.two_sided, radiance(SceneSettings::shown_background(settings)));
+            mirrors = mirror_views(&self.objects, &seen.view, look, options.mirror_depth, left_out);
+            // Counts are of the passes that have a row in the account.
+            let features = FrameFeatures { counted: CountedStages::default(), ..decision.features.clone() };
+            let mut instances = draws.instances.len();
+            for mirror in &mut mirrors {
+                let own: Vec<usize> = mirror.mirrors.iter().map(|surface| surface.slot).collect();
+                let visible = VisibleObjects::new(
+                    &self.objects,
+                    (&mirror.view, &own),
+                    settings,
+                    &features,
+                    (decision.plan.lit_format, decision.plan.samples),
+                    &choose,
+                    &mut |_, _, _| Shading::Phong,
+                );
+                let first = u32::try_from(instances).unwrap_or(u32::MAX);
+                mirror.draws = Draws::new(&visible, &mut lists, &self.volumes, first);
+                instances += mirror.draws.instances.len();
+            }
+        }
         lists.check()?;
         clock.lap(|cpu| &mut cpu.draws_ms);
         let (lights_per_object, light_list) = (lists.mean_length(), lists.indices);
@@ -487,6 +505,7 @@ impl Renderer {
             called_for,
             lights,
             draws,
+            mirrors,
             light_list,
             lights_per_object,
             shading_by_need,
@@ -503,7 +522,7 @@ impl Renderer {
         wait: bool,
     ) -> Result<usize, RenderError> {
         let mut awaited = HashSet::new();
-        for batch in decided.draws.batches() {
+        for batch in decided.batches() {
             let (key, set) = (batch.pipeline, batch.texture_set.as_deref());
             let rehearse = || self.rehearsals.of(&self.gpu, key, set);
             if !self.pipelines.prepare(&self.gpu, &mut self.sets, key, wait, rehearse)? {
@@ -539,7 +558,7 @@ impl Renderer {
         decided.declared = self.ready_effects(decided, seen)?;
         let linear = decided.decision.plan.ending == Ending::DisplayPass;
         for (effect, declared) in self.effects.iter().zip(&mut decided.declared) {
-            *declared &= effect.stage() != Stage::Radiance || linear;
+            *declared &= !effect.needs_radiance() || linear;
         }
         for (called, declared) in decided.called_for.iter_mut().zip(&decided.declared) {
             *called &= declared;
@@ -554,14 +573,20 @@ impl Renderer {
         seen: &Seen<'_>,
         clock: &mut StageClock,
     ) -> Result<Statistics, RenderError> {
-        let Decided { draws, lights, light_list, .. } = decided;
-        self.instances.replace(draws.instances.iter().copied());
+        let Decided { draws, mirrors, lights, light_list, .. } = decided;
+        self.instances.replace(decided.every_draws().flat_map(|draws| draws.instances.iter().copied()));
         self.light_list.replace(light_list.iter().copied());
-        let clustered = draws.clustered_depths.is_some();
-        if let Some(depths) = draws.clustered_depths {
-            let (origin, size) = (self.objects.origin, [seen.target.width, seen.target.height]);
-            self.clusters.build(&ClusteredView { view: seen.view, origin, size, depths }, lights);
+        let views = 1 + mirrors.len();
+        if self.views.len() < views {
+            self.views.resize_with(views, || ViewBuffers::new(&self.gpu));
         }
+        let (origin, size) = (self.objects.origin, [seen.target.width, seen.target.height]);
+        for ((view, draws), buffers) in views_of(decided, seen).zip(&mut self.views) {
+            if let Some(depths) = draws.clustered_depths {
+                buffers.clusters.build(&ClusteredView { view, origin, size, depths }, lights);
+            }
+        }
+        let clustered = draws.clustered_depths.is_some();
         clock.lap(|cpu| &mut cpu.clusters_ms);
         let shadowed = !lights.shadows.is_empty();
         if shadowed {
@@ -571,17 +596,15 @@ impl Renderer {
             self.shadows.plan(&lights.shadows, &self.objects, &view);
         }
         clock.lap(|cpu| &mut cpu.shadows_ms);
-        let settings = &decided.decision.settings;
-        let mut uploads =
-            self.upload_buffers(&seen.view, settings, &lights.set, seen.exposure, [clustered, shadowed])?;
+        let mut uploads = self.upload_buffers(decided, seen, shadowed)?;
         if decided.counts_lights() {
             self.light_counter.begin(&self.gpu);
         }
-        self.make_frame_groups(draws);
+        self.make_groups(decided);
         let flat_rule = decided.decision.flat_rule();
         let mut triangles = 0;
         self.drawn.clear();
-        for batch in draws.batches() {
+        for batch in decided.batches() {
             match self.drawn.last_mut() {
                 Some((variant, count)) if *variant == batch.pipeline.variant => {
                     *count += batch.instances.len()
@@ -598,10 +621,16 @@ impl Renderer {
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
+        for surface in mirrors.iter().flat_map(|mirror| &mirror.mirrors) {
+            let object = self.objects.objects.get(surface.slot).and_then(Option::as_ref);
+            if let Some(mesh) = object.and_then(|object| self.meshes.get_mut(object.mesh)) {
+                uploads.meshes += mesh.prepare(&self.gpu, &[Attribute::Position], None);
+            }
+        }
         [uploads.textures, uploads.lightmaps] = self.textures.take_uploaded();
         uploads.irradiance_volumes = self.volumes.take_uploaded();
         clock.lap(|cpu| &mut cpu.upload_ms);
-        let clusters = &self.clusters.clusters;
+        let clusters = &self.views[0].clusters.clusters;
         let light_lists = LightListing {
             clustered,
             clusters: if clustered { clusters.grid.size.to_array() } else { [0; 3] },
@@ -622,7 +651,8 @@ impl Renderer {
             objects: draws.instances.len(),
             objects_outside: draws.outside,
             triangles,
-            draws: draws.batches().count(),
+            draws: decided.batches().count(),
+            mirror_views: mirrors.len(),
             variants: self.pipelines.variants(),
             pipelines_made: self.pipelines.made(),
             pipelines_awaited: 0,
@@ -646,6 +676,8 @@ impl Renderer {
             let pipelines = self.shadows.pipelines().map_or(0, CasterPipelines::count);
             shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale, pipelines });
         }
+        shape.mirrors =
+            Some(decided.mirrors.iter().map(|mirror| MirrorShape::new(mirror, shape.size)).collect());
         shape.uploads = frame.statistics.uploads;
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms).zip(&decided.called_for);
         for ((effect, ms), _) in effects.filter(|(_, called)| **called) {
@@ -667,13 +699,15 @@ impl Renderer {
             pipelines: &self.pipelines,
             meshes: &self.meshes,
             flat_rule: decided.decision.flat_rule(),
-            frame_groups: &self.frame_groups,
+            mirrors: &decided.mirrors,
+            views: &self.views,
             view: frame.view,
             shadows: &self.shadows,
         };
         let effects = (self.effects.as_slice(), decided.declared.as_slice(), &decided.decision.plan);
         let light = decided.bindings().light_resources();
-        let bound = |buffer| self.frame_buffer(buffer, None).map(|bound| bound.buffer.clone());
+        let shared = self.shared_buffers();
+        let bound = |buffer| self.views[0].bound(buffer, None, &shared).map(|bound| bound.buffer.clone());
         let light: Vec<_> = light.filter_map(|(name, of)| Some((name, of, bound(of)?))).collect();
         let counts = if decided.counts_lights() { self.light_counter.copy(&self.gpu) } else { None };
         let last = Last { overlay, counts: counts.clone() };
@@ -739,27 +773,12 @@ impl Renderer {
     /// Uploads the components that changed; answers with their bytes.
     fn upload_buffers(
         &mut self,
-        view: &CameraView,
-        settings: &SceneSettings,
-        lights: &LightSet,
-        exposure: f32,
-        [clustered, shadowed]: [bool; 2],
+        decided: &Decided,
+        seen: &Seen<'_>,
+        shadowed: bool,
     ) -> Result<Uploads, RenderError> {
         let origin = self.objects.origin;
-        let fog = settings.fog.as_ref();
-        let data = FrameData {
-            clip_from_frame: view.clip_from_frame(origin).as_mat4().to_cols_array_2d(),
-            eye: (view.eye - origin).as_vec3(),
-            exposure,
-            backward: view.basis.z_axis.as_vec3(),
-            padding: 0.0,
-            ambient: radiance(settings.ambient_with_sky()) + lights.ambient,
-            padding_2: 0.0,
-            fog_color: fog.map_or(glam::Vec3::ZERO, |fog| radiance(fog.color)),
-            padding_3: 0.0,
-            fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
-        };
-        self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&data));
+        let (settings, lights) = (&decided.decision.settings, &decided.lights.set);
         let mut uploads = Uploads {
             transforms: self.objects.transforms.pending_bytes(),
             materials: self.objects.materials.pending_bytes(),
@@ -775,13 +794,16 @@ impl Renderer {
             self.lights.upload(&self.gpu),
             self.light_list.upload(&self.gpu),
         ];
-        if clustered {
-            uploads.clusters = self.clusters.pending_bytes();
-            renewed.push(self.clusters.upload(&self.gpu));
+        for ((view, draws), buffers) in views_of(decided, seen).zip(&mut self.views) {
+            buffers.write(&self.gpu, (&view, origin), settings, lights, seen.exposure);
+            if draws.clustered_depths.is_some() {
+                uploads.clusters += buffers.clusters.pending_bytes();
+                renewed.push(buffers.clusters.upload(&self.gpu));
+            }
         }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
             // Whatever fails below, the old groups name buffers that are gone.
-            self.frame_groups.clear();
+            self.views.iter_mut().for_each(ViewBuffers::forget_groups);
         }
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
         if let Some(transforms) = self.objects.transforms.buffer().filter(|_| shadowed) {
@@ -792,49 +814,36 @@ impl Renderer {
         Ok(uploads)
     }
 
-    /// A buffer of group 0, once it is there; what a pass counts lights in is its own.
-    fn frame_buffer(
-        &self,
-        buffer: FrameBuffer,
-        counted_in: Option<LitPass>,
-    ) -> Option<wgpu::BufferBinding<'_>> {
-        let whole = match buffer {
-            FrameBuffer::Frame => Some(&self.frame_uniform),
-            FrameBuffer::Objects => self.objects.transforms.buffer(),
-            FrameBuffer::Materials => self.objects.materials.buffer(),
-            FrameBuffer::Instances => self.instances.buffer(),
-            FrameBuffer::Lights => self.lights.buffer(),
-            FrameBuffer::LightList => self.light_list.buffer(),
-            FrameBuffer::LightCounts | FrameBuffer::VertexLightCounts => {
-                return self.light_counter.binding(counted_in?);
-            }
-            of_clusters => return self.clusters.buffer(of_clusters),
-        };
-        whole.map(|buffer| wgpu::BufferBinding { buffer, offset: 0, size: None })
+    /// The buffers of group 0 that all views share.
+    fn shared_buffers(&self) -> SharedBuffers<'_> {
+        SharedBuffers {
+            objects: self.objects.transforms.buffer(),
+            materials: self.objects.materials.buffer(),
+            instances: self.instances.buffer(),
+            lights: self.lights.buffer(),
+            light_list: self.light_list.buffer(),
+            counter: &self.light_counter,
+        }
     }
 
     /// Makes the groups 0 of a frame's draws that are not there yet.
-    fn make_frame_groups(&mut self, draws: &Draws) {
-        let groups = LitPass::ALL
-            .into_iter()
-            .flat_map(|pass| draws.of(pass).iter().map(move |batch| FrameGroup::of(batch, pass)));
-        for wanted in groups {
-            if self.frame_groups.contains_key(&wanted) {
-                continue;
+    fn make_groups(&mut self, decided: &Decided) {
+        let mut views = std::mem::take(&mut self.views);
+        for (draws, buffers) in decided.every_draws().zip(&mut views) {
+            for wanted in buffers.missing_groups(draws) {
+                let layout = self.pipelines.frame_layout(&self.gpu, wanted.bindings).clone();
+                buffers.make_group(&self.gpu, wanted, &layout, &self.shared_buffers());
             }
-            let layout = self.pipelines.frame_layout(&self.gpu, wanted.bindings).clone();
-            let entry = |buffer: FrameBuffer| {
-                let bound = self.frame_buffer(buffer, wanted.counted_in)?;
-                let resource = wgpu::BindingResource::Buffer(bound);
-                Some(wgpu::BindGroupEntry { binding: buffer.binding(), resource })
-            };
-            let entries: Vec<_> = wanted.bindings.buffers().filter_map(entry).collect();
-            let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("frame"),
-                layout: &layout,
-                entries: &entries,
-            });
-            self.frame_groups.insert(wanted, group);
         }
+        self.views = views;
     }
+}
+
+/// The views of a frame and what is drawn of each: the camera's first, then those of mirrors.
+fn views_of<'a>(
+    decided: &'a Decided,
+    seen: &Seen<'_>,
+) -> impl Iterator<Item = (CameraView, &'a Draws)> + use<'a> {
+    let mirrored = |mirror: &'a MirrorView| (mirror.view, &mirror.draws);
+    std::iter::once((seen.view, &decided.draws)).chain(decided.mirrors.iter().map(mirrored))
 }

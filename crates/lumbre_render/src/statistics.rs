@@ -22,6 +22,8 @@ pub struct Statistics {
     pub triangles: usize,
     /// Draw calls.
     pub draws: usize,
+    /// Views that mirrors in sight call for, beside the camera's.
+    pub mirror_views: usize,
     /// Forward shader variants compiled so far.
     pub variants: usize,
     /// Pipelines made so far.

@@ -13,7 +13,7 @@ use crate::layout::radiance;
 use crate::{FrameOptions, Gpu};
 
 /// The largest finite half float.
-const LARGEST_HALF: Vec3 = Vec3::splat(65504.0);
+pub(super) const LARGEST_HALF: Vec3 = Vec3::splat(65504.0);
 
 #[derive(Debug, Default)]
 pub(super) struct Background {

@@ -104,6 +104,15 @@ impl Board {
         }
     }
 
+    /// Has a pass that draws lit surfaces elsewhere than in the frame depend on what they are lit with.
+    pub(super) fn lit<'g, 'a>(
+        &self,
+        pass: PassBuilder<'g, 'a, Raster, FrameScene<'a>>,
+    ) -> PassBuilder<'g, 'a, Raster, FrameScene<'a>> {
+        let pass = self.lit_by.iter().fold(pass, |pass, texture| pass.samples(texture));
+        self.lit_by_buffers.iter().fold(pass, |pass, (buffer, how)| pass.reads(buffer, *how))
+    }
+
     pub(super) fn has_display_pass(&self) -> bool {
         self.ending == Ending::DisplayPass
     }

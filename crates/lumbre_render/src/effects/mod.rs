@@ -14,6 +14,7 @@ mod board;
 mod display;
 mod forward;
 mod lightmap;
+mod mirrors;
 mod shadows;
 mod transparent;
 
@@ -45,7 +46,7 @@ pub enum Stage {
     /// What is blended over them.
     Transparent,
     /// Between light and display: [`Board::linear`] holds the lit frame, as radiance, one sample per pixel. A frame in which such an effect is
-    /// called for keeps its radiance until the display; any other is encoded where its colours are made.
+    /// called for keeps its radiance until the display, as [others](Effect::needs_radiance) ask it to; any other is encoded where its colours are made.
     Radiance,
     /// From radiance to the numbers of the target.
     Display,
@@ -123,6 +124,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// Whether a frame in which it is called for keeps its radiance until the display.
+    fn needs_radiance(&self) -> bool {
+        self.stage() == Stage::Radiance
+    }
+
     /// What it has brought to the GPU and made there since it was built, for the accounts of frames ([`Accounting`](crate::Accounting)): whatever no pass shows.
     fn work(&self) -> EffectWork {
         EffectWork::default()
@@ -142,6 +148,8 @@ pub enum BuiltIn {
     Lightmap,
     /// Opaque surfaces: without it they are not drawn.
     Forward,
+    /// What flat mirrors show: without it they are drawn without.
+    Mirrors,
     /// Blended surfaces: without it they are not drawn.
     Transparent,
     /// The display pass: without it, or another at [`Stage::Display`], a frame that needs one is refused ([`RenderError::NoDisplay`](crate::RenderError::NoDisplay)).
@@ -150,8 +158,8 @@ pub enum BuiltIn {
 
 impl BuiltIn {
     /// Every one.
-    pub const ALL: [Self; 5] =
-        [Self::ShadowMaps, Self::Lightmap, Self::Forward, Self::Transparent, Self::Display];
+    pub const ALL: [Self; 6] =
+        [Self::ShadowMaps, Self::Lightmap, Self::Forward, Self::Mirrors, Self::Transparent, Self::Display];
 
     /// Its name in plans and accounts.
     pub fn name(self) -> &'static str {
@@ -159,6 +167,7 @@ impl BuiltIn {
             Self::ShadowMaps => "shadow maps",
             Self::Lightmap => "lightmap",
             Self::Forward => "forward",
+            Self::Mirrors => "mirrors",
             Self::Transparent => "transparent",
             Self::Display => "display",
         }
@@ -169,6 +178,7 @@ impl BuiltIn {
         match self {
             Self::ShadowMaps => options.shadows = false,
             Self::Lightmap => options.lightmaps = false,
+            Self::Mirrors => options.mirror_depth = 0,
             Self::Forward | Self::Transparent | Self::Display => {}
         }
     }
@@ -176,11 +186,12 @@ impl BuiltIn {
 
 /// The effects of this crate but for some, each in its stage.
 pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
-    let all: [Box<dyn Effect>; 6] = [
+    let all: [Box<dyn Effect>; 7] = [
         Box::new(shadows::Shadows::default()),
         Box::new(background::Background::default()),
         Box::new(lightmap::Lightmap::default()),
         Box::new(forward::Forward::default()),
+        Box::new(mirrors::Mirrors::default()),
         Box::new(transparent::Transparent::default()),
         Box::new(display::DisplayPass::default()),
     ];

@@ -1,9 +1,10 @@
-//! The camera of a frame: which one, and its matrices. Not its tone curve: that is the display pass.
+//! The camera of a frame: which one, its matrices, and its image in a mirror. Not its tone curve: that is the display pass.
 
 use bevy_ecs::prelude::*;
-use glam::{DMat3, DMat4, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use lumbre_scene::{ActiveCamera, Camera, GlobalTransform, Projection};
 
+use super::planar_mirror::mirror_image;
 use crate::RenderError;
 
 /// What a camera sees, as its projection tells.
@@ -23,7 +24,41 @@ pub(crate) struct CameraView {
     pub basis: DMat3,
     pub exposure: f32,
     pub volume: ViewVolume,
+    /// The part of the frame that is drawn.
+    pub window: Window,
     clip_from_view: DMat4,
+}
+
+/// A rectangle of the frame, in normalized device coordinates: from -1 to 1, to the right and up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Window {
+    pub low: DVec2,
+    pub high: DVec2,
+}
+
+impl Window {
+    /// The whole frame.
+    pub const WHOLE: Self = Self { low: DVec2::NEG_ONE, high: DVec2::ONE };
+
+    /// The part of the frame that it covers, at most 1.
+    pub fn area(&self) -> f64 {
+        let size = self.high - self.low;
+        0.25 * size.x * size.y
+    }
+
+    /// The pixels of a frame of this size that it touches: the corner of the least numbers, width and height.
+    pub fn pixels(&self, [width, height]: [u32; 2]) -> [u32; 4] {
+        let axis = |low: f64, high: f64, size: u32| {
+            let at = |coordinate: f64| 0.5 * (coordinate + 1.0) * f64::from(size);
+            let first = at(low).floor().clamp(0.0, f64::from(size.saturating_sub(1)));
+            let last = at(high).ceil().clamp(first + 1.0, f64::from(size.max(1)));
+            [first as u32, (last - first) as u32]
+        };
+        let [x, wide] = axis(self.low.x, self.high.x, width);
+        // Rows count downwards.
+        let [y, high] = axis(-self.high.y, -self.low.y, height);
+        [x, y, wide, high]
+    }
 }
 
 /// The asked-for camera, else the active one, else the first.
@@ -84,7 +119,7 @@ impl CameraView {
         let up = axes.y_axis.reject_from_normalized(backward);
         let up = up.try_normalize().unwrap_or_else(|| backward.any_orthonormal_vector());
         let basis = DMat3::from_cols(up.cross(backward), up, backward);
-        Ok(Self { eye, basis, exposure: camera.exposure, volume, clip_from_view })
+        Ok(Self { eye, basis, exposure: camera.exposure, volume, window: Window::WHOLE, clip_from_view })
     }
 
     /// From frame space, whose origin stands at `origin` in the world, to clip space.
@@ -99,14 +134,93 @@ impl CameraView {
         self.clip_from_view * view
     }
 
-    /// Planes of the view volume in frame space, normals inwards, of unit length; there is no far plane.
+    /// The view that this one has in a mirror: its eye and axes are mirror images, so that a point's image is on the same pixel as the point is in the mirror; what lies
+    /// behind the mirror is cut off by the near plane, which is the mirror's. The plane is in the world and faces this view; of the frame only `window` is drawn. `None`
+    /// where no point of the window is before the mirror.
+    ///
+    /// The oblique near plane is that of Lengyel, "Oblique View Frustum Depth Projection and Clipping", Journal of Game Development 1(2), 2005, for depths that are reversed:
+    /// z/w = 1 - a d/w at a distance d from the mirror, with the largest a that keeps every point of the window above 0.
+    pub fn reflected(&self, plane: DVec4, window: Window) -> Option<Self> {
+        let eye = mirror_image(plane, self.eye, 1.0);
+        let axis = |axis: DVec3| mirror_image(plane, axis, 0.0);
+        let basis =
+            DMat3::from_cols(axis(self.basis.x_axis), axis(self.basis.y_axis), axis(self.basis.z_axis));
+        let in_view = (basis.transpose() * plane.truncate()).extend(plane.dot(eye.extend(1.0)));
+        let corners = [window.low, window.high].map(|x| [window.low, window.high].map(|y| [x.x, y.y]));
+        let corners = corners.into_iter().flatten();
+        let farthest = match self.volume {
+            // The distance grows with depth along each direction, by this much a metre.
+            ViewVolume::Perspective { half_width, half_height, .. } => corners
+                .map(|[x, y]| in_view.dot(DVec4::new(x * half_width, y * half_height, -1.0, 0.0)))
+                .fold(0.0, f64::max),
+            ViewVolume::Orthographic { half_width, half_height, near, far } => corners
+                .flat_map(|[x, y]| [near, far].map(|z| DVec4::new(x * half_width, y * half_height, -z, 1.0)))
+                .map(|corner| in_view.dot(corner))
+                .fold(0.0, f64::max),
+        };
+        if farthest <= 0.0 {
+            return None;
+        }
+        let mut rows = self.clip_from_view.transpose();
+        rows.z_axis = rows.w_axis - in_view / farthest;
+        Some(Self { eye, basis, window, clip_from_view: rows.transpose(), ..*self })
+    }
+
+    /// Whether it is seen in an odd number of mirrors: the front of a triangle winds the other way then.
+    pub fn is_mirrored(&self) -> bool {
+        self.basis.determinant() < 0.0
+    }
+
+    /// The eye, or where it is infinitely far the direction towards it, with `w` 0; in the world.
+    pub fn viewer(&self) -> DVec4 {
+        match self.volume {
+            ViewVolume::Perspective { .. } => self.eye.extend(1.0),
+            ViewVolume::Orthographic { .. } => self.basis.z_axis.extend(0.0),
+        }
+    }
+
+    /// The part of the window in which a box may be seen that stands in the world along its axes; `None` where it is outside.
+    pub fn window_of_box(&self, center: DVec3, half_size: DVec3) -> Option<Window> {
+        let clip = self.clip_from_frame(center);
+        let corner = |index: usize| {
+            let side = |axis: usize| if index & (1 << axis) == 0 { -1.0 } else { 1.0 };
+            clip * (DVec3::new(side(0), side(1), side(2)) * half_size).extend(1.0)
+        };
+        let corners: [DVec4; 8] = std::array::from_fn(corner);
+        // Above 0 in front of the near plane.
+        let before = |point: DVec4| point.w - point.z;
+        let mut low = DVec2::INFINITY;
+        let mut high = DVec2::NEG_INFINITY;
+        let mut hold = |point: DVec4| {
+            // At the near plane of a perspective view w is positive; rounding may leave 0.
+            let projected = point.truncate().truncate() / point.w.max(f64::MIN_POSITIVE);
+            (low, high) = (low.min(projected), high.max(projected));
+        };
+        for (index, from) in corners.iter().enumerate() {
+            if before(*from) >= 0.0 {
+                hold(*from);
+            }
+            for axis in 0..3 {
+                let to = corners[index | (1 << axis)];
+                let (a, b) = (before(*from), before(to));
+                if (a < 0.0) != (b < 0.0) {
+                    hold(from.lerp(to, a / (a - b)));
+                }
+            }
+        }
+        let window = Window { low: low.max(self.window.low), high: high.min(self.window.high) };
+        (window.low.cmplt(window.high).all()).then_some(window)
+    }
+
+    /// Planes of what is drawn in frame space, normals inwards, of unit length; there is no far plane.
     pub fn frustum(&self, origin: DVec3) -> [DVec4; 5] {
         let m = self.clip_from_frame(origin).transpose();
+        let Window { low, high } = self.window;
         [
-            m.w_axis + m.x_axis,
-            m.w_axis - m.x_axis,
-            m.w_axis + m.y_axis,
-            m.w_axis - m.y_axis,
+            m.x_axis - low.x * m.w_axis,
+            high.x * m.w_axis - m.x_axis,
+            m.y_axis - low.y * m.w_axis,
+            high.y * m.w_axis - m.y_axis,
             m.w_axis - m.z_axis,
         ]
         .map(|plane| plane / plane.truncate().length().max(f64::MIN_POSITIVE))
@@ -167,5 +281,95 @@ mod tests {
             let held = planes.iter().all(|plane| plane.dot(point.extend(1.0)) >= 0.0);
             assert_eq!(inside, held, "{point}");
         }
+    }
+
+    /// A camera of either kind before a tilted mirror, with the mirror's plane turned towards it.
+    fn before_a_mirror() -> Vec<(CameraView, DVec4)> {
+        let mut world = World::new();
+        let transform =
+            lumbre_scene::Transform::from_xyz(3.0, 2.0, 8.0).looking_at(DVec3::new(0.5, 0.0, 0.0), DVec3::Y);
+        let projections = [
+            Projection::Perspective { vertical_fov: 0.9, aspect: None, near: 0.1, far: None },
+            Projection::Orthographic { half_width: 3.0, half_height: 2.0, near: 0.5, far: 40.0 },
+        ];
+        let normal = DVec3::new(0.2, 0.1, 1.0).normalize();
+        let plane = normal.extend(-normal.dot(DVec3::new(0.0, 0.0, -1.0)));
+        let view = |projection| {
+            let camera = Camera { projection, ..Camera::default() };
+            let entity = world.spawn((camera, GlobalTransform(transform.affine()))).id();
+            (CameraView::new(&world, entity, 1.5).unwrap(), plane)
+        };
+        projections.map(view).to_vec()
+    }
+
+    #[test]
+    fn a_reflected_view_has_images_where_the_view_has_what_they_are_images_of() {
+        for (view, plane) in before_a_mirror() {
+            let origin = DVec3::new(0.3, -1.0, 2.0);
+            let reflected = view.reflected(plane, Window::WHOLE).unwrap();
+            assert!(reflected.is_mirrored() && !view.is_mirrored());
+            let (whole, mirrored) = (view.clip_from_frame(origin), reflected.clip_from_frame(origin));
+            let mut inside = 0;
+            for step in 0..2000 {
+                let t = f64::from(step);
+                let point = DVec3::new((t * 0.37).sin(), (t * 0.73).sin(), (t * 0.11).cos()) * 9.0;
+                let distance = plane.dot(point.extend(1.0));
+                let image = mirror_image(plane, point, 1.0);
+                let seen = mirrored * (point - origin).extend(1.0);
+                let direct = whole * (image - origin).extend(1.0);
+                let close = (seen.x - direct.x).abs().max((seen.y - direct.y).abs());
+                assert!(close < 1e-12 * seen.w.abs().max(10.0), "{point}: {seen} and {direct}");
+                if seen.w > 0.0 && seen.x.abs() < seen.w && seen.y.abs() < seen.w {
+                    inside += 1;
+                    assert_eq!(distance > 0.0, seen.z < seen.w, "{point}: {distance}, {seen}");
+                    assert!(distance < 0.0 || seen.z >= -1e-12, "{point} is cut off: {seen}");
+                }
+            }
+            assert!(inside > 100, "{inside}");
+        }
+    }
+
+    #[test]
+    fn a_view_in_two_mirrors_is_not_mirrored() {
+        let (view, plane) = before_a_mirror()[0];
+        let once = view.reflected(plane, Window::WHOLE).unwrap();
+        // The same mirror from behind: the second image is the first eye again.
+        let twice = once.reflected(-plane, Window::WHOLE).unwrap();
+        assert!(!twice.is_mirrored() && (twice.eye - view.eye).length() < 1e-12);
+    }
+
+    #[test]
+    fn the_window_of_a_box_holds_every_point_of_it_that_is_seen() {
+        for (view, plane) in before_a_mirror() {
+            for view in [view, view.reflected(plane, Window::WHOLE).unwrap()] {
+                let clip_from_world = view.clip_from_frame(DVec3::ZERO);
+                for step in 0..200 {
+                    let t = f64::from(step);
+                    let center = DVec3::new((t * 0.9).sin(), (t * 1.7).cos(), (t * 0.31).sin()) * 8.0;
+                    let half = DVec3::new(2.0 + (t * 0.5).sin(), 0.0, 1.5);
+                    let window = view.window_of_box(center, half);
+                    for x in -4..=4 {
+                        for z in -4..=4 {
+                            let place = DVec3::new(f64::from(x), 0.0, f64::from(z)) / 4.0;
+                            let clip = clip_from_world * (center + place * half).extend(1.0);
+                            let at = DVec2::new(clip.x, clip.y) / clip.w;
+                            let inside = at.abs().max_element() < 1.0 && clip.w > 0.0 && clip.z < clip.w;
+                            let held = window.is_some_and(|window| {
+                                (at.cmpge(window.low - 1e-9) & at.cmple(window.high + 1e-9)).all()
+                            });
+                            assert!(!inside || held, "{center} {at}: {window:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_covers_the_pixels_that_it_touches() {
+        assert_eq!(Window::WHOLE.pixels([640, 360]), [0, 0, 640, 360]);
+        let window = Window { low: DVec2::new(-0.5, 0.25), high: DVec2::new(0.0, 1.0) };
+        assert_eq!(window.pixels([100, 80]), [25, 0, 25, 30]);
+        assert!((window.area() - 0.09375).abs() < 1e-12);
     }
 }

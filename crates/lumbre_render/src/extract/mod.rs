@@ -6,9 +6,10 @@ mod emitters;
 mod lights;
 mod lit_pass;
 mod objects;
+mod planar_mirror;
 mod shown_light;
 
-pub(crate) use camera::{CameraView, ViewVolume, find_camera};
+pub(crate) use camera::{CameraView, ViewVolume, Window, find_camera};
 pub(crate) use emitters::Emitters;
 #[cfg(test)]
 pub(crate) use lights::PolygonReach;
@@ -18,3 +19,4 @@ pub(crate) use lights::{
 };
 pub(crate) use lit_pass::LitPass;
 pub(crate) use objects::{Object, Objects, Reflectance, world_box};
+pub(crate) use planar_mirror::PlanarMirror;

@@ -11,10 +11,11 @@ use glam::{DAffine3, DVec3};
 use lumbre_mesh::TextureCoordinateSet;
 use lumbre_optics::{Lobe, Material, ReflectionModel, Shading, Surface};
 use lumbre_scene::{
-    Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Mesh, Name,
-    ObjectCensus, ObjectTraits, StaticObject, with_descendants,
+    Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden, Lightmap, MaterialTextures, Medium,
+    Mesh, Name, ObjectCensus, ObjectTraits, StaticObject, planar_mirror, with_descendants,
 };
 
+use super::planar_mirror::PlanarMirror;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{MaterialData, ObjectData};
 use crate::mesh_buffers::{MeshBuffers, MeshKey};
@@ -45,6 +46,8 @@ pub(crate) struct Object {
     pub half_size: DVec3,
     /// Of the sphere around the same middle.
     pub radius: f64,
+    /// Where what it mirrors can be drawn.
+    pub planar_mirror: Option<PlanarMirror>,
     /// What it reflects.
     pub reflectance: Reflectance,
     /// A number that is another one after each change of it.
@@ -72,7 +75,7 @@ impl Reflectance {
 struct Optional {
     maps: bool,
     lightmap: bool,
-    choices: (Option<Shading>, Option<ReflectionModel>),
+    choices: (Option<Shading>, Option<ReflectionModel>, Option<Medium>),
     /// It is static, it moves, it lights others.
     marks: (bool, bool, bool),
 }
@@ -87,7 +90,7 @@ type ObjectQuery<'w, 's> = Query<
         Ref<'static, GlobalTransform>,
         Option<Ref<'static, MaterialTextures>>,
         Option<Ref<'static, Lightmap>>,
-        (Option<&'static Shading>, Option<&'static ReflectionModel>),
+        (Option<&'static Shading>, Option<&'static ReflectionModel>, Option<&'static Medium>),
         (Has<StaticObject>, Has<DynamicObject>, Has<EmissiveLight>),
     ),
 >;
@@ -198,11 +201,11 @@ impl Objects {
                 let map_changed = lightmap.as_ref().is_some_and(Ref::is_changed);
                 let maps = maps.map(Ref::into_inner);
                 let lightmap = lightmap.map(Ref::into_inner);
-                let (shading, reflection) = choices;
+                let (shading, reflection, medium) = choices;
                 let optional = Optional {
                     maps: maps.is_some(),
                     lightmap: lightmap.is_some(),
-                    choices: (shading.copied(), reflection.copied()),
+                    choices: (shading.copied(), reflection.copied(), medium.copied()),
                     marks,
                 };
                 let normal_map =
@@ -254,6 +257,9 @@ impl Objects {
                 if transformed || restated {
                     object.changed = self.frame;
                     object.reflectance = Reflectance::of(&material);
+                    let plane = planar_mirror(&mesh.0, &material, maps, medium);
+                    object.planar_mirror =
+                        plane.and_then(|plane| PlanarMirror::new(plane, &transform.0, &material, medium));
                 }
                 if restated {
                     let traits = ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks));
@@ -337,6 +343,7 @@ impl Object {
             center: DVec3::ZERO,
             half_size: DVec3::ZERO,
             radius: 0.0,
+            planar_mirror: None,
             reflectance: Reflectance::default(),
             changed: 0,
             seen: 0,

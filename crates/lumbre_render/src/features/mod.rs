@@ -13,6 +13,7 @@ mod specular_antialiasing;
 mod textures;
 mod two_sided;
 
+pub(crate) use fog::fog_feature;
 use lumbre_optics::{ReflectionModel, Shading};
 use lumbre_scene::{ObjectTraits, SceneSettings, ShadowFilter};
 

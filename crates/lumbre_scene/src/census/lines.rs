@@ -152,6 +152,12 @@ impl Census {
                 "no visible back has a material of its own",
             ),
             mesh("unlit", self.unlit, "taking no light", "every material takes light"),
+            mesh(
+                "planar mirrors",
+                self.planar_mirrors,
+                "mirroring in a plane",
+                "no flat opaque mesh mirrors",
+            ),
             scene("fog", self.fog, "the scene has fog", "the scene has no fog"),
             mesh("dynamic objects", self.dynamic_objects, "marked as moving", "nothing moves"),
             mesh("static objects", self.static_objects, "for the baker", "no mesh is static"),

@@ -21,7 +21,7 @@ use serde::Serialize;
 
 pub use lights::{LightCensus, light_place, shines};
 pub use lines::CensusLine;
-pub use object::{Mobility, ObjectComponents, ObjectItem, ObjectTraits, shown_objects};
+pub use object::{Mobility, ObjectComponents, ObjectItem, ObjectTraits, planar_mirror, shown_objects};
 pub use object_census::ObjectCensus;
 
 use crate::{SceneSettings, usable_irradiance_volumes};
@@ -83,6 +83,8 @@ pub struct Census {
     pub specular: usize,
     /// Meshes that mirror.
     pub mirrors: usize,
+    /// Meshes that can be drawn with what they mirror: flat ones.
+    pub planar_mirrors: usize,
     /// Meshes that light passes through.
     pub transmission: usize,
     /// Meshes shaded per face.
@@ -151,6 +153,7 @@ impl Census {
             emissive_lights: objects.emissive_lights,
             specular: objects.highlights.iter().sum(),
             mirrors: objects.mirrors,
+            planar_mirrors: objects.planar_mirrors,
             transmission: objects.transmission,
             flat: shaded(Shading::Flat),
             gouraud: shaded(Shading::Gouraud),

@@ -2,10 +2,12 @@
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use lumbre_mesh::TriangleMesh;
+use lumbre_mesh::{MeshPlane, TriangleMesh};
 use lumbre_optics::{AlphaMode, Distribution, Fresnel, Lobe, Material, ReflectionModel, Shading, Surface};
 
-use crate::{DynamicObject, EmissiveLight, Lightmap, MaterialTextures, Mesh, StaticObject, hidden_entities};
+use crate::{
+    DynamicObject, EmissiveLight, Lightmap, MaterialTextures, Medium, Mesh, StaticObject, hidden_entities,
+};
 
 /// What matters of one object. Equal traits have equal shader variants in every frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +51,9 @@ pub struct ObjectTraits {
     pub reflection: Option<ReflectionModel>,
     /// Whether it mirrors.
     pub mirrors: bool,
+    /// Whether what it mirrors can be drawn as a view of its own: it mirrors (or reflects by Fresnel's equations what it does not let through),
+    /// is flat, and neither blended, unlit nor roughened by a normal texture.
+    pub planar_mirror: bool,
     /// Whether light passes through it.
     pub transmits: bool,
     /// What the baker makes of it.
@@ -70,20 +75,20 @@ pub enum Mobility {
 /// The components that an object's traits follow from, as a query's data.
 pub type ObjectComponents = (
     (&'static Mesh, &'static Material, Option<&'static MaterialTextures>, Option<&'static Lightmap>),
-    (Option<&'static Shading>, Option<&'static ReflectionModel>),
+    (Option<&'static Shading>, Option<&'static ReflectionModel>, Option<&'static Medium>),
     (Has<StaticObject>, Has<DynamicObject>, Has<EmissiveLight>),
 );
 
 /// What a query of [`ObjectComponents`] finds.
 pub type ObjectItem<'w> = (
     (&'w Mesh, &'w Material, Option<&'w MaterialTextures>, Option<&'w Lightmap>),
-    (Option<&'w Shading>, Option<&'w ReflectionModel>),
+    (Option<&'w Shading>, Option<&'w ReflectionModel>, Option<&'w Medium>),
     (bool, bool, bool),
 );
 
 impl ObjectTraits {
     /// The traits of an object with these components.
-    pub fn new((look, (shading, reflection), (fixed, moves, shines)): ObjectItem<'_>) -> Self {
+    pub fn new((look, (shading, reflection, medium), (fixed, moves, shines)): ObjectItem<'_>) -> Self {
         let (mesh, material, maps, lightmap) = look;
         let mesh: &TriangleMesh = &mesh.0;
         let back = material.back.as_ref();
@@ -114,6 +119,7 @@ impl ObjectTraits {
             shading: shading.copied(),
             reflection: reflection.copied(),
             mirrors: material.mirror != Vec3::ZERO,
+            planar_mirror: planar_mirror(mesh, material, maps, medium).is_some(),
             transmits: material.transmission != Vec3::ZERO,
             mobility: match (moves, fixed) {
                 (true, _) => Mobility::Dynamic,
@@ -132,6 +138,21 @@ impl ObjectTraits {
     pub fn is_lit_by_irradiance_volume(&self) -> bool {
         !self.lightmapped && !self.unlit
     }
+}
+
+/// The plane of an object, in its mesh's space, where what it mirrors can be drawn as a view of its own.
+pub fn planar_mirror(
+    mesh: &TriangleMesh,
+    material: &Material,
+    maps: Option<&MaterialTextures>,
+    medium: Option<&Medium>,
+) -> Option<MeshPlane> {
+    let reflects_by_fresnel =
+        material.transmission != Vec3::ZERO && medium.is_some_and(|medium| medium.fresnel);
+    let even = maps.is_none_or(|maps| maps.normal.is_none());
+    let seen_whole = material.alpha_mode != AlphaMode::Blend && !material.unlit;
+    let mirrors = material.mirror != Vec3::ZERO || reflects_by_fresnel;
+    if mirrors && even && seen_whole { mesh.plane() } else { None }
 }
 
 /// The traits and the number of triangles of each object of a World that is shown.

@@ -53,6 +53,8 @@ pub struct ObjectCensus {
     pub highlights: [usize; 1 + ReflectionModel::ALL.len()],
     /// Objects that mirror.
     pub mirrors: usize,
+    /// Objects that can be drawn with what they mirror: flat ones.
+    pub planar_mirrors: usize,
     /// Objects that light passes through.
     pub transmission: usize,
 }
@@ -120,6 +122,7 @@ impl ObjectCensus {
                 !traits.unlit && traits.specular,
             ),
             (&mut self.mirrors, traits.mirrors),
+            (&mut self.planar_mirrors, traits.planar_mirror),
             (&mut self.transmission, traits.transmits),
         ] {
             change(counter, usize::from(counts));

@@ -1,0 +1,457 @@
+//! What flat mirrors show: each plane of mirrors in sight has a view of its own, drawn as the frame is, and its light is added to the surfaces that mirror, by the part that
+//! they reflect. Which views there are is decided in `mirror_views`. Nothing here is approximated but the light of other mirrors deeper than the frame goes: bent surfaces are
+//! drawn without what they mirror.
+//!
+//! ```text
+//!   view of a mirror ──► mirrors in it ──► what is blended in it ──► mirrors of the frame
+//! ```
+
+use std::collections::HashMap;
+use std::num::NonZeroU64;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+use lumbre_graph::{
+    LoadOp, PassBuilder, PassResources, Raster, RasterContext, RunError, TextureDescriptor, TextureHandle,
+};
+use lumbre_scene::SceneSettings;
+
+use super::background::LARGEST_HALF;
+use super::{Board, Effect, EffectWork, FrameGraph, Stage};
+use crate::deferred::Deferred;
+use crate::error::EffectError;
+use crate::extract::LitPass;
+use crate::facts::SceneFacts;
+use crate::features::fog_feature;
+use crate::frame_bindings::FrameBuffer;
+use crate::frame_plan::{FrameShape, MirrorShape};
+use crate::frame_scene::FrameScene;
+use crate::layout::radiance;
+use crate::mirror_views::MirrorData;
+use crate::shader::{self, Feature};
+use crate::target::DEPTH_FORMAT;
+use crate::{FrameOptions, Gpu, RenderError};
+
+#[derive(Debug, Default)]
+pub(super) struct Mirrors {
+    /// Whether the scene has flat mirrors, and whether they are switched on.
+    called_for: [bool; 2],
+    fog: Option<Feature>,
+    /// What lies behind everything, as radiance, with nothing of it a surface.
+    clear: wgpu::Color,
+    /// Of this frame, if it is decided.
+    views: Option<Vec<MirrorShape>>,
+    key: Option<Key>,
+    size: [u32; 2],
+    device: Option<OnDevice>,
+}
+
+/// What a pipeline follows from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Key {
+    format: wgpu::TextureFormat,
+    samples: u32,
+    fog: Option<Feature>,
+}
+
+/// Bytes from one surface's uniform to the next: the largest alignment that a device may ask for.
+const STRIDE: usize = 256;
+
+#[derive(Debug)]
+struct OnDevice {
+    /// Of a view and the objects, and of a surface and what it shows.
+    layouts: [wgpu::BindGroupLayout; 2],
+    pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
+    uniform: Option<wgpu::Buffer>,
+    /// What the uniform holds.
+    written: Vec<u8>,
+    /// Bytes written so far.
+    uploaded: u64,
+}
+
+impl Effect for Mirrors {
+    fn name(&self) -> &'static str {
+        "mirrors"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Opaque
+    }
+
+    fn extract(&mut self, _: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool {
+        self.called_for = [facts.census.planar_mirrors > 0, options.mirror_depth > 0];
+        self.fog = facts.settings.fog.as_ref().map(|fog| fog_feature(&fog.mode));
+        let background = radiance(SceneSettings::shown_background(&facts.settings));
+        let [r, g, b] = background.clamp(-LARGEST_HALF, LARGEST_HALF).as_dvec3().to_array();
+        self.clear = wgpu::Color { r, g, b, a: 0.0 };
+        self.views = None;
+        facts.calls_for_mirrors(options)
+    }
+
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
+    fn needs_radiance(&self) -> bool {
+        true
+    }
+
+    fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
+        let key = self.key_of(frame);
+        let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
+        device.pipeline(gpu, key, false)
+    }
+
+    fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
+        (self.key, self.size) = (None, frame.size);
+        self.views.clone_from(&frame.mirrors);
+        let surfaces = self.views.iter().flatten().flat_map(|view| &view.surfaces);
+        let data: Vec<MirrorData> = surfaces.map(|surface| surface.data).collect();
+        if !data.is_empty() {
+            let key = self.key_of(frame);
+            let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
+            device.pipeline(gpu, key, true)?;
+            device.write(gpu, &data);
+            self.key = Some(key);
+        }
+        Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        let made = |device: &OnDevice| {
+            device.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
+        };
+        self.device
+            .as_ref()
+            .map_or_else(EffectWork::default, |device| EffectWork::new(device.uploaded, made(device)))
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        let [in_scene, switched_on] = self.called_for;
+        let called_for = in_scene && switched_on;
+        let views = self.views.as_deref().unwrap_or_default();
+        // Children before their parents: their pictures are in these.
+        let mut pictures: Vec<Option<TextureHandle>> = vec![None; views.len()];
+        for index in (0..views.len()).rev().filter(|_| called_for) {
+            pictures[index] = Some(self.declare_view(graph, board, (index, &views[index]), &pictures));
+        }
+        let shown = self.seen_from(0, &pictures);
+        let pass = board
+            .lit_pass(graph, self.name(), LoadOp::Load)
+            .calls_for(in_scene, "flat mesh that mirrors")
+            .calls_for(switched_on, "mirrors switched on")
+            // Of an explanation without a device it is not known.
+            .calls_for(self.views.is_none() || !shown.is_empty(), "mirror in sight");
+        let pass = shown.iter().fold(pass, |pass, (_, picture)| pass.samples(picture));
+        pass.depth(&mut board.depth, LoadOp::Load).run(move |context| self.add_to(0, context, &shown));
+    }
+}
+
+impl Mirrors {
+    fn key_of(&self, frame: &FrameShape) -> Key {
+        Key { format: frame.lit_format, samples: frame.samples, fog: self.fog }
+    }
+
+    /// The views in mirrors that a view sees, with their pictures: 0 is the camera's, 1 the first of those in mirrors.
+    fn seen_from(&self, parent: usize, pictures: &[Option<TextureHandle>]) -> Vec<(usize, TextureHandle)> {
+        let views = self.views.iter().flatten().zip(pictures).enumerate();
+        views
+            .filter(|(_, (view, _))| view.parent == parent)
+            .filter_map(|(index, (_, p))| Some((index, (*p)?)))
+            .collect()
+    }
+
+    /// Declares the passes of a view in a mirror, with the pictures of those that it sees; its own picture.
+    fn declare_view<'a>(
+        &'a self,
+        graph: &mut FrameGraph<'a>,
+        board: &Board,
+        (index, view): (usize, &'a MirrorShape),
+        pictures: &[Option<TextureHandle>],
+    ) -> TextureHandle {
+        let number = index + 1;
+        let mut targets = Targets::new(graph, board, number);
+        let pass = targets.pass(graph, format!("mirror view {number}"), LoadOp::Clear(self.clear));
+        board.lit(pass).run(move |context| {
+            confine(context.pass, view.pixels);
+            context.user.draw_view(context.pass, LitPass::Lightmap, number);
+            context.user.draw_view(context.pass, LitPass::Forward, number);
+            confine(context.pass, self.whole());
+            Ok(())
+        });
+        let shown = self.seen_from(number, pictures);
+        if !shown.is_empty() {
+            let pass = targets.pass(graph, format!("mirrors in view {number}"), LoadOp::Load);
+            let pass = shown.iter().fold(pass, |pass, (_, picture)| pass.samples(picture));
+            pass.run(move |context| self.add_to(number, context, &shown));
+        }
+        if view.transparent {
+            let pass = targets.pass(graph, format!("mirrored transparent {number}"), LoadOp::Load);
+            board.lit(pass).run(move |context| {
+                confine(context.pass, view.pixels);
+                context.user.draw_view(context.pass, LitPass::Transparent, number);
+                confine(context.pass, self.whole());
+                Ok(())
+            });
+        }
+        targets.picture
+    }
+
+    /// Adds what mirrors show, each view by its picture, to the surfaces of a view.
+    fn add_to(
+        &self,
+        parent: usize,
+        context: &mut RasterContext<'_, FrameScene<'_>>,
+        shown: &[(usize, TextureHandle)],
+    ) -> Result<(), EffectError> {
+        let (Some(views), Some(device), Some(key)) = (&self.views, &self.device, &self.key) else {
+            return Ok(());
+        };
+        let Some(Ok(pipeline)) = device.pipelines.get(key).and_then(Deferred::get) else { return Ok(()) };
+        let Some(bound) = context.user.view_and_transforms(parent) else { return Ok(()) };
+        context.pass.set_pipeline(pipeline);
+        let seen_from = device.view_group(context.resources.device, bound);
+        context.pass.set_bind_group(0, &seen_from, &[]);
+        for (index, picture) in shown {
+            let Some(group) = device.picture_group(&context.resources, picture)? else { continue };
+            confine(context.pass, views[*index].pixels);
+            let before: usize = views[..*index].iter().map(|view| view.surfaces.len()).sum();
+            for (surface, place) in views[*index].surfaces.iter().zip(before..) {
+                // Fewer than 2^24 mirrors fit into a uniform.
+                context.pass.set_bind_group(1, &group, &[(place * STRIDE) as u32]);
+                context.user.draw_shape(context.pass, surface.slot);
+            }
+        }
+        confine(context.pass, self.whole());
+        Ok(())
+    }
+
+    fn whole(&self) -> [u32; 4] {
+        let [width, height] = self.size;
+        [0, 0, width, height]
+    }
+}
+
+/// Has a pass draw within a part of its targets only: the corner of the least numbers, width and height.
+fn confine(pass: &mut wgpu::RenderPass<'static>, [x, y, width, height]: [u32; 4]) {
+    pass.set_scissor_rect(x, y, width, height);
+}
+
+/// What a view in a mirror is drawn into.
+struct Targets {
+    /// Radiance, one sample per pixel.
+    picture: TextureHandle,
+    multisampled: Option<TextureHandle>,
+    depth: TextureHandle,
+}
+
+impl Targets {
+    fn new(graph: &mut FrameGraph<'_>, board: &Board, number: usize) -> Self {
+        let [width, height] = board.size;
+        let described = |format, samples| TextureDescriptor::new_2d(width, height, format).samples(samples);
+        let (format, samples) = (board.linear_format, board.samples);
+        let mut texture = |name: &str, format, samples| {
+            graph.texture(format!("mirror {name} {number}"), described(format, samples))
+        };
+        Self {
+            picture: texture("picture", format, 1),
+            multisampled: (samples > 1).then(|| texture("samples", format, samples)),
+            depth: texture("depth", DEPTH_FORMAT, samples),
+        }
+    }
+
+    /// Begins a pass over what is there, or over a background.
+    fn pass<'g, 'a>(
+        &mut self,
+        graph: &'g mut FrameGraph<'a>,
+        name: String,
+        load: LoadOp<wgpu::Color>,
+    ) -> PassBuilder<'g, 'a, Raster, FrameScene<'a>> {
+        let pass = graph.raster_pass(name);
+        let pass = match &mut self.multisampled {
+            Some(samples) => pass.color(samples, load).resolve(&mut self.picture),
+            None => pass.color(&mut self.picture, load),
+        };
+        let depths = if matches!(load, LoadOp::Clear(_)) { LoadOp::Clear(0.0) } else { LoadOp::Load };
+        pass.depth(&mut self.depth, depths)
+    }
+}
+
+impl OnDevice {
+    fn new(gpu: &Gpu) -> Self {
+        let buffer = |binding, visibility, ty, dynamic| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: dynamic, min_binding_size: None },
+            count: None,
+        };
+        let (uniform, storage) =
+            (wgpu::BufferBindingType::Uniform, wgpu::BufferBindingType::Storage { read_only: true });
+        let (vertex, fragment) = (wgpu::ShaderStages::VERTEX, wgpu::ShaderStages::FRAGMENT);
+        let picture = wgpu::BindGroupLayoutEntry {
+            binding: 1,
+            visibility: fragment,
+            ty: wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+            count: None,
+        };
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            let described = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries };
+            gpu.device.create_bind_group_layout(&described)
+        };
+        let of_view = [
+            buffer(FrameBuffer::Frame.binding(), vertex | fragment, uniform, false),
+            buffer(FrameBuffer::Objects.binding(), vertex, storage, false),
+        ];
+        let of_surface = [buffer(0, fragment, uniform, true), picture];
+        Self {
+            layouts: [layout("view of mirrors", &of_view), layout("mirror", &of_surface)],
+            pipelines: HashMap::new(),
+            uniform: None,
+            written: Vec::new(),
+            uploaded: 0,
+        }
+    }
+
+    /// Makes a pipeline, or begins to; whether it is there. With `wait` it is.
+    fn pipeline(&mut self, gpu: &Gpu, key: Key, wait: bool) -> Result<bool, EffectError> {
+        let pipeline = self.pipelines.entry(key).or_insert_with(|| {
+            let (device, layouts) = (gpu.device.clone(), self.layouts.clone());
+            let make = move || Ok(make(&device, &layouts, key)?);
+            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+        });
+        Ok(pipeline.is_there(wait)?)
+    }
+
+    /// Sends the surfaces of a frame, if they changed.
+    fn write(&mut self, gpu: &Gpu, surfaces: &[MirrorData]) {
+        let mut bytes = vec![0; surfaces.len() * STRIDE];
+        for (place, surface) in bytes.chunks_exact_mut(STRIDE).zip(surfaces) {
+            place[..size_of::<MirrorData>()].copy_from_slice(bytemuck::bytes_of(surface));
+        }
+        let size = bytes.len() as u64;
+        let uniform = match self.uniform.take().filter(|uniform| uniform.size() >= size) {
+            Some(uniform) => uniform,
+            None => {
+                self.written.clear();
+                gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("mirrors"),
+                    size: size.next_power_of_two(),
+                    usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                    mapped_at_creation: false,
+                })
+            }
+        };
+        if self.written != bytes {
+            gpu.queue.write_buffer(&uniform, 0, &bytes);
+            self.uploaded += size;
+            self.written = bytes;
+        }
+        self.uniform = Some(uniform);
+    }
+
+    fn view_group(&self, device: &wgpu::Device, [view, transforms]: [&wgpu::Buffer; 2]) -> wgpu::BindGroup {
+        let entry = |buffer: FrameBuffer, bound: &'_ wgpu::Buffer| (buffer.binding(), bound.clone());
+        let bound = [entry(FrameBuffer::Frame, view), entry(FrameBuffer::Objects, transforms)];
+        let entries = bound.each_ref().map(|(binding, buffer)| wgpu::BindGroupEntry {
+            binding: *binding,
+            resource: buffer.as_entire_binding(),
+        });
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("view of mirrors"),
+            layout: &self.layouts[0],
+            entries: &entries,
+        })
+    }
+
+    fn picture_group(
+        &self,
+        resources: &PassResources<'_>,
+        picture: &TextureHandle,
+    ) -> Result<Option<wgpu::BindGroup>, RunError> {
+        let Some(uniform) = &self.uniform else { return Ok(None) };
+        let surface = wgpu::BufferBinding {
+            buffer: uniform,
+            offset: 0,
+            size: NonZeroU64::new(size_of::<MirrorData>() as u64),
+        };
+        let entries = [
+            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(surface) },
+            wgpu::BindGroupEntry {
+                binding: 1,
+                resource: wgpu::BindingResource::TextureView(resources.view(picture)?),
+            },
+        ];
+        let described =
+            wgpu::BindGroupDescriptor { label: Some("mirror"), layout: &self.layouts[1], entries: &entries };
+        Ok(Some(resources.device.create_bind_group(&described)))
+    }
+}
+
+fn make(
+    device: &wgpu::Device,
+    layouts: &[wgpu::BindGroupLayout; 2],
+    Key { format, samples, fog }: Key,
+) -> Result<wgpu::RenderPipeline, RenderError> {
+    let modes = [
+        Feature::Fog,
+        Feature::FogLinear,
+        Feature::FogExponential,
+        Feature::FogExponentialSquared,
+        Feature::FogDepthCue,
+    ];
+    let on = |feature| fog.is_some_and(|mode| feature == mode || feature == Feature::Fog);
+    let flags = modes.map(|feature| (feature.name(), on(feature)));
+    let module = shader::compile(device, "mirror", &flags)?;
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("mirrors"),
+        bind_group_layouts: &layouts.each_ref().map(Some),
+        immediate_size: 0,
+    });
+    let add = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    };
+    let positions =
+        [wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x3, offset: 0, shader_location: 0 }];
+    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("mirrors"),
+        layout: Some(&pipeline_layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<Vec3>() as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &positions,
+            })],
+        },
+        // What a mirror is seen from was decided with its view; what is not there has no equal depth.
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(false),
+            depth_compare: Some(wgpu::CompareFunction::Equal),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format,
+                blend: Some(wgpu::BlendState { color: add, alpha: add }),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    }))
+}

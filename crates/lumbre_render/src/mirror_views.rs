@@ -1,0 +1,181 @@
+//! The views that the planar mirrors of a frame call for: which mirrors are seen from where, as seen in which others, and what each adds to the surface that mirrors.
+//! Not how a view is drawn (`effects::mirrors`), nor its geometry (`extract::CameraView::reflected`).
+//!
+//! ```text
+//!   camera ──┬── mirror A ──── mirror B in A        a tree; each view is reflected in a plane of what its parent sees
+//!            └── mirror B ──── mirror A in B        and drawn before it
+//! ```
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec4, Vec3};
+
+use crate::draws::Draws;
+use crate::extract::{CameraView, Object, Objects, PlanarMirror, Window};
+
+/// More views than this a frame does not have, beside the camera's.
+pub(crate) const MOST_VIEWS: usize = 16;
+/// Mirrors that lie in one plane share a view: planes whose normals are as near as this, as the sine of an angle.
+const SAME_DIRECTION: f64 = 1e-6;
+/// And whose distances from the mirror's middle are as near as this, in metres beside the extent of the mirror.
+const SAME_PLACE: f64 = 1e-5;
+
+/// What is seen in one plane of mirrors.
+#[derive(Debug)]
+pub(crate) struct MirrorView {
+    /// The view that sees the mirrors: 0 is the camera's, 1 the first of these.
+    pub parent: usize,
+    pub view: CameraView,
+    pub mirrors: Vec<MirrorSurface>,
+    /// What is drawn of it, by the objects in view.
+    pub draws: Draws,
+}
+
+/// A mirror in the plane of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MirrorSurface {
+    /// Of its object.
+    pub slot: usize,
+    pub data: MirrorData,
+}
+
+/// `Mirror`: what a surface makes of what it mirrors.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct MirrorData {
+    /// k_r.
+    mirror: Vec3,
+    /// Of the medium behind the surface to that before it.
+    eta: f32,
+    /// k_t.
+    transmission: Vec3,
+    /// 1 for a sheet, which both of its faces make brighter.
+    thin: f32,
+    /// Unit, towards the viewer.
+    normal: Vec3,
+    /// 1 where rays of sight are parallel.
+    parallel: f32,
+    /// What lies behind everything, as radiance.
+    background: Vec3,
+    padding: f32,
+}
+
+impl MirrorData {
+    fn new(mirror: &PlanarMirror, plane: DVec4, front: bool, view: &CameraView, background: Vec3) -> Self {
+        let flag = |on: bool| if on { 1.0 } else { 0.0 };
+        // Seen from behind a solid's surface, the viewer is inside.
+        let inside = !front && !mirror.thin && mirror.ior > 0.0;
+        Self {
+            mirror: mirror.mirror,
+            eta: if inside { 1.0 / mirror.ior } else { mirror.ior },
+            transmission: mirror.transmission,
+            thin: flag(mirror.thin),
+            normal: plane.truncate().as_vec3(),
+            parallel: flag(view.viewer().w == 0.0),
+            background,
+            padding: 0.0,
+        }
+    }
+}
+
+/// A plane of mirrors that a view sees.
+struct SeenPlane {
+    plane: DVec4,
+    /// Where its mirrors are in the frame.
+    window: Window,
+    mirrors: Vec<MirrorSurface>,
+    /// The largest part of light that it reflects to the camera, times the part of the frame that it covers.
+    weight: f64,
+}
+
+/// The views of what a camera sees in mirrors, and of what it sees in these, as often as `depth` says; parents before children. Draws are not in them yet. Of more than
+/// [`MOST_VIEWS`] those that matter least are left out, each with those seen in it, and said to be.
+pub(crate) fn mirror_views(
+    objects: &Objects,
+    camera: &CameraView,
+    (two_sided, background): (bool, Vec3),
+    depth: u32,
+    left_out: &mut Vec<String>,
+) -> Vec<MirrorView> {
+    let mut views: Vec<MirrorView> = Vec::new();
+    // Of the last generation: number, view, part of its light that reaches the camera, and mirrors in whose plane it is.
+    let mut generation = vec![(0, *camera, 1.0, Vec::new())];
+    let mut without = 0;
+    for _ in 0..depth {
+        let seen = generation.iter().flat_map(|(parent, view, weight, own)| {
+            let planes = seen_planes(objects, view, two_sided, background, own);
+            planes.into_iter().map(move |seen| (*parent, *view, seen.weight * weight, seen))
+        });
+        let mut seen: Vec<_> = seen.collect();
+        seen.sort_by(|a, b| b.2.total_cmp(&a.2));
+        let mut children = Vec::new();
+        for (parent, view, weight, seen) in seen {
+            let Some(reflected) = view.reflected(seen.plane, seen.window) else { continue };
+            if views.len() == MOST_VIEWS {
+                without += 1;
+                continue;
+            }
+            let own = seen.mirrors.iter().map(|mirror| mirror.slot).collect();
+            let (mirrors, draws) = (seen.mirrors, Draws::default());
+            views.push(MirrorView { parent, view: reflected, mirrors, draws });
+            children.push((views.len(), reflected, weight / seen.window.area().max(f64::MIN_POSITIVE), own));
+        }
+        generation = children;
+    }
+    if without > 0 {
+        left_out.push(format!(
+            "what {without} more mirrors show: a frame has {MOST_VIEWS} views of mirrors at most, those that cover most of it; let mirrors lie in one plane, or \
+             lower `mirror_depth`"
+        ));
+    }
+    views
+}
+
+/// The planes of the mirrors that a view sees, but for those that it is itself seen in.
+fn seen_planes(
+    objects: &Objects,
+    view: &CameraView,
+    two_sided: bool,
+    background: Vec3,
+    own: &[usize],
+) -> Vec<SeenPlane> {
+    let mut planes: Vec<SeenPlane> = Vec::new();
+    let frustum = view.frustum(objects.origin);
+    for (slot, object) in objects.iter() {
+        let Some(mirror) = object.planar_mirror.filter(|_| !own.contains(&slot)) else { continue };
+        let center = (object.center - objects.origin).extend(1.0);
+        if frustum.iter().any(|plane| plane.dot(center) < -reach(object, plane)) {
+            continue;
+        }
+        let Some((plane, front)) = mirror.facing(view.viewer()) else { continue };
+        let shown = front || (two_sided && object.traits.double_sided);
+        let Some(window) = view.window_of_box(object.center, object.half_size).filter(|_| shown) else {
+            continue;
+        };
+        let data = MirrorData::new(&mirror, plane, front, view, background);
+        let surface = MirrorSurface { slot, data };
+        let weight = mirror.weight() * window.area();
+        match planes.iter_mut().find(|seen| is_same_plane(seen.plane, plane, object)) {
+            Some(seen) => {
+                let both =
+                    Window { low: seen.window.low.min(window.low), high: seen.window.high.max(window.high) };
+                (seen.window, seen.weight) = (both, seen.weight + weight);
+                seen.mirrors.push(surface);
+            }
+            None => planes.push(SeenPlane { plane, window, mirrors: vec![surface], weight }),
+        }
+    }
+    planes
+}
+
+/// How far an object's box reaches along the normal of a plane, from its middle.
+fn reach(object: &Object, plane: &DVec4) -> f64 {
+    plane.truncate().abs().dot(object.half_size)
+}
+
+/// Whether a mirror of this object, in plane `b`, lies in plane `a`.
+fn is_same_plane(a: DVec4, b: DVec4, object: &Object) -> bool {
+    let apart = (a - b).dot(object.center.extend(1.0)).abs();
+    a.truncate().dot(b.truncate()) > 0.0
+        && a.truncate().cross(b.truncate()).length() < SAME_DIRECTION
+        && apart < SAME_PLACE * (1.0 + object.radius)
+}

@@ -1,0 +1,153 @@
+//! The buffers that one view of a frame has for itself: its matrices, its clusters of lights, and the groups 0 that name them. What all views of a frame share
+//! (objects, materials, lights) is the renderer's.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::{DVec3, Vec3};
+use lumbre_scene::SceneSettings;
+
+use crate::Gpu;
+use crate::cluster_buffers::ClusterBuffers;
+use crate::draws::{Batch, Draws};
+use crate::extract::{CameraView, LightSet, LitPass};
+use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::layout::{FrameData, radiance};
+use crate::light_counter::LightCounter;
+
+/// The buffers of group 0 that all views of a frame share, as far as they are there.
+#[derive(Clone, Copy)]
+pub(crate) struct SharedBuffers<'a> {
+    pub objects: Option<&'a wgpu::Buffer>,
+    pub materials: Option<&'a wgpu::Buffer>,
+    pub instances: Option<&'a wgpu::Buffer>,
+    pub lights: Option<&'a wgpu::Buffer>,
+    pub light_list: Option<&'a wgpu::Buffer>,
+    /// Where lights are counted.
+    pub counter: &'a LightCounter,
+}
+
+/// A group 0: the buffers that are bound in it, and for which pass, where lights are counted by pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FrameGroup {
+    pub bindings: FrameBindings,
+    pub counted_in: Option<LitPass>,
+}
+
+impl FrameGroup {
+    /// What a batch is drawn with in a pass.
+    pub fn of(batch: &Batch, pass: LitPass) -> Self {
+        let bindings = FrameBindings::of(&batch.pipeline.variant);
+        Self { bindings, counted_in: bindings.count_lights().then_some(pass) }
+    }
+}
+
+/// A view on the GPU.
+#[derive(Debug)]
+pub(crate) struct ViewBuffers {
+    frame: wgpu::Buffer,
+    pub clusters: ClusterBuffers,
+    groups: HashMap<FrameGroup, wgpu::BindGroup>,
+}
+
+impl ViewBuffers {
+    pub fn new(gpu: &Gpu) -> Self {
+        let frame = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("frame"),
+            size: size_of::<FrameData>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { frame, clusters: ClusterBuffers::new(), groups: HashMap::new() }
+    }
+
+    /// Sends the matrices of a view, and what its shaders need to know of the scene; `origin` is that of frame space.
+    pub fn write(
+        &self,
+        gpu: &Gpu,
+        (view, origin): (&CameraView, DVec3),
+        settings: &SceneSettings,
+        lights: &LightSet,
+        exposure: f32,
+    ) {
+        let fog = settings.fog.as_ref();
+        let data = FrameData {
+            clip_from_frame: view.clip_from_frame(origin).as_mat4().to_cols_array_2d(),
+            eye: (view.eye - origin).as_vec3(),
+            exposure,
+            backward: view.basis.z_axis.as_vec3(),
+            padding: 0.0,
+            ambient: radiance(settings.ambient_with_sky()) + lights.ambient,
+            padding_2: 0.0,
+            fog_color: fog.map_or(Vec3::ZERO, |fog| radiance(fog.color)),
+            padding_3: 0.0,
+            fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
+        };
+        gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&data));
+    }
+
+    /// A buffer of group 0, once it is there; what a pass counts lights in is its own.
+    pub fn bound<'a>(
+        &'a self,
+        buffer: FrameBuffer,
+        counted_in: Option<LitPass>,
+        shared: &SharedBuffers<'a>,
+    ) -> Option<wgpu::BufferBinding<'a>> {
+        let whole = match buffer {
+            FrameBuffer::Frame => Some(&self.frame),
+            FrameBuffer::Objects => shared.objects,
+            FrameBuffer::Materials => shared.materials,
+            FrameBuffer::Instances => shared.instances,
+            FrameBuffer::Lights => shared.lights,
+            FrameBuffer::LightList => shared.light_list,
+            FrameBuffer::LightCounts | FrameBuffer::VertexLightCounts => {
+                return shared.counter.binding(counted_in?);
+            }
+            of_clusters => return self.clusters.buffer(of_clusters),
+        };
+        whole.map(|buffer| wgpu::BufferBinding { buffer, offset: 0, size: None })
+    }
+
+    /// What shaders know of the view.
+    pub fn frame(&self) -> &wgpu::Buffer {
+        &self.frame
+    }
+
+    /// Forgets the groups: a buffer that they name is another one.
+    pub fn forget_groups(&mut self) {
+        self.groups.clear();
+    }
+
+    /// The group 0 of some draws, once it is made.
+    pub fn group(&self, wanted: &FrameGroup) -> Option<&wgpu::BindGroup> {
+        self.groups.get(wanted)
+    }
+
+    /// The groups 0 of these draws that are not there yet.
+    pub fn missing_groups(&self, draws: &Draws) -> HashSet<FrameGroup> {
+        let groups = LitPass::ALL
+            .into_iter()
+            .flat_map(|pass| draws.of(pass).iter().map(move |batch| FrameGroup::of(batch, pass)));
+        groups.filter(|wanted| !self.groups.contains_key(wanted)).collect()
+    }
+
+    /// Makes a group 0.
+    pub fn make_group(
+        &mut self,
+        gpu: &Gpu,
+        wanted: FrameGroup,
+        layout: &wgpu::BindGroupLayout,
+        shared: &SharedBuffers<'_>,
+    ) {
+        let entry = |buffer: FrameBuffer| {
+            let resource = wgpu::BindingResource::Buffer(self.bound(buffer, wanted.counted_in, shared)?);
+            Some(wgpu::BindGroupEntry { binding: buffer.binding(), resource })
+        };
+        let entries: Vec<_> = wanted.bindings.buffers().filter_map(entry).collect();
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout,
+            entries: &entries,
+        });
+        self.groups.insert(wanted, group);
+    }
+}
