@@ -512,6 +512,24 @@ const ROWS: &[Row] = &[
         add: |scene| settings(scene, |settings| settings.two_sided = true),
     },
     Row {
+        effect: "planar mirrors",
+        called_for_by: "a flat mesh whose material has `mirror`, or `transmission` with `Medium::fresnel`",
+        features: &[],
+        before: |scene| {
+            point_light(scene);
+            let place = Transform::from_xyz(0.0, -1.1, 0.0);
+            let floor = Mesh::from(shapes::plane(4.0, 4.0, 1, 1));
+            scene.world.spawn((floor, Material::matt(Vec3::splat(0.2)), place));
+        },
+        add: |scene| {
+            for (mesh, mut material) in
+                scene.world.query::<(&Mesh, &mut Material)>().iter_mut(&mut scene.world)
+            {
+                material.mirror = if mesh.0.triangle_count() == 2 { Vec3::splat(0.7) } else { Vec3::ZERO };
+            }
+        },
+    },
+    Row {
         effect: "linear fog",
         called_for_by: "the scene's fog, by its mode",
         features: &["FOG", "FOG_LINEAR"],

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Fog, FogMode, Light, Material, Shading, Surface};
+use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material, Shading, SpotCone, Surface};
 use lumbre_render::{FrameOptions, LightLists};
 use lumbre_scene::{Camera, Medium, Mesh, Projection, SceneSettings, Transform};
 use lumbre_trace::{TraceOptions, trace};
@@ -74,6 +74,8 @@ struct Against {
     /// How many such pixels there are, and in how many of them a mirror shows something.
     pixels: usize,
     mirrored: usize,
+    /// And in how many the difference can be seen.
+    apart: usize,
 }
 
 /// Compares a frame with the ray tree, mirrored as often, in those pixels over which the ray tree has no edge.
@@ -88,7 +90,7 @@ fn against_the_ray_tree(world: &mut World, options: &FrameOptions) -> Against {
         ..TraceOptions::default()
     };
     let traced = trace(world, &traced, &|_| ControlFlow::Continue(())).unwrap().0.radiance;
-    let mut against = Against { largest: 0.0, pixels: 0, mirrored: 0 };
+    let mut against = Against { largest: 0.0, pixels: 0, mirrored: 0, apart: 0 };
     for (index, (pixel, without)) in frame.iter().zip(&without).enumerate() {
         let (row, column) = (index / WIDTH as usize, index % WIDTH as usize);
         // With the nearest rays of the pixels around it, as samples of a pixel lie farther out than its rays.
@@ -101,7 +103,9 @@ fn against_the_ray_tree(world: &mut World, options: &FrameOptions) -> Against {
         if even {
             against.pixels += 1;
             against.mirrored += usize::from((*pixel - *without).abs().max_element() > STEP);
-            against.largest = against.largest.max((*pixel - middle).abs().max_element());
+            let difference = (*pixel - middle).abs().max_element();
+            against.largest = against.largest.max(difference);
+            against.apart += usize::from(difference > 4.0 * STEP);
         }
     }
     against
@@ -133,6 +137,62 @@ fn a_mirror_shows_what_the_ray_tree_shows() {
     is_the_ray_trees("four samples", &mut room(mirror(0.8)), &sampled);
     let clustered = FrameOptions { light_lists: LightLists::Clusters, ..unshadowed(1) };
     is_the_ray_trees("clusters of lights", &mut room(mirror(0.8)), &clustered);
+}
+
+/// A blended pane in a mirror is blended over what the mirror shows, as it is in the frame.
+#[test]
+fn what_is_blended_is_blended_in_mirrors() {
+    let pane = |alpha| {
+        let mut world = room(mirror(0.8));
+        let material =
+            Material { alpha, alpha_mode: AlphaMode::Blend, unlit: true, ..matte(Vec3::new(0.9, 0.1, 0.6)) };
+        let place = Transform::from_xyz(-0.3, 1.6, 5.5)
+            .with_rotation(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2));
+        world.spawn((Mesh(Arc::new(shapes::plane(6.0, 6.0, 1, 1))), material, place));
+        world
+    };
+    for multisample in [false, true] {
+        let options = FrameOptions { multisample: Some(multisample), ..unshadowed(1) };
+        let [clear, half, full] =
+            [0.0, 0.5, 1.0].map(|alpha| draw(&mut pane(alpha), WIDTH, HEIGHT, &options).0);
+        let mut mixed = 0;
+        for ((clear, half), full) in clear.iter().zip(&half).zip(&full) {
+            assert!((0.5 * (*clear + *full) - *half).abs().max_element() < 1e-5, "{clear} {half} {full}");
+            mixed += usize::from((*clear - *full).abs().max_element() > STEP);
+        }
+        assert!(mixed > 1000, "{mixed}");
+    }
+}
+
+/// The ray tree's shadows are exact, so that pixels at the edges of shadows differ; there may be few of them.
+#[test]
+fn shadows_are_in_mirrors_too() {
+    for light in [
+        Light::directional(Vec3::new(2.0, 1.9, 1.7)),
+        Light::point(Vec3::splat(16.0)),
+        Light::spot(Vec3::splat(30.0), SpotCone::Smooth { inner: 0.4, outer: 0.6 }),
+    ] {
+        let mut world = room(mirror(0.9));
+        world.resource_mut::<SceneSettings>().frame.shadow_resolution = 4.0;
+        let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
+        lamps.into_iter().for_each(|lamp| assert!(world.despawn(lamp)));
+        // The post and its shadow are behind the camera.
+        let place = Transform::from_xyz(4.0, 3.5, 4.5).looking_at(DVec3::new(0.0, 0.5, 3.5), DVec3::Y);
+        world.spawn((Light { shadow: true, ..light.clone() }, place));
+        let post = Transform::from_xyz(0.2, 0.9, 5.2);
+        world.spawn((
+            Mesh(Arc::new(shapes::cuboid(Vec3::new(0.5, 1.8, 0.5), 1))),
+            matte(Vec3::splat(0.4)),
+            post,
+        ));
+        let options = FrameOptions { shadows: true, ..unshadowed(1) };
+        let apart = against_the_ray_tree(&mut world, &options).apart;
+        let (shadowed, _) = draw(&mut world, WIDTH, HEIGHT, &options);
+        let (lit, _) = draw(&mut world, WIDTH, HEIGHT, &unshadowed(1));
+        let dark = shadowed.iter().zip(&lit).filter(|(a, b)| (**a - **b).abs().max_element() > STEP).count();
+        println!("{:?}: {dark} pixels in shadow, {apart} differ", light.kind);
+        assert!(dark > 400 && apart * 40 < dark, "{:?}: {apart} of {dark} differ", light.kind);
+    }
 }
 
 #[test]

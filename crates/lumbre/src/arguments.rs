@@ -547,6 +547,10 @@ pub struct Frame {
     /// Draws no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,
+    /// How often light is mirrored at most where it meets flat mirrors: 1 shows a mirror, 2 (the default) a mirror in a mirror; 0 leaves out what mirrors
+    /// show.
+    #[arg(long, value_name = "N")]
+    pub mirror_depth: Option<u32>,
     /// Four samples per pixel, whatever the file says.
     #[arg(long)]
     pub msaa: bool,

@@ -590,9 +590,12 @@ impl Renderer {
         clock.lap(|cpu| &mut cpu.clusters_ms);
         let shadowed = !lights.shadows.is_empty();
         if shadowed {
-            let depths = draws.depths.unwrap_or([0.0, 1.0]);
+            let depths = decided.every_draws().filter_map(|draws| draws.depths);
+            let depths = depths.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([0.0, 1.0]);
             let resolution = decided.decision.settings.frame.shadow_resolution();
-            let view = ShadowedView { view: seen.view, height: seen.target.height, depths, resolution };
+            let reflected = mirrors.iter().map(|mirror| mirror.view).collect();
+            let height = seen.target.height;
+            let view = ShadowedView { view: seen.view, reflected, height, depths, resolution };
             self.shadows.plan(&lights.shadows, &self.objects, &view);
         }
         clock.lap(|cpu| &mut cpu.shadows_ms);

@@ -49,12 +49,14 @@ pub(crate) struct StaleMap {
 }
 
 /// What the views of a frame need to know of its camera.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ShadowedView {
     pub view: CameraView,
+    /// The views that it has in mirrors.
+    pub reflected: Vec<CameraView>,
     /// Rows of the frame.
     pub height: u32,
-    /// Nearest and farthest depth of what is in view, in metres.
+    /// Nearest and farthest depth of what is in any view, in metres.
     pub depths: [f64; 2],
     /// Texels of the maps beside the usual number, along a side.
     pub resolution: f32,
@@ -155,6 +157,7 @@ impl ShadowMaps {
         };
         let seen = views::Seen {
             view: seen.view,
+            reflected: seen.reflected.clone(),
             origin: objects.origin,
             depths: seen.depths,
             height: seen.height,

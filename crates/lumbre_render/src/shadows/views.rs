@@ -43,9 +43,11 @@ pub(super) struct Lamp {
 }
 
 /// The camera, as cascades depend on it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Seen {
     pub view: CameraView,
+    /// The views that it has in mirrors.
+    pub reflected: Vec<CameraView>,
     pub origin: DVec3,
     /// Nearest and farthest depth of what is in view, in metres.
     pub depths: [f64; 2],
@@ -143,7 +145,7 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
     (1..=CASCADES)
         .map(|number| {
             let finish = end(number as f64 / CASCADES as f64);
-            let (center, radius) = slice(&seen.view, seen.origin, begin, finish);
+            let (center, radius) = slice_of_all(seen, begin, finish);
             begin = finish;
             let texel = 2.0 * radius * (1.0 + BORDER) / seen.most_texels();
             // In a grid that is fixed in the world.
@@ -176,6 +178,36 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
         .collect()
 }
 
+/// The ball around what all views show between two depths, in frame space. With mirrors its size depends on where the camera looks: in steps, so that most frames have the
+/// grid of texels of the one before.
+fn slice_of_all(seen: &Seen, begin: f64, end: f64) -> (DVec3, f64) {
+    let own = slice(&seen.view, seen.origin, begin, end);
+    let reflected = seen.reflected.iter().filter_map(|view| {
+        let corners = view.corners(seen.origin, [begin, end]);
+        let mirror = view.frustum(seen.origin)[4];
+        // Behind the mirror there is nothing to light.
+        corners.iter().any(|corner| mirror.dot(corner.extend(1.0)) > 0.0).then(|| {
+            let center = corners.iter().sum::<DVec3>() / corners.len() as f64;
+            (center, corners.iter().map(|corner| corner.distance(center)).fold(0.0, f64::max))
+        })
+    });
+    let (center, radius) = reflected.fold(own, |(center, radius), (other, other_radius)| {
+        let apart = center.distance(other);
+        if apart + other_radius <= radius {
+            return (center, radius);
+        }
+        if apart + radius <= other_radius {
+            return (other, other_radius);
+        }
+        let both = 0.5 * (apart + radius + other_radius);
+        (center.lerp(other, (both - radius) / apart), both)
+    });
+    match seen.reflected.is_empty() {
+        true => (center, radius),
+        false => (center, ((4.0 * radius.log2()).ceil() / 4.0).exp2()),
+    }
+}
+
 /// The ball around the part of the view volume between two depths, in frame space.
 fn slice(view: &CameraView, origin: DVec3, begin: f64, end: f64) -> (DVec3, f64) {
     let eye = view.eye - origin;
@@ -199,6 +231,7 @@ fn slice(view: &CameraView, origin: DVec3, begin: f64, end: f64) -> (DVec3, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::extract::Window;
 
     fn seen(eye: DVec3) -> Seen {
         let mut world = bevy_ecs::world::World::new();
@@ -208,6 +241,7 @@ mod tests {
         let view = CameraView::new(&world, camera, 1.5).unwrap();
         Seen {
             view,
+            reflected: Vec::new(),
             origin: DVec3::ZERO,
             depths: [0.5, 60.0],
             height: 720,
@@ -247,6 +281,32 @@ mod tests {
             let face = 2 * face + usize::from(direction[face] < 0.0);
             assert!(inside(&faces[face], cube.position + direction), "{direction} {face}");
         }
+    }
+
+    #[test]
+    fn cascades_hold_what_mirrors_show() {
+        let mut seen = seen(DVec3::new(4.0, 3.0, 8.0));
+        let normal = DVec3::new(1.0, 0.1, 0.9).normalize();
+        let plane = normal.extend(0.0);
+        seen.reflected = vec![seen.view.reflected(plane, Window::WHOLE).unwrap()];
+        let cascades = views(&lamp(ShadowKind::Cascades), &seen);
+        let view = seen.reflected[0];
+        let corners = [1.0, 60.0].map(|depth| view.corners(DVec3::ZERO, [depth; 2]));
+        let mut held = 0;
+        for step in 0..1000 {
+            let t = f64::from(step);
+            let [u, v, w] = [0.37, 0.73, 0.11].map(|speed| 0.5 + 0.5 * (t * speed).sin());
+            // Corners: right, up, far.
+            let across = |row: &[DVec3; 8]| row[0] + (row[1] - row[0]) * u + (row[2] - row[0]) * v;
+            let point = across(&corners[0]).lerp(across(&corners[1]), w * w);
+            if plane.dot(point.extend(1.0)) > 0.0 {
+                let depth = (view.eye - point).dot(view.basis.z_axis);
+                let cascade = cascades.iter().find(|cascade| depth <= cascade.end).unwrap();
+                assert!(inside(cascade, point), "{point} at {depth} m");
+                held += 1;
+            }
+        }
+        assert!(held > 300, "{held}");
     }
 
     #[test]
