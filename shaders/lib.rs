@@ -31,6 +31,7 @@ macro_rules! modules {
 }
 
 modules!(
+    "behind",
     "display",
     "display_color",
     "forward",
@@ -44,6 +45,7 @@ modules!(
     "mirror",
     "normal_map",
     "occlusion_map",
+    "refraction",
     "shadow_caster",
     "shadows",
     "surface_maps",

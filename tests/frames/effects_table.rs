@@ -512,6 +512,16 @@ const ROWS: &[Row] = &[
         add: |scene| settings(scene, |settings| settings.two_sided = true),
     },
     Row {
+        effect: "refraction",
+        called_for_by: "a material with `transmission` that is not blended",
+        features: &[],
+        before: |scene| {
+            point_light(scene);
+            occluder(scene);
+        },
+        add: |scene| material(scene, |material| material.transmission = Vec3::splat(0.8)),
+    },
+    Row {
         effect: "planar mirrors",
         called_for_by: "a flat mesh whose material has `mirror`, or `transmission` with `Medium::fresnel`",
         features: &[],
@@ -653,6 +663,7 @@ const NO_SCENE: &[(&str, &str)] = &[
     ("CONSTANT", "leaves out all but one colour of a surface"),
     ("DISPLAY", "that the display is folded in, with a tone curve, a clamp or neither"),
     ("VIEWPORT", "frames in a part of their target: `display`'s tests"),
+    ("MULTISAMPLED", "depths of several samples behind glass: `refraction`'s tests"),
     ("DECODE_SRGB", "targets that encode by themselves: `display`'s tests"),
 ];
 

@@ -34,6 +34,7 @@ mod own_effects;
 mod polygon_lights;
 mod properties;
 mod reflection;
+mod refraction;
 mod settings;
 mod shading_by_need;
 mod shadows;

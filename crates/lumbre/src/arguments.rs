@@ -551,6 +551,9 @@ pub struct Frame {
     /// show.
     #[arg(long, value_name = "N")]
     pub mirror_depth: Option<u32>,
+    /// Draws surfaces that light passes through opaque.
+    #[arg(long)]
+    pub no_refraction: bool,
     /// Four samples per pixel, whatever the file says.
     #[arg(long)]
     pub msaa: bool,

@@ -128,6 +128,7 @@ pub fn frame_options(
         lightmaps: !frame.no_lightmaps,
         irradiance_volumes: !frame.no_irradiance_volumes,
         shadows: !frame.no_shadows,
+        refraction: !frame.no_refraction,
         mirror_depth: frame.mirror_depth.unwrap_or(FrameOptions::default().mirror_depth),
         multisample: match (frame.msaa, frame.no_msaa) {
             (true, _) => Some(true),

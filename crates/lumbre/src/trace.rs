@@ -128,8 +128,8 @@ fn meaningless(asked: &Trace) -> Vec<&'static str> {
             "--light-threshold, --shadow-resolution and --shadow-filter mean nothing to rays: no lamp ends early, and shadows are exact",
         ),
         (
-            asked.frame.mirror_depth.is_some(),
-            "--mirror-depth is for frames: --depth says how often rays are mirrored and let through",
+            asked.frame.mirror_depth.is_some() || asked.frame.no_refraction,
+            "--mirror-depth and --no-refraction are for frames: --depth says how often rays are mirrored and let through",
         ),
         (trees && asked.error.is_some(), "--error is for --integrator path: the ray tree has no noise"),
         (

@@ -34,6 +34,8 @@ pub(crate) struct Batch {
 pub(crate) struct Draws {
     pub lightmapped: Vec<Batch>,
     pub opaque: Vec<Batch>,
+    /// What lies behind them is drawn through them.
+    pub refractive: Vec<Batch>,
     pub transparent: Vec<Batch>,
     /// In the order of the draws.
     pub instances: Vec<InstanceData>,
@@ -94,7 +96,7 @@ impl<'a> VisibleObjects<'a> {
                 continue;
             }
             let traits = &object.traits;
-            let pass = LitPass::of(traits, frame.lightmaps);
+            let pass = LitPass::of(traits, frame.lightmaps, frame.refraction);
             let shading = match features::asked_shading(traits, settings, frame) {
                 Shading::Auto { max_error } => need(slot, object, max_error),
                 asked => asked,
@@ -177,6 +179,7 @@ impl Draws {
         let batches = match seen.pass {
             LitPass::Lightmap => &mut self.lightmapped,
             LitPass::Forward => &mut self.opaque,
+            LitPass::Refraction => &mut self.refractive,
             LitPass::Transparent => &mut self.transparent,
         };
         let has = |feature| seen.pipeline.variant.has(feature);
@@ -209,6 +212,7 @@ impl Draws {
         match pass {
             LitPass::Lightmap => &self.lightmapped,
             LitPass::Forward => &self.opaque,
+            LitPass::Refraction => &self.refractive,
             LitPass::Transparent => &self.transparent,
         }
     }
@@ -220,7 +224,7 @@ impl Draws {
 
     /// Every batch, in the order of the passes.
     pub fn batches(&self) -> impl Iterator<Item = &Batch> {
-        self.lightmapped.iter().chain(&self.opaque).chain(&self.transparent)
+        LitPass::ALL.into_iter().flat_map(|pass| self.of(pass))
     }
 }
 
@@ -238,6 +242,6 @@ fn order(object: &Object, eye: DVec3, pass: LitPass) -> f64 {
     let center = (object.center - eye).length();
     match pass {
         LitPass::Transparent => -(center - object.radius).max(0.0),
-        LitPass::Lightmap | LitPass::Forward => center + object.radius,
+        LitPass::Lightmap | LitPass::Forward | LitPass::Refraction => center + object.radius,
     }
 }

@@ -119,6 +119,7 @@ const EFFECTS: &[Removable] = &[
         effect: "two-sided",
         without: |world, _| each_material(world, |material| material.double_sided = false),
     },
+    Removable { effect: "refraction", without: |_, options| options.refraction = false },
     Removable { effect: "planar mirrors", without: |_, options| options.mirror_depth = 0 },
     Removable { effect: "fog", without: |world, _| settings(world, |settings| settings.fog = None) },
 ];

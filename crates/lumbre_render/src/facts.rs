@@ -14,10 +14,12 @@ use crate::extract::LightSet;
 pub struct SceneFacts {
     /// What there is of everything: of what can be drawn, wherever the camera looks.
     pub census: Arc<Census>,
-    /// Shown opaque objects that are not lit by a lightmap.
+    /// Shown opaque objects that are not lit by a lightmap, without those that refract.
     pub opaque: usize,
     /// Shown opaque objects with a lightmap, whether lightmaps are switched on or not.
     pub lightmapped: usize,
+    /// Shown objects through which what lies behind them is drawn, if that is switched on.
+    pub refractive: usize,
     /// Shown objects that are blended.
     pub transparent: usize,
     /// Lights that shine, ambient ones apart; each face of an emissive object that lights others is one.
@@ -39,12 +41,17 @@ impl SceneFacts {
         settings: &SceneSettings,
         options: &FrameOptions,
     ) -> Self {
-        let lightmapped = objects.lightmapped - objects.lightmapped_blended;
+        let (refractive, lightmapped_refractive) = match options.refraction {
+            true => (objects.refractive, objects.lightmapped_refractive),
+            false => (0, 0),
+        };
+        let lightmapped = objects.lightmapped - objects.lightmapped_blended - lightmapped_refractive;
         let by_lightmap = if options.lightmaps { lightmapped } else { 0 };
         Self {
             census: Arc::new(Census::new(objects, lights.census, irradiance_volumes, settings)),
-            opaque: objects.meshes - objects.alpha_blend - by_lightmap,
+            opaque: objects.meshes - objects.alpha_blend - refractive - by_lightmap,
             lightmapped,
+            refractive,
             transparent: objects.alpha_blend,
             lights: lights.every.all,
             shadow_lights: lights.every.shadows.lights,

@@ -154,6 +154,7 @@ impl Decided {
         LitPasses {
             lightmap: self.pass_lights(&self.draws.lightmapped),
             forward: self.pass_lights(&self.draws.opaque),
+            refraction: self.pass_lights(&self.draws.refractive),
             transparent: self.pass_lights(&self.draws.transparent),
         }
     }

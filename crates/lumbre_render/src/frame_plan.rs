@@ -1,7 +1,7 @@
 //! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
 
+use crate::extract::{MirrorSurface, RefractorSurface};
 use crate::facts::SceneFacts;
-use crate::mirror_views::{MirrorSurface, MirrorView};
 use crate::rehearsal::Rehearsals;
 use crate::statistics::Uploads;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
@@ -64,7 +64,7 @@ impl FramePlan {
             && flags.sample_count_supported(plan.samples)
             && flags.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
         let blends = features.contains(wgpu::Features::FLOAT32_BLENDABLE);
-        let blended = facts.transparent > 0 || facts.calls_for_mirrors(options);
+        let blended = facts.transparent > 0 || facts.refractive > 0 || facts.calls_for_mirrors(options);
         let wide_works = (!blended || blends) && (plan.samples == 1 || resolves);
         if wide_works && (options.full_precision || target.format == wide) {
             plan.linear_format = wide;
@@ -97,6 +97,7 @@ impl FramePlan {
             display_pass: self.ending == Ending::DisplayPass,
             shadow_atlas: None,
             mirrors: None,
+            refractors: Vec::new(),
             uploads: Uploads::default(),
             rehearsals: None,
         }
@@ -129,6 +130,8 @@ pub struct FrameShape {
     pub(crate) shadow_atlas: Option<ShadowAtlas>,
     /// What mirrors show, parents before children; unknown before the frame is decided.
     pub(crate) mirrors: Option<Vec<MirrorShape>>,
+    /// What light passes through, as far as the camera sees it.
+    pub(crate) refractors: Vec<RefractorSurface>,
     /// What has been uploaded for the frame.
     pub(crate) uploads: Uploads,
     /// First draws where no frame waits for them, if the frame is to have any.
@@ -153,16 +156,4 @@ pub(crate) struct MirrorShape {
     /// Whether anything is blended in it.
     pub transparent: bool,
     pub surfaces: Vec<MirrorSurface>,
-}
-
-impl MirrorShape {
-    /// Of a view in a frame of this size.
-    pub fn new(mirror: &MirrorView, size: [u32; 2]) -> Self {
-        Self {
-            parent: mirror.parent,
-            pixels: mirror.view.window.pixels(size),
-            transparent: !mirror.draws.transparent.is_empty(),
-            surfaces: mirror.mirrors.clone(),
-        }
-    }
 }

@@ -13,6 +13,9 @@ use crate::shader::Feature;
 use crate::shadows::ShadowMaps;
 use crate::view_buffers::{FrameGroup, ViewBuffers};
 
+/// A shape with its normals.
+pub(crate) const SHAPE: [Attribute; 2] = [Attribute::Position, Attribute::Normal];
+
 /// A frame's scene, as its passes find it in `context.user`.
 pub struct FrameScene<'a> {
     pub(crate) draws: &'a Draws,
@@ -106,17 +109,20 @@ impl<'a> FrameScene<'a> {
         Some([self.views.get(view)?.frame(), self.objects.transforms.buffer()?])
     }
 
-    /// Draws the shape of an object once, as instance `slot`: vertex buffer 0 has positions in the mesh's space.
-    pub(crate) fn draw_shape(&self, pass: &mut wgpu::RenderPass<'static>, slot: usize) {
+    /// Draws the shape of an object once, as instance `slot`: these attributes are in the vertex buffers, one each.
+    pub(crate) fn draw_shape(
+        &self,
+        pass: &mut wgpu::RenderPass<'static>,
+        slot: usize,
+        attributes: &[Attribute],
+    ) {
         let object = self.objects.objects.get(slot).and_then(Option::as_ref);
         let Some(mesh) = object.and_then(|object| self.meshes.get(object.mesh)) else { return };
-        let slices = mesh.slices(&[Attribute::Position], None);
-        let (Some(positions), Some(indices), Ok(instance)) =
-            (slices.attributes.first(), slices.indices, u32::try_from(slot))
-        else {
-            return;
-        };
-        pass.set_vertex_buffer(0, positions.slice(..));
+        let slices = mesh.slices(attributes, None);
+        let (Some(indices), Ok(instance)) = (slices.indices, u32::try_from(slot)) else { return };
+        for (slot, buffer) in (0..).zip(&slices.attributes) {
+            pass.set_vertex_buffer(slot, buffer.slice(..));
+        }
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(0..slices.count, 0, instance..instance + 1);
     }

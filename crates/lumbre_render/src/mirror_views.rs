@@ -6,11 +6,11 @@
 //!            └── mirror B ──── mirror A in B        and drawn before it
 //! ```
 
-use bytemuck::{Pod, Zeroable};
 use glam::{DVec4, Vec3};
 
 use crate::draws::Draws;
-use crate::extract::{CameraView, Object, Objects, PlanarMirror, Window};
+use crate::extract::{CameraView, MirrorData, MirrorSurface, Object, Objects, Window};
+use crate::frame_plan::MirrorShape;
 
 /// More views than this a frame does not have, beside the camera's.
 pub(crate) const MOST_VIEWS: usize = 16;
@@ -30,51 +30,27 @@ pub(crate) struct MirrorView {
     pub draws: Draws,
 }
 
-/// A mirror in the plane of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct MirrorSurface {
-    /// Of its object.
-    pub slot: usize,
-    pub data: MirrorData,
-}
-
-/// `Mirror`: what a surface makes of what it mirrors.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct MirrorData {
-    /// k_r.
-    mirror: Vec3,
-    /// Of the medium behind the surface to that before it.
-    eta: f32,
-    /// k_t.
-    transmission: Vec3,
-    /// 1 for a sheet, which both of its faces make brighter.
-    thin: f32,
-    /// Unit, towards the viewer.
-    normal: Vec3,
-    /// 1 where rays of sight are parallel.
-    parallel: f32,
-    /// What lies behind everything, as radiance.
-    background: Vec3,
-    padding: f32,
-}
-
-impl MirrorData {
-    fn new(mirror: &PlanarMirror, plane: DVec4, front: bool, view: &CameraView, background: Vec3) -> Self {
-        let flag = |on: bool| if on { 1.0 } else { 0.0 };
-        // Seen from behind a solid's surface, the viewer is inside.
-        let inside = !front && !mirror.thin && mirror.ior > 0.0;
-        Self {
-            mirror: mirror.mirror,
-            eta: if inside { 1.0 / mirror.ior } else { mirror.ior },
-            transmission: mirror.transmission,
-            thin: flag(mirror.thin),
-            normal: plane.truncate().as_vec3(),
-            parallel: flag(view.viewer().w == 0.0),
-            background,
-            padding: 0.0,
+impl MirrorView {
+    /// What effects are told of it, in a frame of this size.
+    pub fn shape(&self, size: [u32; 2]) -> MirrorShape {
+        MirrorShape {
+            parent: self.parent,
+            pixels: self.view.window.pixels(size),
+            transparent: !self.draws.transparent.is_empty(),
+            surfaces: self.mirrors.clone(),
         }
     }
+}
+
+/// What a frame sets for all its mirrors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MirrorLook {
+    /// Backs are drawn where materials ask for it.
+    pub two_sided: bool,
+    /// What lies behind glass is drawn.
+    pub refraction: bool,
+    /// As radiance.
+    pub background: Vec3,
 }
 
 /// A plane of mirrors that a view sees.
@@ -92,7 +68,7 @@ struct SeenPlane {
 pub(crate) fn mirror_views(
     objects: &Objects,
     camera: &CameraView,
-    (two_sided, background): (bool, Vec3),
+    look: MirrorLook,
     depth: u32,
     left_out: &mut Vec<String>,
 ) -> Vec<MirrorView> {
@@ -102,7 +78,7 @@ pub(crate) fn mirror_views(
     let mut without = 0;
     for _ in 0..depth {
         let seen = generation.iter().flat_map(|(parent, view, weight, own)| {
-            let planes = seen_planes(objects, view, two_sided, background, own);
+            let planes = seen_planes(objects, view, look, own);
             planes.into_iter().map(move |seen| (*parent, *view, seen.weight * weight, seen))
         });
         let mut seen: Vec<_> = seen.collect();
@@ -134,8 +110,7 @@ pub(crate) fn mirror_views(
 fn seen_planes(
     objects: &Objects,
     view: &CameraView,
-    two_sided: bool,
-    background: Vec3,
+    MirrorLook { two_sided, refraction, background }: MirrorLook,
     own: &[usize],
 ) -> Vec<SeenPlane> {
     let mut planes: Vec<SeenPlane> = Vec::new();
@@ -151,8 +126,9 @@ fn seen_planes(
         let Some(window) = view.window_of_box(object.center, object.half_size).filter(|_| shown) else {
             continue;
         };
-        let data = MirrorData::new(&mirror, plane, front, view, background);
-        let surface = MirrorSurface { slot, data };
+        let parallel = view.viewer().w == 0.0;
+        let data = MirrorData::new(&mirror, plane, front, parallel, background);
+        let surface = MirrorSurface { slot, refracts: refraction && object.traits.refracts, data };
         let weight = mirror.weight() * window.area();
         match planes.iter_mut().find(|seen| is_same_plane(seen.plane, plane, object)) {
             Some(seen) => {

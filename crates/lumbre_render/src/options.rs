@@ -100,6 +100,8 @@ pub struct FrameOptions {
     /// How often light is mirrored on its way to the camera, at most, where it meets flat mirrors: 1 shows a mirror, 2 a mirror in a mirror, 0 none. What a mirror shows is
     /// drawn like the frame; it costs as much as what is in it, in as many pixels as the mirror has.
     pub mirror_depth: u32,
+    /// Draws what lies behind surfaces that light passes through, bent as they bend it. Without it they are opaque.
+    pub refraction: bool,
     /// Four samples per pixel instead of one, or not, whatever the scene says; one where neither says anything.
     pub multisample: Option<bool>,
     /// From radiance to the target's numbers.
@@ -132,6 +134,7 @@ impl Default for FrameOptions {
             irradiance_volumes: true,
             shadows: true,
             mirror_depth: 2,
+            refraction: true,
             multisample: None,
             display: Display::Srgb,
             exposure: None,

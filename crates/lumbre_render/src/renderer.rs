@@ -15,14 +15,15 @@ use crate::draws::{Draws, VisibleObjects};
 use crate::effect_shares::EffectShares;
 use crate::effects::{self, BuiltIn, Effect, Stage};
 use crate::extract::{
-    CameraView, Emitters, KnownLights, LightPlace, Object, Objects, extract_lights, find_camera,
+    CameraView, Emitters, KnownLights, LightPlace, Object, Objects, RefractorData, RefractorSurface,
+    extract_lights, find_camera,
 };
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
 use crate::frame_decision::{AskedFrame, Decided, Decision, Decisions, LastFrame, Seen, with_camera};
 use crate::frame_graph::{Last, Overlay, run_graph};
-use crate::frame_plan::{Ending, FramePlan, MirrorShape, ShadowAtlas};
-use crate::frame_scene::FrameScene;
+use crate::frame_plan::{Ending, FramePlan, ShadowAtlas};
+use crate::frame_scene::{FrameScene, SHAPE};
 use crate::growable_buffer::GrowableBuffer;
 use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::{InstanceData, LightData, radiance};
@@ -31,7 +32,7 @@ use crate::light_clusters::ClusteredView;
 use crate::light_counter::{CountedStages, LightCounter};
 use crate::light_lists::ObjectLightLists;
 use crate::mesh_buffers::{Attribute, MeshBuffers};
-use crate::mirror_views::{MirrorView, mirror_views};
+use crate::mirror_views::{MirrorLook, MirrorView, mirror_views};
 use crate::pipelines::{PipelineKey, Pipelines, attributes, is_flat};
 use crate::rehearsal::Rehearsals;
 use crate::shader::Variant;
@@ -474,10 +475,14 @@ impl Renderer {
         let draws = Draws::new(&visible, &mut lists, &self.volumes, 0);
         let mut mirrors = Vec::new();
         if facts.calls_for_mirrors(options) && decision.plan.ending == Ending::DisplayPass {
-            let look = (settings.two_sided, radiance(SceneSettings::shown_background(settings)));
+            let look = MirrorLook {
+                two_sided: settings.two_sided,
+                refraction: options.refraction,
+                background: radiance(SceneSettings::shown_background(settings)),
+            };
             mirrors = mirror_views(&self.objects, &seen.view, look, options.mirror_depth, left_out);
             // Counts are of the passes that have a row in the account.
-            let features = FrameFeatures { counted: CountedStages::default(), ..decision.features.clone() };
+            let features = FrameFeatures { counted: CountedStages::default(), ..decision.features };
             let mut instances = draws.instances.len();
             for mirror in &mut mirrors {
                 let own: Vec<usize> = mirror.mirrors.iter().map(|surface| surface.slot).collect();
@@ -624,6 +629,11 @@ impl Renderer {
                 triangles += mesh.triangles() * batch.instances.len();
             }
         }
+        for batch in &draws.refractive {
+            if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
+                uploads.meshes += mesh.prepare(&self.gpu, &SHAPE, None);
+            }
+        }
         for surface in mirrors.iter().flat_map(|mirror| &mirror.mirrors) {
             let object = self.objects.objects.get(surface.slot).and_then(Option::as_ref);
             if let Some(mesh) = object.and_then(|object| self.meshes.get_mut(object.mesh)) {
@@ -679,8 +689,8 @@ impl Renderer {
             let pipelines = self.shadows.pipelines().map_or(0, CasterPipelines::count);
             shape.shadow_atlas = Some(ShadowAtlas { view: maps.atlas_view.clone(), stale, pipelines });
         }
-        shape.mirrors =
-            Some(decided.mirrors.iter().map(|mirror| MirrorShape::new(mirror, shape.size)).collect());
+        shape.mirrors = Some(decided.mirrors.iter().map(|mirror| mirror.shape(shape.size)).collect());
+        shape.refractors = self.refractors(decided, &frame.view);
         shape.uploads = frame.statistics.uploads;
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms).zip(&decided.called_for);
         for ((effect, ms), _) in effects.filter(|(_, called)| **called) {
@@ -763,6 +773,22 @@ impl Renderer {
         };
         self.last = Some(frame);
         Ok(report)
+    }
+
+    /// The surfaces in view that light passes through.
+    fn refractors(&self, decided: &Decided, view: &CameraView) -> Vec<RefractorSurface> {
+        let background = radiance(SceneSettings::shown_background(&decided.decision.settings));
+        let parallel = view.viewer().w == 0.0;
+        let draws = &decided.draws;
+        let instances = draws.refractive.iter().flat_map(|batch| batch.instances.clone());
+        let surfaces = instances.filter_map(|instance| {
+            let slot = draws.instances.get(instance as usize)?.object as usize;
+            let object = self.objects.objects.get(slot)?.as_ref()?;
+            let refractor = object.refractor.as_ref()?;
+            let data = RefractorData::new(refractor, object.radius, parallel, background);
+            Some(RefractorSurface { slot, thin: refractor.thin, mirrored: object.mirrored, data })
+        });
+        surfaces.collect()
     }
 
     /// Logs what is left out now and was not in the frame before.

@@ -97,6 +97,8 @@ pub struct LitPasses {
     pub lightmap: PassLights,
     /// Opaque surfaces without one.
     pub forward: PassLights,
+    /// Surfaces that light passes through.
+    pub refraction: PassLights,
     /// Surfaces that are blended.
     pub transparent: PassLights,
 }
@@ -107,6 +109,7 @@ impl LitPasses {
         match pass {
             "lightmap" => Some(&self.lightmap),
             "forward" => Some(&self.forward),
+            "refractive surfaces" => Some(&self.refraction),
             "transparent" => Some(&self.transparent),
             _ => None,
         }

@@ -1,5 +1,5 @@
-//! What is behind a surface that lets light through, beside its coefficient of transmission and its index of refraction. Read by the tracer:
-//! a frame shows such surfaces opaque. Not the refraction itself: that is `lumbre_optics::transmitted_direction`.
+//! What is behind a surface that lets light through, beside its coefficient of transmission and its index of refraction. Read by the
+//! tracer and by frames. Not the refraction itself: that is `lumbre_optics::transmitted_direction`.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};

@@ -7,7 +7,6 @@
 //! ```
 
 use std::collections::HashMap;
-use std::num::NonZeroU64;
 
 use bevy_ecs::world::World;
 use glam::Vec3;
@@ -17,17 +16,18 @@ use lumbre_graph::{
 use lumbre_scene::SceneSettings;
 
 use super::background::LARGEST_HALF;
+use super::surface_uniforms::SurfaceUniforms;
 use super::{Board, Effect, EffectWork, FrameGraph, Stage};
 use crate::deferred::Deferred;
 use crate::error::EffectError;
-use crate::extract::LitPass;
+use crate::extract::{LitPass, MirrorData};
 use crate::facts::SceneFacts;
-use crate::features::fog_feature;
+use crate::features::{fog_feature, fog_flags};
 use crate::frame_bindings::FrameBuffer;
 use crate::frame_plan::{FrameShape, MirrorShape};
 use crate::frame_scene::FrameScene;
 use crate::layout::radiance;
-use crate::mirror_views::MirrorData;
+use crate::mesh_buffers::Attribute;
 use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
 use crate::{FrameOptions, Gpu, RenderError};
@@ -46,6 +46,10 @@ pub(super) struct Mirrors {
     device: Option<OnDevice>,
 }
 
+/// On the board: what flat surfaces mirror that light passes through too, by the slots of their objects. Their light is added with what is seen through them.
+#[derive(Debug, Default)]
+pub(super) struct MirrorPictures(pub HashMap<usize, TextureHandle>);
+
 /// What a pipeline follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Key {
@@ -54,19 +58,12 @@ struct Key {
     fog: Option<Feature>,
 }
 
-/// Bytes from one surface's uniform to the next: the largest alignment that a device may ask for.
-const STRIDE: usize = 256;
-
 #[derive(Debug)]
 struct OnDevice {
     /// Of a view and the objects, and of a surface and what it shows.
     layouts: [wgpu::BindGroupLayout; 2],
     pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
-    uniform: Option<wgpu::Buffer>,
-    /// What the uniform holds.
-    written: Vec<u8>,
-    /// Bytes written so far.
-    uploaded: u64,
+    surfaces: SurfaceUniforms,
 }
 
 impl Effect for Mirrors {
@@ -111,7 +108,7 @@ impl Effect for Mirrors {
             let key = self.key_of(frame);
             let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
             device.pipeline(gpu, key, true)?;
-            device.write(gpu, &data);
+            device.surfaces.write(gpu, &data);
             self.key = Some(key);
         }
         Ok(())
@@ -121,9 +118,9 @@ impl Effect for Mirrors {
         let made = |device: &OnDevice| {
             device.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
         };
-        self.device
-            .as_ref()
-            .map_or_else(EffectWork::default, |device| EffectWork::new(device.uploaded, made(device)))
+        self.device.as_ref().map_or_else(EffectWork::default, |device| {
+            EffectWork::new(device.surfaces.uploaded, made(device))
+        })
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
@@ -136,6 +133,12 @@ impl Effect for Mirrors {
             pictures[index] = Some(self.declare_view(graph, board, (index, &views[index]), &pictures));
         }
         let shown = self.seen_from(0, &pictures);
+        let mut of_glass = MirrorPictures::default();
+        for (index, picture) in &shown {
+            let glass = views[*index].surfaces.iter().filter(|surface| surface.refracts);
+            of_glass.0.extend(glass.map(|surface| (surface.slot, *picture)));
+        }
+        board.insert(of_glass);
         let pass = board
             .lit_pass(graph, self.name(), LoadOp::Load)
             .calls_for(in_scene, "flat mesh that mirrors")
@@ -176,6 +179,8 @@ impl Mirrors {
             confine(context.pass, view.pixels);
             context.user.draw_view(context.pass, LitPass::Lightmap, number);
             context.user.draw_view(context.pass, LitPass::Forward, number);
+            // Seen in mirrors they are opaque.
+            context.user.draw_view(context.pass, LitPass::Refraction, number);
             confine(context.pass, self.whole());
             Ok(())
         });
@@ -217,9 +222,11 @@ impl Mirrors {
             confine(context.pass, views[*index].pixels);
             let before: usize = views[..*index].iter().map(|view| view.surfaces.len()).sum();
             for (surface, place) in views[*index].surfaces.iter().zip(before..) {
-                // Fewer than 2^24 mirrors fit into a uniform.
-                context.pass.set_bind_group(1, &group, &[(place * STRIDE) as u32]);
-                context.user.draw_shape(context.pass, surface.slot);
+                if parent == 0 && surface.refracts {
+                    continue;
+                }
+                context.pass.set_bind_group(1, &group, &[SurfaceUniforms::offset(place)]);
+                context.user.draw_shape(context.pass, surface.slot, &[Attribute::Position]);
             }
         }
         confine(context.pass, self.whole());
@@ -310,9 +317,7 @@ impl OnDevice {
         Self {
             layouts: [layout("view of mirrors", &of_view), layout("mirror", &of_surface)],
             pipelines: HashMap::new(),
-            uniform: None,
-            written: Vec::new(),
-            uploaded: 0,
+            surfaces: SurfaceUniforms::default(),
         }
     }
 
@@ -324,33 +329,6 @@ impl OnDevice {
             if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
         });
         Ok(pipeline.is_there(wait)?)
-    }
-
-    /// Sends the surfaces of a frame, if they changed.
-    fn write(&mut self, gpu: &Gpu, surfaces: &[MirrorData]) {
-        let mut bytes = vec![0; surfaces.len() * STRIDE];
-        for (place, surface) in bytes.chunks_exact_mut(STRIDE).zip(surfaces) {
-            place[..size_of::<MirrorData>()].copy_from_slice(bytemuck::bytes_of(surface));
-        }
-        let size = bytes.len() as u64;
-        let uniform = match self.uniform.take().filter(|uniform| uniform.size() >= size) {
-            Some(uniform) => uniform,
-            None => {
-                self.written.clear();
-                gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("mirrors"),
-                    size: size.next_power_of_two(),
-                    usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                    mapped_at_creation: false,
-                })
-            }
-        };
-        if self.written != bytes {
-            gpu.queue.write_buffer(&uniform, 0, &bytes);
-            self.uploaded += size;
-            self.written = bytes;
-        }
-        self.uniform = Some(uniform);
     }
 
     fn view_group(&self, device: &wgpu::Device, [view, transforms]: [&wgpu::Buffer; 2]) -> wgpu::BindGroup {
@@ -372,14 +350,9 @@ impl OnDevice {
         resources: &PassResources<'_>,
         picture: &TextureHandle,
     ) -> Result<Option<wgpu::BindGroup>, RunError> {
-        let Some(uniform) = &self.uniform else { return Ok(None) };
-        let surface = wgpu::BufferBinding {
-            buffer: uniform,
-            offset: 0,
-            size: NonZeroU64::new(size_of::<MirrorData>() as u64),
-        };
+        let Some(surface) = self.surfaces.binding::<MirrorData>() else { return Ok(None) };
         let entries = [
-            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(surface) },
+            wgpu::BindGroupEntry { binding: 0, resource: surface },
             wgpu::BindGroupEntry {
                 binding: 1,
                 resource: wgpu::BindingResource::TextureView(resources.view(picture)?),
@@ -396,16 +369,7 @@ fn make(
     layouts: &[wgpu::BindGroupLayout; 2],
     Key { format, samples, fog }: Key,
 ) -> Result<wgpu::RenderPipeline, RenderError> {
-    let modes = [
-        Feature::Fog,
-        Feature::FogLinear,
-        Feature::FogExponential,
-        Feature::FogExponentialSquared,
-        Feature::FogDepthCue,
-    ];
-    let on = |feature| fog.is_some_and(|mode| feature == mode || feature == Feature::Fog);
-    let flags = modes.map(|feature| (feature.name(), on(feature)));
-    let module = shader::compile(device, "mirror", &flags)?;
+    let module = shader::compile(device, "mirror", &fog_flags(fog))?;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("mirrors"),
         bind_group_layouts: &layouts.each_ref().map(Some),

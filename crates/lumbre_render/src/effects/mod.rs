@@ -15,7 +15,9 @@ mod display;
 mod forward;
 mod lightmap;
 mod mirrors;
+mod refraction;
 mod shadows;
+mod surface_uniforms;
 mod transparent;
 
 use bevy_ecs::world::World;
@@ -150,6 +152,8 @@ pub enum BuiltIn {
     Forward,
     /// What flat mirrors show: without it they are drawn without.
     Mirrors,
+    /// What lies behind surfaces that light passes through: without it they are opaque.
+    Refraction,
     /// Blended surfaces: without it they are not drawn.
     Transparent,
     /// The display pass: without it, or another at [`Stage::Display`], a frame that needs one is refused ([`RenderError::NoDisplay`](crate::RenderError::NoDisplay)).
@@ -158,8 +162,15 @@ pub enum BuiltIn {
 
 impl BuiltIn {
     /// Every one.
-    pub const ALL: [Self; 6] =
-        [Self::ShadowMaps, Self::Lightmap, Self::Forward, Self::Mirrors, Self::Transparent, Self::Display];
+    pub const ALL: [Self; 7] = [
+        Self::ShadowMaps,
+        Self::Lightmap,
+        Self::Forward,
+        Self::Mirrors,
+        Self::Refraction,
+        Self::Transparent,
+        Self::Display,
+    ];
 
     /// Its name in plans and accounts.
     pub fn name(self) -> &'static str {
@@ -168,6 +179,7 @@ impl BuiltIn {
             Self::Lightmap => "lightmap",
             Self::Forward => "forward",
             Self::Mirrors => "mirrors",
+            Self::Refraction => "refraction",
             Self::Transparent => "transparent",
             Self::Display => "display",
         }
@@ -179,6 +191,7 @@ impl BuiltIn {
             Self::ShadowMaps => options.shadows = false,
             Self::Lightmap => options.lightmaps = false,
             Self::Mirrors => options.mirror_depth = 0,
+            Self::Refraction => options.refraction = false,
             Self::Forward | Self::Transparent | Self::Display => {}
         }
     }
@@ -186,12 +199,13 @@ impl BuiltIn {
 
 /// The effects of this crate but for some, each in its stage.
 pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
-    let all: [Box<dyn Effect>; 7] = [
+    let all: [Box<dyn Effect>; 8] = [
         Box::new(shadows::Shadows::default()),
         Box::new(background::Background::default()),
         Box::new(lightmap::Lightmap::default()),
         Box::new(forward::Forward::default()),
         Box::new(mirrors::Mirrors::default()),
+        Box::new(refraction::Refraction::default()),
         Box::new(transparent::Transparent::default()),
         Box::new(display::DisplayPass::default()),
     ];

@@ -8,28 +8,31 @@ use lumbre_scene::ObjectTraits;
 pub(crate) enum LitPass {
     Lightmap,
     Forward,
+    Refraction,
     Transparent,
 }
 
 impl LitPass {
     /// Every one, in this order.
-    pub const ALL: [Self; 3] = [Self::Lightmap, Self::Forward, Self::Transparent];
+    pub const ALL: [Self; 4] = [Self::Lightmap, Self::Forward, Self::Refraction, Self::Transparent];
 
     /// The name of the pass in plans.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lightmap => "lightmap",
             Self::Forward => "forward",
+            Self::Refraction => "refractive surfaces",
             Self::Transparent => "transparent",
         }
     }
 
-    /// The pass of an object, where lightmaps are used or not.
-    pub fn of(traits: &ObjectTraits, lightmaps: bool) -> Self {
-        match (traits.alpha_mode, lightmaps && traits.is_lit_by_lightmap()) {
-            (AlphaMode::Blend, _) => Self::Transparent,
-            (_, true) => Self::Lightmap,
-            (_, false) => Self::Forward,
+    /// The pass of an object, where lightmaps are used or not, and refraction is.
+    pub fn of(traits: &ObjectTraits, lightmaps: bool, refraction: bool) -> Self {
+        match (traits.alpha_mode, refraction && traits.refracts, lightmaps && traits.is_lit_by_lightmap()) {
+            (AlphaMode::Blend, ..) => Self::Transparent,
+            (_, true, _) => Self::Refraction,
+            (_, _, true) => Self::Lightmap,
+            (_, _, false) => Self::Forward,
         }
     }
 }

@@ -7,6 +7,7 @@ mod lights;
 mod lit_pass;
 mod objects;
 mod planar_mirror;
+mod refractor;
 mod shown_light;
 
 pub(crate) use camera::{CameraView, ViewVolume, Window, find_camera};
@@ -19,4 +20,5 @@ pub(crate) use lights::{
 };
 pub(crate) use lit_pass::LitPass;
 pub(crate) use objects::{Object, Objects, Reflectance, world_box};
-pub(crate) use planar_mirror::PlanarMirror;
+pub(crate) use planar_mirror::{MirrorData, MirrorSurface};
+pub(crate) use refractor::{RefractorData, RefractorSurface};

@@ -16,6 +16,7 @@ use lumbre_scene::{
 };
 
 use super::planar_mirror::PlanarMirror;
+use super::refractor::Refractor;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{MaterialData, ObjectData};
 use crate::mesh_buffers::{MeshBuffers, MeshKey};
@@ -48,6 +49,8 @@ pub(crate) struct Object {
     pub radius: f64,
     /// Where what it mirrors can be drawn.
     pub planar_mirror: Option<PlanarMirror>,
+    /// What light does that passes through it, where it does.
+    pub refractor: Option<Refractor>,
     /// What it reflects.
     pub reflectance: Reflectance,
     /// A number that is another one after each change of it.
@@ -260,6 +263,7 @@ impl Objects {
                     let plane = planar_mirror(&mesh.0, &material, maps, medium);
                     object.planar_mirror =
                         plane.and_then(|plane| PlanarMirror::new(plane, &transform.0, &material, medium));
+                    object.refractor = Some(Refractor::new(&material, medium));
                 }
                 if restated {
                     let traits = ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks));
@@ -344,6 +348,7 @@ impl Object {
             half_size: DVec3::ZERO,
             radius: 0.0,
             planar_mirror: None,
+            refractor: None,
             reflectance: Reflectance::default(),
             changed: 0,
             seen: 0,

@@ -1,5 +1,6 @@
 //! A planar mirror in the world: its plane, and which part of the light it reflects. Not what is seen in it: that is a view of its own (`mirror_views`).
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, DVec4, Vec3};
 use lumbre_mesh::MeshPlane;
 use lumbre_optics::Material;
@@ -54,6 +55,56 @@ impl PlanarMirror {
         let side = self.plane.dot(viewer);
         let turned = if side > 0.0 { self.plane } else { -self.plane };
         (side != 0.0 && side.is_finite()).then_some((turned, side > 0.0))
+    }
+}
+
+/// A mirror in the plane of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MirrorSurface {
+    /// Of its object.
+    pub slot: usize,
+    /// What lies behind it is drawn through it where the camera sees it.
+    pub refracts: bool,
+    pub data: MirrorData,
+}
+
+/// `Mirror`: what a surface makes of what it mirrors.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct MirrorData {
+    /// k_r.
+    mirror: Vec3,
+    /// Of the medium behind the surface to that before it.
+    eta: f32,
+    /// k_t.
+    transmission: Vec3,
+    /// 1 for a sheet, which both of its faces make brighter.
+    thin: f32,
+    /// Unit, towards the viewer.
+    normal: Vec3,
+    /// 1 where rays of sight are parallel.
+    parallel: f32,
+    /// What lies behind everything, as radiance.
+    background: Vec3,
+    padding: f32,
+}
+
+impl MirrorData {
+    /// Of a mirror whose plane is turned towards the viewer, who may be in front of it or behind, and infinitely far.
+    pub fn new(mirror: &PlanarMirror, plane: DVec4, front: bool, parallel: bool, background: Vec3) -> Self {
+        let flag = |on: bool| if on { 1.0 } else { 0.0 };
+        // Seen from behind a solid's surface, the viewer is inside.
+        let inside = !front && !mirror.thin && mirror.ior > 0.0;
+        Self {
+            mirror: mirror.mirror,
+            eta: if inside { 1.0 / mirror.ior } else { mirror.ior },
+            transmission: mirror.transmission,
+            thin: flag(mirror.thin),
+            normal: plane.truncate().as_vec3(),
+            parallel: flag(parallel),
+            background,
+            padding: 0.0,
+        }
     }
 }
 

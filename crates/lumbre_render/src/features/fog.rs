@@ -20,3 +20,16 @@ pub(crate) fn fog_feature(mode: &FogMode) -> Feature {
         FogMode::DepthCue { .. } => Feature::FogDepthCue,
     }
 }
+
+/// Fog in shaders that know no other feature.
+pub(crate) fn fog_flags(fog: Option<Feature>) -> Vec<(&'static str, bool)> {
+    let features = [
+        Feature::Fog,
+        Feature::FogLinear,
+        Feature::FogExponential,
+        Feature::FogExponentialSquared,
+        Feature::FogDepthCue,
+    ];
+    let on = |feature| fog.is_some_and(|mode| feature == mode || feature == Feature::Fog);
+    features.map(|feature| (feature.name(), on(feature))).to_vec()
+}

@@ -13,7 +13,7 @@ mod specular_antialiasing;
 mod textures;
 mod two_sided;
 
-pub(crate) use fog::fog_feature;
+pub(crate) use fog::{fog_feature, fog_flags};
 use lumbre_optics::{ReflectionModel, Shading};
 use lumbre_scene::{ObjectTraits, SceneSettings, ShadowFilter};
 
@@ -30,6 +30,8 @@ pub(crate) struct FrameFeatures {
     pub shading: Option<Shading>,
     pub reflection: Option<ReflectionModel>,
     pub lightmaps: bool,
+    /// Surfaces that light passes through have a pass of their own.
+    pub refraction: bool,
     /// What has no lightmap is lit by an irradiance volume.
     pub irradiance_volumes: bool,
     pub specular_antialiasing: bool,
@@ -62,6 +64,7 @@ impl FrameFeatures {
             reflection: options.reflection,
             specular_antialiasing: options.specular_antialiasing.unwrap_or(settings.specular_antialiasing),
             lightmaps: options.lightmaps,
+            refraction: options.refraction,
             irradiance_volumes: facts.calls_for_irradiance_volumes(options),
             clamp: options.display == Display::Clamp,
             half,

@@ -152,6 +152,7 @@ impl Census {
                 "no visible back has a material of its own",
             ),
             mesh("unlit", self.unlit, "taking no light", "every material takes light"),
+            mesh("refraction", self.refractive, "that light passes through", "light passes through no mesh"),
             mesh(
                 "planar mirrors",
                 self.planar_mirrors,

@@ -87,6 +87,8 @@ pub struct Census {
     pub planar_mirrors: usize,
     /// Meshes that light passes through.
     pub transmission: usize,
+    /// Meshes that can be drawn with what lies behind them.
+    pub refractive: usize,
     /// Meshes shaded per face.
     pub flat: usize,
     /// Meshes shaded per vertex.
@@ -155,6 +157,7 @@ impl Census {
             mirrors: objects.mirrors,
             planar_mirrors: objects.planar_mirrors,
             transmission: objects.transmission,
+            refractive: objects.refractive,
             flat: shaded(Shading::Flat),
             gouraud: shaded(Shading::Gouraud),
             phong: shaded(Shading::Phong),

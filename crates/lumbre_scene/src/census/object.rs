@@ -56,6 +56,8 @@ pub struct ObjectTraits {
     pub planar_mirror: bool,
     /// Whether light passes through it.
     pub transmits: bool,
+    /// Whether what lies behind it can be drawn through it: light passes, and it is neither blended nor unlit.
+    pub refracts: bool,
     /// What the baker makes of it.
     pub mobility: Mobility,
 }
@@ -121,6 +123,9 @@ impl ObjectTraits {
             mirrors: material.mirror != Vec3::ZERO,
             planar_mirror: planar_mirror(mesh, material, maps, medium).is_some(),
             transmits: material.transmission != Vec3::ZERO,
+            refracts: material.transmission != Vec3::ZERO
+                && material.alpha_mode != AlphaMode::Blend
+                && !material.unlit,
             mobility: match (moves, fixed) {
                 (true, _) => Mobility::Dynamic,
                 (false, true) => Mobility::Static,

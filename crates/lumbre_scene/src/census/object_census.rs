@@ -57,6 +57,10 @@ pub struct ObjectCensus {
     pub planar_mirrors: usize,
     /// Objects that light passes through.
     pub transmission: usize,
+    /// Objects that can be drawn with what lies behind them.
+    pub refractive: usize,
+    /// Of these, those that are lit by a lightmap.
+    pub lightmapped_refractive: usize,
 }
 
 /// 0 for none, or one more than the place among all.
@@ -124,6 +128,8 @@ impl ObjectCensus {
             (&mut self.mirrors, traits.mirrors),
             (&mut self.planar_mirrors, traits.planar_mirror),
             (&mut self.transmission, traits.transmits),
+            (&mut self.refractive, traits.refracts),
+            (&mut self.lightmapped_refractive, traits.refracts && by_lightmap),
         ] {
             change(counter, usize::from(counts));
         }

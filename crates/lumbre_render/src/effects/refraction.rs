@@ -1,0 +1,478 @@
+//! What lies behind surfaces that light passes through, bent as they bend it, and what they mirror by Fresnel's equations: rays are followed over the picture of the frame so far
+//! (shaders/refraction.wesl). What that picture does not show (behind the camera, outside of the frame, hidden by something nearer, behind another such surface) is not there: rays
+//! take the picture's edge, or the background. Light that is reflected within a body is lost.
+//!
+//! ```text
+//!   frame so far ──► behind ───────────────┐
+//!   back faces of bodies ──► back faces ───┼──► refraction: added where refractive surfaces are
+//!   what flat ones mirror (`mirrors`) ─────┘
+//! ```
+
+use std::collections::HashMap;
+
+use bevy_ecs::world::World;
+use glam::Vec3;
+use lumbre_graph::{LoadOp, PassResources, RasterContext, RunError, TextureDescriptor, TextureHandle};
+
+use super::mirrors::MirrorPictures;
+use super::surface_uniforms::SurfaceUniforms;
+use super::{Board, Effect, EffectWork, FrameGraph, Stage};
+use crate::deferred::Deferred;
+use crate::error::EffectError;
+use crate::extract::{LitPass, RefractorData, RefractorSurface};
+use crate::facts::SceneFacts;
+use crate::features::{fog_feature, fog_flags};
+use crate::frame_bindings::FrameBuffer;
+use crate::frame_plan::FrameShape;
+use crate::frame_scene::{FrameScene, SHAPE};
+use crate::shader::{self, Feature};
+use crate::target::DEPTH_FORMAT;
+use crate::{FrameOptions, Gpu, RenderError};
+
+/// Depths of what lies behind.
+const DEPTHS: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
+/// Normals and depths of back faces.
+const BACK_FACES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+#[derive(Debug, Default)]
+pub(super) struct Refraction {
+    /// Whether light passes through any mesh, and whether what lies behind it is to be drawn.
+    called_for: [bool; 2],
+    fog: Option<Feature>,
+    /// In view.
+    surfaces: Vec<RefractorSurface>,
+    /// Of this frame, if it is decided.
+    keys: Option<Keys>,
+    device: Option<OnDevice>,
+}
+
+/// What a pipeline follows from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Key {
+    /// The copy of the frame so far.
+    Behind { format: wgpu::TextureFormat, multisampled: bool },
+    /// Back faces of what winds this way.
+    BackFaces { mirrored: bool },
+    /// The light that is added.
+    Surfaces { format: wgpu::TextureFormat, samples: u32, fog: Option<Feature> },
+}
+
+/// The pipelines of a frame.
+#[derive(Clone, Copy, Debug)]
+struct Keys {
+    behind: Key,
+    back_faces: [Key; 2],
+    surfaces: Key,
+}
+
+impl Keys {
+    fn of(frame: &FrameShape, fog: Option<Feature>) -> Self {
+        let (format, samples) = (frame.lit_format, frame.samples);
+        Self {
+            behind: Key::Behind { format: frame.linear_format, multisampled: samples > 1 },
+            back_faces: [false, true].map(|mirrored| Key::BackFaces { mirrored }),
+            surfaces: Key::Surfaces { format, samples, fog },
+        }
+    }
+
+    fn all(&self) -> [Key; 4] {
+        [self.behind, self.back_faces[0], self.back_faces[1], self.surfaces]
+    }
+}
+
+#[derive(Debug)]
+struct OnDevice {
+    layouts: Layouts,
+    pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
+    surfaces: SurfaceUniforms,
+}
+
+/// Of the groups that shaders read.
+#[derive(Clone, Debug)]
+struct Layouts {
+    /// The frame so far, with one sample per pixel and with several.
+    frame: [wgpu::BindGroupLayout; 2],
+    /// A view and the objects.
+    view: wgpu::BindGroupLayout,
+    /// A surface, and the pictures in which its rays are followed.
+    surface: wgpu::BindGroupLayout,
+}
+
+/// The pictures in which rays are followed.
+#[derive(Clone, Copy, Debug)]
+struct Pictures {
+    behind: TextureHandle,
+    depths: TextureHandle,
+    back_faces: TextureHandle,
+}
+
+impl Effect for Refraction {
+    fn name(&self) -> &'static str {
+        "refraction"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Opaque
+    }
+
+    fn extract(&mut self, _: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool {
+        self.called_for = [facts.census.refractive > 0, options.refraction];
+        self.fog = facts.settings.fog.as_ref().map(|fog| fog_feature(&fog.mode));
+        (self.surfaces, self.keys) = (Vec::new(), None);
+        facts.refractive > 0
+    }
+
+    fn is_still(&mut self, _: &mut World) -> bool {
+        true
+    }
+
+    fn needs_radiance(&self) -> bool {
+        true
+    }
+
+    fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
+        let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
+        let mut ready = true;
+        for key in Keys::of(frame, self.fog).all() {
+            ready &= device.pipeline(gpu, key, false)?;
+        }
+        Ok(ready)
+    }
+
+    fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
+        self.surfaces.clone_from(&frame.refractors);
+        let keys = Keys::of(frame, self.fog);
+        let device = self.device.get_or_insert_with(|| OnDevice::new(gpu));
+        if !self.surfaces.is_empty() {
+            for key in keys.all() {
+                device.pipeline(gpu, key, true)?;
+            }
+            // Each twice: as it is, and with a picture of what it mirrors.
+            let data = self.surfaces.iter().flat_map(|surface| [surface.data, surface.data.pictured()]);
+            device.surfaces.write(gpu, &data.collect::<Vec<_>>());
+        }
+        self.keys = Some(keys);
+        Ok(())
+    }
+
+    fn work(&self) -> EffectWork {
+        let made = |device: &OnDevice| {
+            device.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
+        };
+        let work = |device: &OnDevice| EffectWork::new(device.surfaces.uploaded, made(device));
+        self.device.as_ref().map_or_else(EffectWork::default, work)
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        let [in_scene, switched_on] = self.called_for;
+        // Of an explanation without a device it is not known what is in sight.
+        let in_sight = self.keys.is_none() || !self.surfaces.is_empty();
+        let [width, height] = board.size;
+        let described = |format| TextureDescriptor::new_2d(width, height, format);
+        let mut behind = graph.texture("behind", described(board.linear_format));
+        let mut depths = graph.texture("depths behind", described(DEPTHS));
+        let mut back_faces = graph.texture("back faces", described(BACK_FACES));
+        let mut back_depth = graph.texture("depth of back faces", described(DEPTH_FORMAT));
+        if in_scene && switched_on && in_sight {
+            let (linear, depth) = (board.linear, board.depth);
+            graph
+                .raster_pass("behind")
+                .samples(&linear)
+                .samples(&depth)
+                .color(&mut behind, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                .color(&mut depths, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                .run(move |context| self.copy_frame(context, &linear, &depth));
+            graph
+                .raster_pass("back faces")
+                .color(&mut back_faces, LoadOp::Clear(wgpu::Color::TRANSPARENT))
+                .depth(&mut back_depth, LoadOp::Clear(0.0))
+                .run(move |context| self.draw_back_faces(context));
+        }
+        board
+            .lit_pass(graph, LitPass::Refraction.name(), LoadOp::Load)
+            .calls_for(in_scene, "mesh that light passes through")
+            .calls_for(switched_on, "refraction switched on")
+            .calls_for(in_sight, "such mesh in sight")
+            .depth(&mut board.depth, LoadOp::Load)
+            .run(|context| {
+                context.user.draw(context.pass, LitPass::Refraction);
+                Ok(())
+            });
+        if in_scene && switched_on && in_sight {
+            let mirrored =
+                board.get::<MirrorPictures>().map(|pictures| pictures.0.clone()).unwrap_or_default();
+            let pictures = Pictures { behind, depths, back_faces };
+            let mut pass = board
+                .lit_pass(graph, self.name(), LoadOp::Load)
+                .samples(&behind)
+                .samples(&depths)
+                .samples(&back_faces);
+            for picture in mirrored.values() {
+                pass = pass.samples(picture);
+            }
+            pass.depth(&mut board.depth, LoadOp::Load)
+                .run(move |context| self.add_light(context, &pictures, &mirrored));
+        }
+    }
+}
+
+impl Refraction {
+    /// A pipeline of this frame, with what it was made with.
+    fn pipeline(&self, of: impl Fn(&Keys) -> Key) -> Option<(&OnDevice, &wgpu::RenderPipeline)> {
+        let device = self.device.as_ref()?;
+        let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Deferred::get)?.ok()?;
+        Some((device, pipeline))
+    }
+
+    fn copy_frame(
+        &self,
+        context: &mut RasterContext<'_, FrameScene<'_>>,
+        linear: &TextureHandle,
+        depth: &TextureHandle,
+    ) -> Result<(), EffectError> {
+        let Some((device, pipeline)) = self.pipeline(|keys| keys.behind) else { return Ok(()) };
+        let views = [context.resources.view(linear)?, context.resources.view(depth)?];
+        let several = context.resources.texture(depth)?.sample_count() > 1;
+        let layout = &device.layouts.frame[usize::from(several)];
+        let group = group(
+            context.resources.device,
+            "frame so far",
+            layout,
+            &views.map(wgpu::BindingResource::TextureView),
+        );
+        context.pass.set_pipeline(pipeline);
+        context.pass.set_bind_group(0, &group, &[]);
+        context.pass.draw(0..3, 0..1);
+        Ok(())
+    }
+
+    fn draw_back_faces(&self, context: &mut RasterContext<'_, FrameScene<'_>>) -> Result<(), EffectError> {
+        for mirrored in [false, true] {
+            let Some((device, pipeline)) = self.pipeline(|keys| keys.back_faces[usize::from(mirrored)])
+            else {
+                continue;
+            };
+            let Some(bound) = context.user.view_and_transforms(0) else { return Ok(()) };
+            let view = group(
+                context.resources.device,
+                "view of refraction",
+                &device.layouts.view,
+                &bound.map(wgpu::Buffer::as_entire_binding),
+            );
+            context.pass.set_pipeline(pipeline);
+            context.pass.set_bind_group(0, &view, &[]);
+            for surface in
+                self.surfaces.iter().filter(|surface| !surface.thin && surface.mirrored == mirrored)
+            {
+                context.user.draw_shape(context.pass, surface.slot, &SHAPE);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_light(
+        &self,
+        context: &mut RasterContext<'_, FrameScene<'_>>,
+        pictures: &Pictures,
+        mirrored: &HashMap<usize, TextureHandle>,
+    ) -> Result<(), EffectError> {
+        let Some((device, pipeline)) = self.pipeline(|keys| keys.surfaces) else { return Ok(()) };
+        let Some(bound) = context.user.view_and_transforms(0) else { return Ok(()) };
+        let view = group(
+            context.resources.device,
+            "view of refraction",
+            &device.layouts.view,
+            &bound.map(wgpu::Buffer::as_entire_binding),
+        );
+        context.pass.set_pipeline(pipeline);
+        context.pass.set_bind_group(0, &view, &[]);
+        // Without a picture of their own they look for what they mirror behind.
+        let plain = device.surface_group(&context.resources, pictures, &pictures.behind)?;
+        for (index, surface) in self.surfaces.iter().enumerate() {
+            let picture = mirrored.get(&surface.slot);
+            let own =
+                picture.map(|own| device.surface_group(&context.resources, pictures, own)).transpose()?;
+            let Some(group) = own.as_ref().map_or(plain.as_ref(), Option::as_ref) else { continue };
+            let offset = SurfaceUniforms::offset(2 * index + usize::from(picture.is_some()));
+            context.pass.set_bind_group(1, group, &[offset]);
+            context.user.draw_shape(context.pass, surface.slot, &SHAPE);
+        }
+        Ok(())
+    }
+}
+
+fn group(
+    device: &wgpu::Device,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries = (0..).zip(resources);
+    let entries: Vec<_> = entries
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}
+
+impl OnDevice {
+    fn new(gpu: &Gpu) -> Self {
+        Self {
+            layouts: Layouts::new(&gpu.device),
+            pipelines: HashMap::new(),
+            surfaces: SurfaceUniforms::default(),
+        }
+    }
+
+    /// Makes a pipeline, or begins to; whether it is there. With `wait` it is.
+    fn pipeline(&mut self, gpu: &Gpu, key: Key, wait: bool) -> Result<bool, EffectError> {
+        let pipeline = self.pipelines.entry(key).or_insert_with(|| {
+            let (device, layouts) = (gpu.device.clone(), self.layouts.clone());
+            let make = move || Ok(make(&device, &layouts, key)?);
+            if wait { Deferred::make(make) } else { Deferred::begin(gpu, make) }
+        });
+        Ok(pipeline.is_there(wait)?)
+    }
+
+    fn surface_group(
+        &self,
+        resources: &PassResources<'_>,
+        pictures: &Pictures,
+        mirrored: &TextureHandle,
+    ) -> Result<Option<wgpu::BindGroup>, RunError> {
+        let Some(surface) = self.surfaces.binding::<RefractorData>() else { return Ok(None) };
+        let picture = |handle| resources.view(handle).map(wgpu::BindingResource::TextureView);
+        let bound = [
+            surface,
+            picture(&pictures.behind)?,
+            picture(&pictures.depths)?,
+            picture(&pictures.back_faces)?,
+            picture(mirrored)?,
+        ];
+        Ok(Some(group(resources.device, "refraction", &self.layouts.surface, &bound)))
+    }
+}
+
+impl Layouts {
+    fn new(device: &wgpu::Device) -> Self {
+        let (vertex, fragment) = (wgpu::ShaderStages::VERTEX, wgpu::ShaderStages::FRAGMENT);
+        let texture = |sample_type, multisampled| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled,
+        };
+        let color = || texture(wgpu::TextureSampleType::Float { filterable: false }, false);
+        let buffer = |ty, has_dynamic_offset| wgpu::BindingType::Buffer {
+            ty,
+            has_dynamic_offset,
+            min_binding_size: None,
+        };
+        let layout = |label, entries: &[(wgpu::ShaderStages, wgpu::BindingType)]| {
+            let entry = |(binding, (visibility, ty)): (u32, &(wgpu::ShaderStages, wgpu::BindingType))| {
+                wgpu::BindGroupLayoutEntry { binding, visibility: *visibility, ty: *ty, count: None }
+            };
+            let entries: Vec<_> = (0..).zip(entries).map(entry).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &entries,
+            })
+        };
+        // The places of `FrameBuffer`.
+        debug_assert_eq!([FrameBuffer::Frame.binding(), FrameBuffer::Objects.binding()], [0, 1]);
+        let uniform = |dynamic| buffer(wgpu::BufferBindingType::Uniform, dynamic);
+        let transforms = buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);
+        let depth = |multisampled| (fragment, texture(wgpu::TextureSampleType::Depth, multisampled));
+        Self {
+            frame: [false, true]
+                .map(|several| layout("frame so far", &[(fragment, color()), depth(several)])),
+            view: layout("view of refraction", &[(vertex | fragment, uniform(false)), (vertex, transforms)]),
+            surface: layout(
+                "refraction",
+                &[
+                    (fragment, uniform(true)),
+                    (fragment, color()),
+                    (fragment, color()),
+                    (fragment, color()),
+                    (fragment, color()),
+                ],
+            ),
+        }
+    }
+}
+
+fn make(device: &wgpu::Device, layouts: &Layouts, key: Key) -> Result<wgpu::RenderPipeline, RenderError> {
+    let target =
+        |format, blend| Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL });
+    let depth = |write, compare| wgpu::DepthStencilState {
+        format: DEPTH_FORMAT,
+        depth_write_enabled: Some(write),
+        depth_compare: Some(compare),
+        stencil: Default::default(),
+        bias: Default::default(),
+    };
+    let add = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    };
+    let add = Some(wgpu::BlendState { color: add, alpha: add });
+    let mut primitive = wgpu::PrimitiveState::default();
+    let mut samples = 1;
+    let (root, entry, flags, groups, targets, depth_stencil) = match key {
+        Key::Behind { format, multisampled } => {
+            let flags = vec![("MULTISAMPLED", multisampled)];
+            let layouts = vec![Some(&layouts.frame[usize::from(multisampled)])];
+            ("behind", "fragment", flags, layouts, vec![target(format, None), target(DEPTHS, None)], None)
+        }
+        Key::BackFaces { mirrored } => {
+            primitive.front_face = if mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw };
+            primitive.cull_mode = Some(wgpu::Face::Front);
+            let nearest = depth(true, wgpu::CompareFunction::Greater);
+            let targets = vec![target(BACK_FACES, None)];
+            ("refraction", "back_face", fog_flags(None), vec![Some(&layouts.view)], targets, Some(nearest))
+        }
+        Key::Surfaces { format, samples: several, fog } => {
+            samples = several;
+            let here = depth(false, wgpu::CompareFunction::Equal);
+            let layouts = vec![Some(&layouts.view), Some(&layouts.surface)];
+            ("refraction", "fragment", fog_flags(fog), layouts, vec![target(format, add)], Some(here))
+        }
+    };
+    let module = shader::compile(device, root, &flags)?;
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(root),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    let attribute = |shader_location| {
+        [wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x3, offset: 0, shader_location }]
+    };
+    let attributes = [attribute(0), attribute(1)];
+    let shape = attributes.each_ref().map(|attributes| {
+        Some(wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vec3>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes,
+        })
+    });
+    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(root),
+        layout: Some(&pipeline_layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: if matches!(key, Key::Behind { .. }) { &[] } else { &shape },
+        },
+        primitive,
+        depth_stencil,
+        multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    }))
+}
