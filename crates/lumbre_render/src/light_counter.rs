@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn counts_have_64_bits_and_stand_by_their_pass() {
-        let mut bytes = vec![0; 3 * STRIDE as usize];
+        let mut bytes = vec![0; LitPass::ALL.len() * STRIDE as usize];
         bytes[STRIDE as usize..][..16]
             .copy_from_slice(&[1, 0, 0, 0, 2, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0]);
         let counts = PassCounts::read(&bytes);

@@ -8,7 +8,8 @@ use glam::Vec3;
 use lumbre_mesh::TriangleMesh;
 use lumbre_optics::{Attenuation, BakeMode, Light, Material, SpotCone, Surface};
 use lumbre_scene::{
-    Camera, DynamicObject, Extras, MaterialTextures, Mesh, Name, Primitive, StaticObject, Transform,
+    Camera, DynamicObject, Extras, MaterialTextures, Medium, Mesh, Mobility, Name, Primitive, StaticObject,
+    Transform,
 };
 use serde_json::json;
 
@@ -27,6 +28,7 @@ pub struct Builder<'w> {
 struct Look {
     name: String,
     material: Material,
+    medium: Option<Medium>,
     textures: MaterialTextures,
 }
 
@@ -57,7 +59,21 @@ impl<'w> Builder<'w> {
     ) -> Entity {
         let node = self.node(name, place);
         let look = self.look(paint);
-        self.primitive(node, name, mesh.into(), look, false);
+        self.primitive(node, name, mesh.into(), look, Mobility::Static);
+        node
+    }
+
+    /// Something that stands still and that the baker leaves out: it mirrors, or light passes through it.
+    pub fn clear(
+        &mut self,
+        name: &str,
+        place: Transform,
+        mesh: impl Into<Arc<TriangleMesh>>,
+        paint: Paint,
+    ) -> Entity {
+        let node = self.node(name, place);
+        let look = self.look(paint);
+        self.primitive(node, name, mesh.into(), look, Mobility::Unsaid);
         node
     }
 
@@ -73,7 +89,7 @@ impl<'w> Builder<'w> {
         let node = self.node(name, place);
         self.world.entity_mut(node).insert((DynamicObject, motion_extras(motion)));
         let look = self.look(paint);
-        self.primitive(node, name, mesh.into(), look, true);
+        self.primitive(node, name, mesh.into(), look, Mobility::Dynamic);
         node
     }
 
@@ -94,7 +110,7 @@ impl<'w> Builder<'w> {
         let look = glowing(light.diffuse);
         self.world.entity_mut(node).insert((light, DynamicObject, motion_extras(motion)));
         let glow = self.glow.clone();
-        self.primitive(node, "glow", glow, look, true);
+        self.primitive(node, "glow", glow, look, Mobility::Dynamic);
         node
     }
 
@@ -104,7 +120,7 @@ impl<'w> Builder<'w> {
         let look = glowing(light.diffuse);
         self.world.entity_mut(node).insert((light, DynamicObject));
         let glow = self.glow.clone();
-        self.primitive(node, "glow", glow, look, true);
+        self.primitive(node, "glow", glow, look, Mobility::Dynamic);
     }
 
     /// A camera.
@@ -117,7 +133,7 @@ impl<'w> Builder<'w> {
     /// More geometry on a node that moves: what a light hangs from.
     pub fn hang(&mut self, node: Entity, name: &str, mesh: TriangleMesh, paint: Paint) {
         let look = self.look(paint);
-        self.primitive(node, name, Arc::new(mesh), look, true);
+        self.primitive(node, name, Arc::new(mesh), look, Mobility::Dynamic);
     }
 
     fn look(&mut self, paint: Paint) -> Look {
@@ -130,21 +146,31 @@ impl<'w> Builder<'w> {
             material.front.diffuse *= tint;
             textures.base_color = Some(texture);
         }
-        Look { name: paint.name(), material, textures }
+        Look { name: paint.name(), material, medium: paint.medium(), textures }
     }
 
-    fn primitive(&mut self, node: Entity, name: &str, mesh: Arc<TriangleMesh>, look: Look, moves: bool) {
+    fn primitive(
+        &mut self,
+        node: Entity,
+        name: &str,
+        mesh: Arc<TriangleMesh>,
+        look: Look,
+        mobility: Mobility,
+    ) {
         let index = self.world.get::<Children>(node).map_or(0, |children| children.len());
         let primitive = Primitive { index, mesh: name.into(), material: look.name.into() };
         let mut entity = self.world.spawn((Mesh(mesh), look.material, primitive, ChildOf(node)));
         if look.textures != MaterialTextures::default() {
             entity.insert(look.textures);
         }
-        if moves {
-            entity.insert(DynamicObject);
-        } else {
-            entity.insert(StaticObject);
+        if let Some(medium) = look.medium {
+            entity.insert(medium);
         }
+        match mobility {
+            Mobility::Static => entity.insert(StaticObject),
+            Mobility::Dynamic => entity.insert(DynamicObject),
+            Mobility::Unsaid => &mut entity,
+        };
     }
 }
 
@@ -160,6 +186,7 @@ fn glowing(color: Vec3) -> Look {
     Look {
         name: format!("glow {red} {green} {blue}"),
         material: Material { front, ..Material::default() },
+        medium: None,
         textures: MaterialTextures::default(),
     }
 }

@@ -15,6 +15,8 @@ pub const ROOM: (&str, [f64; 3], [f64; 3]) = ("gallery", [23.0, 0.0, -1.0], [35.
 /// The spheres: x, z, and their paint.
 const SPHERES: [(f64, f64, Paint); 3] =
     [(26.0, 8.0, Paint::Broad), (28.5, 8.0, Paint::Medium), (31.0, 8.0, Paint::Narrow)];
+/// The crystal ball: x and z.
+const CRYSTAL: (f64, f64) = (33.5, 8.0);
 /// Where the panels of the ceiling begin, x and z; each is 1.5 m square.
 const PANELS: [(f64, f64); 4] = [(25.5, 1.5), (31.0, 1.5), (25.5, 7.0), (31.0, 7.0)];
 
@@ -47,7 +49,8 @@ pub fn furnish(builder: &mut Builder<'_>) {
 
 fn exhibits(builder: &mut Builder<'_>) {
     let plinth = lumbre_mesh::shapes::cuboid(Vec3::new(0.6, 1.0, 0.6), 3);
-    let plinths = SPHERES.map(|(x, z, _)| shape::at(&plinth, x, 0.5, z));
+    let places = SPHERES.map(|(x, z, _)| (x, z)).into_iter().chain([CRYSTAL]);
+    let plinths = places.map(|(x, z)| shape::at(&plinth, x, 0.5, z));
     builder.fixed("plinths", Transform::IDENTITY, shape::together(plinths), Paint::Marble);
     // Three looks share one sphere, coarse enough for its vertices to tell when shading happens there.
     let sphere = std::sync::Arc::new(lumbre_mesh::shapes::tetrahedral_sphere(0.38, 4, false));
@@ -55,6 +58,17 @@ fn exhibits(builder: &mut Builder<'_>) {
         let name = format!("sphere {}", paint.name());
         builder.fixed(&name, Transform::from_xyz(x, 1.37, z), sphere.clone(), paint);
     }
+    let ball = lumbre_mesh::shapes::uv_sphere(0.38, 64, 32);
+    builder.clear("crystal ball", Transform::from_xyz(CRYSTAL.0, 1.39, CRYSTAL.1), ball, Paint::Crystal);
+
+    // On the east wall.
+    let frame = lumbre_mesh::shapes::cuboid(Vec3::new(0.06, 1.9, 2.6), 3);
+    builder.fixed("mirror frame", Transform::from_xyz(34.97, 1.75, 6.0), frame, Paint::Timber);
+    let mirror = lumbre_mesh::shapes::plane(1.7, 2.4, 1, 1);
+    let westwards = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    let before = Transform::from_xyz(34.935, 1.75, 6.0).with_rotation(westwards);
+    builder.clear("mirror", before, mirror, Paint::Mirror);
+
     let pane = lumbre_mesh::shapes::plane(1.6, 1.5, 3, 3);
     let upright = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     builder.fixed("pane", Transform::from_xyz(28.5, 1.0, 7.1).with_rotation(upright), pane, Paint::Glass);

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use lumbre_optics::{AlphaMode, Material, Surface};
+use lumbre_scene::Medium;
 
 use super::textures::Texture;
 
@@ -48,6 +49,12 @@ pub enum Paint {
     Grille,
     /// A greenish pane, by alpha blending.
     Glass,
+    /// A mirror.
+    Mirror,
+    /// Clear crystal, n = 1.5.
+    Crystal,
+    /// Water.
+    Water,
     /// The daylight behind the windows of the hall.
     Daylight,
     /// Panels in the gallery's ceiling.
@@ -113,10 +120,34 @@ impl Paint {
                 double_sided: true,
                 ..polished(rgb(0.20, 0.38, 0.34), Vec3::splat(0.7), 200.0)
             },
+            Self::Mirror => {
+                Material { mirror: rgb(0.86, 0.88, 0.87), ..polished(rgb(0.02, 0.02, 0.02), Vec3::ZERO, 1.0) }
+            }
+            Self::Crystal => {
+                Material { transmission: Vec3::splat(0.97), ..polished(Vec3::ZERO, Vec3::splat(0.5), 300.0) }
+            }
+            Self::Water => Material {
+                transmission: Vec3::ONE,
+                ior: 1.33,
+                ..polished(Vec3::ZERO, Vec3::splat(0.3), 200.0)
+            },
             Self::Daylight => luminous(rgb(3.3, 3.9, 4.8)),
             Self::Panel => luminous(rgb(4.4, 3.9, 3.1)),
             Self::Shade => luminous(rgb(2.4, 1.35, 0.55)),
             Self::Embers => luminous(rgb(2.2, 0.55, 0.10)),
+        }
+    }
+
+    /// What light meets behind it, where it passes.
+    pub fn medium(self) -> Option<Medium> {
+        let clear = Medium { fresnel: true, ..Medium::default() };
+        match self {
+            Self::Crystal => Some(clear),
+            // What a metre leaves.
+            Self::Water => {
+                Some(Medium { attenuation_color: rgb(0.35, 0.70, 0.72), attenuation_distance: 1.0, ..clear })
+            }
+            _ => None,
         }
     }
 

@@ -12,6 +12,9 @@ use crate::motion::{Bob, Flicker, Motion, Orbit};
 /// Name and extent.
 pub const ROOM: (&str, [f64; 3], [f64; 3]) = ("vault", [13.5, -1.2, 10.5], [21.5, 2.2, 16.5]);
 
+/// The basin: from and to, x and z.
+const BASIN: [[f64; 2]; 2] = [[16.0, 18.5], [13.0, 15.0]];
+
 /// The air of the vault, its two stairs, and the hearth.
 pub fn carve(plan: &mut Plan) {
     let (room, min, max) = ROOM;
@@ -33,6 +36,9 @@ pub fn carve(plan: &mut Plan) {
         let (floor, z) = (-1.2 + 0.2 * f64::from(step), 14.0 - 0.5 * f64::from(step));
         air([24.0, floor, z], [25.2, 2.2, z + 0.5], finish);
     }
+    // A basin, half a metre deep.
+    let [x, z] = BASIN;
+    air([x[0], -1.7, z[0]], [x[1], -1.2, z[1]], Finish::new(Paint::Tiles, Paint::Stone, Paint::Stone));
     // The hearth in the west wall.
     let hearth = Finish { floor: Paint::Embers, ..finish };
     air([12.9, -0.8, 12.9], [13.5, 0.4, 14.1], hearth);
@@ -46,6 +52,12 @@ pub fn furnish(builder: &mut Builder<'_>) {
         shape::moved(&rib, glam::DAffine3::from_rotation_translation(along, DVec3::new(x, -0.2, 13.5)))
     });
     builder.fixed("vault ribs", Transform::IDENTITY, shape::together(ribs), Paint::Stone);
+
+    let [x, z] = BASIN;
+    let water = lumbre_mesh::shapes::plane((x[1] - x[0]) as f32, (z[1] - z[0]) as f32, 1, 1);
+    let level = Transform::from_xyz(0.5 * (x[0] + x[1]), -1.26, 0.5 * (z[0] + z[1]));
+    let water = builder.clear("pool", level, water, Paint::Water);
+    builder.let_through(water);
 
     let chest = lumbre_mesh::shapes::cuboid(Vec3::new(1.1, 0.55, 0.6), 3);
     let turned = Transform::from_xyz(20.6, -0.925, 11.2).with_rotation(DQuat::from_rotation_y(-0.35));

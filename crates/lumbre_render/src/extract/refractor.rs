@@ -25,6 +25,11 @@ pub(crate) struct Refractor {
 }
 
 impl Refractor {
+    /// Whether more than half of the light passes, in the mean of the channels.
+    pub fn lets_most_pass(&self) -> bool {
+        self.transmission.element_sum() > 1.5
+    }
+
     /// Of what these components say.
     pub fn new(material: &Material, medium: Option<&Medium>) -> Self {
         let medium = medium.copied().unwrap_or_default();

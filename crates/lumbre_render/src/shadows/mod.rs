@@ -272,7 +272,9 @@ impl ShadowMaps {
 impl Object {
     /// Whether light stops at it: it is opaque, and takes light at all.
     fn casts_shadow(&self) -> bool {
-        !self.traits.unlit && self.traits.alpha_mode != lumbre_optics::AlphaMode::Blend
+        // Of glass most light passes: no shadow is nearer to the truth than a whole one.
+        let clear = self.refractor.is_some_and(|refractor| refractor.lets_most_pass());
+        !self.traits.unlit && self.traits.alpha_mode != lumbre_optics::AlphaMode::Blend && !clear
     }
 }
 

@@ -87,7 +87,11 @@ pub(crate) fn material(
     let fresnel = if replaced { Fresnel::Dielectric } else { Fresnel::NormalReflectance };
     let mut material = Material { front, unlit, fresnel, ..Material::default() };
     material.ior = dielectric.ior;
-    material.transmission = transmission(source, base * (1.0 - metallic), place, notes)?;
+    let transmitted = transmission(source, place, notes)?;
+    material.transmission = transmitted * base * (1.0 - metallic);
+    // glTF mixes what passes with what is scattered back: the diffuse part keeps the rest.
+    material.front.diffuse *= 1.0 - transmitted;
+    material.front.ambient *= 1.0 - transmitted;
     material.lobe = default_lobe(phong.as_ref(), textures.metallic_roughness.is_some());
     if let Some(phong) = phong {
         if textures.metallic_roughness.is_none() {
@@ -200,16 +204,11 @@ fn dielectric(
 /// Largest index of refraction of a material.
 const LARGEST_INDEX: f32 = 1e4;
 
-/// `KHR_materials_transmission`: k_t of a material whose diffuse colour is `color`.
-fn transmission(
-    source: &document::Material,
-    color: Vec3,
-    place: &str,
-    notes: &mut Notes,
-) -> Result<Vec3, LoadProblem> {
+/// `KHR_materials_transmission`: the part of the light that is not reflected at the surface which passes.
+fn transmission(source: &document::Material, place: &str, notes: &mut Notes) -> Result<f32, LoadProblem> {
     let name = "KHR_materials_transmission";
     let Some(stated) = extension::<Transmission>(&source.extensions, name, place)? else {
-        return Ok(Vec3::ZERO);
+        return Ok(0.0);
     };
     let factor = number(stated.transmission_factor, 0.0);
     if !(0.0..=1.0).contains(&factor) {
@@ -227,11 +226,11 @@ fn transmission(
         notes.add(
             place,
             format!(
-                "{name} is kept as the coefficient of transmission; frames and bakes show the surface opaque, and `lumbre trace` lets light through it"
+                "{name} is kept as the coefficient of transmission; bakes let no light through the surface"
             ),
         );
     }
-    Ok(factor * color)
+    Ok(factor)
 }
 
 fn normal_texture(
