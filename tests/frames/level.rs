@@ -26,7 +26,7 @@ fn level(camera: &str) -> World {
     world
 }
 
-/// What the twin does not know is taken away: textures, and what is seen through.
+/// What the twin does not know is taken away: textures, and what is blended. Mirrors and glass are opaque in both.
 fn plain(world: &mut World) {
     let mut seen_through = world.query::<(Entity, &Material)>();
     let gone: Vec<Entity> = seen_through
@@ -46,7 +46,8 @@ fn plain(world: &mut World) {
 
 fn against_twin(world: &mut World, drawn: &mut World) -> Difference {
     let frame = twin::draw(world, SIZE.0, SIZE.1, TwinOptions::default());
-    let (got, _) = draw(drawn, SIZE.0 as u32, SIZE.1 as u32, &linear());
+    let options = FrameOptions { mirror_depth: 0, refraction: false, ..linear() };
+    let (got, _) = draw(drawn, SIZE.0 as u32, SIZE.1 as u32, &options);
     // Inside one object, away from its own edges, and without the lamps: they are far brighter than what they light, and would hide
     // it in the norm.
     let smooth = |at: usize, center: DVec3| {
@@ -125,6 +126,8 @@ fn the_level_calls_for_what_it_has_and_nothing_else() {
     assert!(report.plan.status("forward").unwrap().runs());
     assert!(report.plan.status("transparent").unwrap().runs(), "there is a pane");
     assert!(!report.plan.status("lightmap").unwrap().runs(), "it is not baked");
+    assert!(report.plan.status("mirrors").unwrap().runs(), "there is a mirror on the wall");
+    assert!(report.plan.status("refractive surfaces").unwrap().runs(), "there is a ball of crystal");
     assert!(report.statistics.lights >= 24 + 8);
     assert!(report.statistics.lights_per_object < 0.6 * report.statistics.lights as f32);
 }

@@ -193,5 +193,6 @@ fn dielectrics_reflect_what_their_extensions_say() {
     let (glass, report) = read(json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}}), 0.0);
     assert_eq!(glass.transmission, Vec3::new(0.25, 0.125, 0.5));
     assert!(noted(&report, "KHR_materials_transmission is kept"), "{:?}", report.notes);
-    assert_eq!(glass.front.diffuse, Vec3::new(0.5, 0.25, 1.0));
+    // glTF mixes what passes with what is scattered back.
+    assert_eq!(glass.front.diffuse, Vec3::new(0.25, 0.125, 0.5));
 }

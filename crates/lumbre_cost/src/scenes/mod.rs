@@ -3,11 +3,13 @@
 mod ball;
 mod balls_and_lamps;
 mod fence;
+mod mirror_and_glass;
 mod room;
 mod sheet;
 
 pub use ball::{Ball, ball, exact_ball};
 pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
 pub use fence::fence;
+pub use mirror_and_glass::mirror_and_glass;
 pub use room::{Air, room};
 pub use sheet::{Sheet, sheet};

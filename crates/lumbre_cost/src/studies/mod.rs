@@ -11,6 +11,7 @@ mod reflection;
 mod shading;
 mod shading_by_need;
 mod shadows;
+mod tour;
 
 use bevy_ecs::world::World;
 
@@ -44,6 +45,7 @@ pub const STUDIES: &[StudyKind] = &[
         run: preprocessing::run,
     },
     StudyKind { name: "transport", about: "from the frame to the truth", run: light_transport::run },
+    StudyKind { name: "tour", about: "every camera's frame against the ray tree", run: tour::run },
     StudyKind { name: "reflection", about: "reflection models against Phong's", run: reflection::run },
     StudyKind { name: "lightmaps", about: "density and format of lightmaps", run: lightmaps::run },
     StudyKind { name: "precision", about: "f32 on the device against f64", run: precision::run },

@@ -5,6 +5,7 @@
 mod counts;
 mod planted;
 mod shadows;
+mod tour;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -58,7 +58,7 @@ fn exhibits(builder: &mut Builder<'_>) {
         let name = format!("sphere {}", paint.name());
         builder.fixed(&name, Transform::from_xyz(x, 1.37, z), sphere.clone(), paint);
     }
-    let ball = lumbre_mesh::shapes::uv_sphere(0.38, 64, 32);
+    let ball = lumbre_mesh::shapes::uv_sphere(0.38, 40, 20);
     builder.clear("crystal ball", Transform::from_xyz(CRYSTAL.0, 1.39, CRYSTAL.1), ball, Paint::Crystal);
 
     // On the east wall.

@@ -38,7 +38,7 @@ pub fn carve(plan: &mut Plan) {
     }
     // A basin, half a metre deep.
     let [x, z] = BASIN;
-    air([x[0], -1.7, z[0]], [x[1], -1.2, z[1]], Finish::new(Paint::Tiles, Paint::Stone, Paint::Stone));
+    air([x[0], -1.7, z[0]], [x[1], -1.2, z[1]], finish);
     // The hearth in the west wall.
     let hearth = Finish { floor: Paint::Embers, ..finish };
     air([12.9, -0.8, 12.9], [13.5, 0.4, 14.1], hearth);

@@ -1,0 +1,226 @@
+//! The frames of every camera against the ray tree: how far each is off, and what of all that a frame can do would take most of that away. Not light that bounces: that is
+//! `light_transport`.
+
+use bevy_ecs::prelude::*;
+use lumbre_optics::{Light, LightKind, Shading};
+use lumbre_render::FrameOptions;
+use lumbre_scene::{Camera, Name};
+use lumbre_trace::TraceOptions;
+
+use super::over_scenes_made;
+use crate::findings::{milliseconds, percent};
+use crate::frames::{Frame, draw_frames};
+use crate::measured::Measured;
+use crate::scene_file::SceneFile;
+use crate::scenes::mirror_and_glass;
+use crate::traced::{ray_tree, traced_world};
+use crate::{Conditions, CostError, ErrorOver, Plot, Point, Quantity, Study};
+
+/// Cameras of a file that are looked through, at most.
+const STOPS: usize = 16;
+const FEW_STOPS: usize = 2;
+/// For the frames of one camera.
+const SECONDS: f64 = 6.0;
+
+/// A frame as it is, with more, or with less.
+struct Change {
+    name: &'static str,
+    /// On the command line, where there is such an option.
+    arguments: &'static str,
+    apply: fn(&mut World, &mut FrameOptions),
+}
+
+const AS_IT_IS: &str = "as it is";
+const EVERYTHING: &str = "all of these";
+const WITHOUT: &str = "without mirrors and glass";
+
+const CHANGES: &[Change] = &[
+    Change { name: AS_IT_IS, arguments: "", apply: |_, _| {} },
+    Change {
+        name: "Phong shading",
+        arguments: " --shading phong",
+        apply: |_, options| options.shading = Some(Shading::Phong),
+    },
+    Change { name: "a shadow of every lamp", arguments: "", apply: |world, _| every_lamp_casts(world) },
+    Change {
+        name: "mirrors four deep",
+        arguments: " --mirror-depth 4",
+        apply: |_, options| options.mirror_depth = 4,
+    },
+    Change {
+        name: EVERYTHING,
+        arguments: "",
+        apply: |world, options| {
+            every_lamp_casts(world);
+            (options.shading, options.mirror_depth) = (Some(Shading::Phong), 4);
+        },
+    },
+    Change {
+        name: WITHOUT,
+        arguments: " --mirror-depth 0 --no-refraction",
+        apply: |_, options| (options.mirror_depth, options.refraction) = (0, false),
+    },
+];
+
+fn every_lamp_casts(world: &mut World) {
+    let mut lights = world.query::<&mut Light>();
+    let lamps = lights.iter_mut(world).filter(|light| light.kind != LightKind::Ambient);
+    lamps.for_each(|mut light| light.shadow = true);
+}
+
+/// Measures it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
+    over_scenes_made(conditions, study(), ("mirror-and-glass", mirror_and_glass), |scene, told, measured| {
+        of_scene(conditions, scene, told, measured)
+    })
+}
+
+fn study() -> Study {
+    Study {
+        name: "tour".into(),
+        title: "The tour".into(),
+        question: "Frame by frame through a scene's cameras: how far is each from the ray tree, with its shadows, mirrors and glass, and which effect would take most of that away, at what price?".into(),
+        reference: "the documents' ray tree, one ray through the middle of every pixel".into(),
+        plots: vec![Plot {
+            title: "Error against time".into(),
+            across: Quantity::Milliseconds,
+            up: Quantity::Error,
+            ..Plot::default()
+        }],
+        ..Study::default()
+    }
+}
+
+/// The cameras of a scene, by name, or by their place where they have none.
+fn cameras(world: &mut World) -> Vec<(Entity, String)> {
+    let mut found: Vec<_> = world
+        .query_filtered::<(Entity, Option<&Name>), With<Camera>>()
+        .iter(world)
+        .map(|(entity, name)| (entity, name.map(ToString::to_string)))
+        .collect();
+    found.sort_by_key(|(entity, _)| entity.index_u32());
+    let named = |(place, (entity, name)): (usize, (Entity, Option<String>))| {
+        (entity, name.unwrap_or_else(|| format!("camera {place}")))
+    };
+    found.into_iter().enumerate().map(named).collect()
+}
+
+fn of_scene(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let all = cameras(&mut scene.open(conditions.aspect())?);
+    let stops: Vec<String> = all.into_iter().map(|(_, name)| name).collect();
+    let most = conditions.unless_quick(STOPS, FEW_STOPS).min(stops.len());
+    if most < stops.len() {
+        measured.study.notes.push(format!(
+            "{} has {} cameras; the first {most} were looked through.",
+            scene.name,
+            stops.len()
+        ));
+    }
+    let mut best = vec![0; CHANGES.len()];
+    for (place, stop) in stops.iter().take(most).enumerate() {
+        let part = |share: f64| before + (after - before) * (place as f64 + share) / most as f64;
+        let first = measured.study.points.len();
+        of_camera(conditions, scene, (place, stop), [part(0.0), part(1.0)], measured)?;
+        let points = &measured.study.points[first..];
+        let (told, winner) = findings(stop, points);
+        winner.into_iter().for_each(|winner| best[winner] += 1);
+        measured.study.findings.extend(told);
+    }
+    let most_often = (1..CHANGES.len()).max_by_key(|change| best[*change]).filter(|change| best[*change] > 0);
+    if let Some(change) = most_often {
+        measured
+            .study
+            .findings
+            .push(format!("Of {most} cameras {} would gain most by {}.", best[change], CHANGES[change].name));
+    }
+    Ok(())
+}
+
+/// The frames of one camera.
+fn of_camera(
+    conditions: &Conditions<'_>,
+    scene: &SceneFile,
+    (place, stop): (usize, &str),
+    [before, after]: [f64; 2],
+    measured: &mut Measured,
+) -> Result<(), CostError> {
+    let opened = || -> Result<(World, Option<Entity>), CostError> {
+        let mut world = scene.open(conditions.aspect())?;
+        let camera = cameras(&mut world).get(place).map(|(entity, _)| *entity);
+        Ok((world, camera))
+    };
+    let (mut world, camera) = opened()?;
+    let (exact, _) = traced_world(conditions, &mut world, &TraceOptions { camera, ..ray_tree(conditions) })?;
+    let reference = measured.keep_reference(&format!("{} {stop} by rays", scene.name), exact);
+    let middle = before + 0.3 * (after - before);
+    conditions.tell(middle)?;
+    let mut frames = Vec::new();
+    for change in CHANGES {
+        let (mut world, camera) = opened()?;
+        let mut options = FrameOptions { camera, ..FrameOptions::default() };
+        (change.apply)(&mut world, &mut options);
+        frames.push(Frame::new(world, options).sharing("tour"));
+    }
+    let drawn = draw_frames(conditions, frames, SECONDS, [middle, after])?;
+    for (change, frame) in CHANGES.iter().zip(&drawn) {
+        let point = Point {
+            series: scene.series(conditions, stop),
+            label: change.name.to_owned(),
+            milliseconds: frame.spread(),
+            counts: frame.counts(),
+            command: format!(
+                "lumbre render {} -o frame.exr --camera \"{stop}\"{} --size {} --frames 20 --timings times.json",
+                scene.in_commands(),
+                change.arguments,
+                conditions.size_text()
+            ),
+            ..Point::default()
+        };
+        measured.add_picture(point, frame.picture.clone(), &reference, ErrorOver::Picture)?;
+    }
+    Ok(())
+}
+
+/// What the points of one camera say, in the order of [`CHANGES`], and which single change takes most of the error away.
+fn findings(stop: &str, points: &[Point]) -> (Vec<String>, Option<usize>) {
+    let error = |place: usize| points.get(place)?.error.map(|error| error.relative_rmse);
+    let time = |place: usize| points.get(place)?.milliseconds;
+    let (Some(now), Some(everything)) = (error(0), points.iter().position(|point| point.label == EVERYTHING))
+    else {
+        return (Vec::new(), None);
+    };
+    let single = (1..everything).filter_map(|place| Some((place, error(place)?)));
+    let best = single.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, left)| *left < 0.99 * now);
+    let price = |place: usize| match (time(0), time(place)) {
+        (Some(now), Some(then)) => format!(" ({} instead of {})", milliseconds(&then), milliseconds(&now)),
+        _ => String::new(),
+    };
+    let mut said = format!("{stop}: the frame is off by {}", percent(now));
+    match best {
+        Some((place, left)) => {
+            said += &format!(
+                "; {} would take most of it away, and leave {}{}",
+                CHANGES[place].name,
+                percent(left),
+                price(place)
+            );
+        }
+        None => said += "; nothing that a frame can do would take much of it away",
+    }
+    if let Some(left) = error(everything) {
+        said += &format!("; all that it can do leaves {}", percent(left));
+    }
+    let without = points.iter().position(|point| point.label == WITHOUT);
+    if let Some(bare) = without.and_then(error).filter(|bare| *bare > 1.01 * now) {
+        said += &format!("; without what mirrors and glass show it would be off by {}", percent(bare));
+    }
+    (vec![said + "."], best.map(|(place, _)| place))
+}
