@@ -113,6 +113,7 @@ fn against_the_ray_tree(world: &mut World, options: &FrameOptions) -> Against {
 }
 
 /// Checks that a frame of mirrors is the ray tree's.
+#[allow(clippy::print_stdout, reason = "the figures of the documentation")]
 fn is_the_ray_trees(what: &str, world: &mut World, options: &FrameOptions) {
     let against = against_the_ray_tree(world, options);
     println!("{what}: {against:?}");

@@ -309,7 +309,7 @@ fn check_bytes(path: &Path, format: PackedFormat, width: u32, height: u32) {
 fn the_demo_level_as_bevy_finds_it() {
     let model = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/demo.glb"));
     // The files are asked for, not the light: few texels and a rough error.
-    let mut world = baked(model, Density::TexelsPerMeter(1.5), 1.0);
+    let mut world = baked(model, Density::TexelsPerMeter(1.5), 0.5);
     let ours = common::maps(&mut world);
     let folder = tempfile::tempdir().expect("there is room for it");
     for format in PackedFormat::ALL {
