@@ -785,7 +785,8 @@ impl Renderer {
             let slot = draws.instances.get(instance as usize)?.object as usize;
             let object = self.objects.objects.get(slot)?.as_ref()?;
             let refractor = object.refractor.as_ref()?;
-            let data = RefractorData::new(refractor, object.radius, parallel, background);
+            let flat = object.planar_mirror.is_some();
+            let data = RefractorData::new(refractor, (object.radius, flat), parallel, background);
             Some(RefractorSurface { slot, thin: refractor.thin, mirrored: object.mirrored, data })
         });
         surfaces.collect()

@@ -76,11 +76,16 @@ impl RefractorData {
     const FRESNEL: u32 = 2;
     const PICTURED: u32 = 4;
     const PARALLEL: u32 = 8;
+    const OPEN: u32 = 16;
 
-    /// Of a body in a bounding sphere of this radius, in metres, before this background, for a viewer who may be infinitely far.
-    pub fn new(refractor: &Refractor, radius: f64, parallel: bool, background: Vec3) -> Self {
-        let flags =
-            [(refractor.thin, Self::THIN), (refractor.fresnel, Self::FRESNEL), (parallel, Self::PARALLEL)];
+    /// Of a body in a bounding sphere of this radius, in metres, or a flat surface; before this background, for a viewer who may be infinitely far.
+    pub fn new(refractor: &Refractor, (radius, flat): (f64, bool), parallel: bool, background: Vec3) -> Self {
+        let flags = [
+            (refractor.thin, Self::THIN),
+            (refractor.fresnel, Self::FRESNEL),
+            (parallel, Self::PARALLEL),
+            (flat, Self::OPEN),
+        ];
         Self {
             mirror: refractor.mirror,
             ior: refractor.ior,
