@@ -52,11 +52,11 @@ fn of_scene(
 ) -> Result<(), CostError> {
     let mut whole = scene.open(conditions.aspect())?;
     let effects = removable_effects(&Census::of(&mut whole), &FrameOptions::default());
-    let mut frames = vec![Frame::new(whole, FrameOptions::default())];
+    let mut frames = vec![Frame::new(whole, FrameOptions::default()).sharing("effects")];
     for effect in &effects {
         let (mut world, mut options) = (scene.open(conditions.aspect())?, FrameOptions::default());
         effect.remove(&mut world, &mut options);
-        frames.push(Frame::new(world, options));
+        frames.push(Frame::new(world, options).sharing("effects"));
     }
     let drawn = draw_frames(conditions, frames, SECONDS, told)?;
     let [whole, without @ ..] = &drawn[..] else { return Ok(()) };

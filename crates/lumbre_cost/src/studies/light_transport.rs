@@ -76,7 +76,7 @@ fn of_scene(
         samples: Some(samples),
         ..TraceOptions::default()
     };
-    let most = conditions.unless_quick(256, 64);
+    let most = conditions.unless_quick(256, 32);
     let (picture, report) = traced(conditions, scene, &paths(most))?;
     // The report states it of the mean; errors are of the root mean square.
     let open = report.standard_error.unwrap_or(0.0) * mean_over_root_mean_square(&picture);
@@ -141,7 +141,7 @@ fn of_scene(
         conditions.tell(part(0.7 + 0.3 * place as f64 / all.len() as f64))?;
         let mut times = Vec::new();
         let mut found = None;
-        for _ in 0..conditions.repetitions(conditions.unless_quick(3, 2)) {
+        for _ in 0..conditions.repetitions(conditions.unless_quick(3, 1)) {
             let begun = Instant::now();
             let one = traced(conditions, scene, options)?;
             times.push(milliseconds_since(begun));
