@@ -12,7 +12,7 @@ use lumbre_render::{FrameOptions, LightLists};
 use lumbre_scene::{Camera, Medium, Mesh, Projection, SceneSettings, Transform};
 use lumbre_trace::{TraceOptions, trace};
 
-use crate::adapter::{draw, linear};
+use crate::adapter::{draw, linear, shown};
 
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 144;
@@ -339,4 +339,44 @@ fn a_hall_of_mirrors_has_no_more_views_than_a_frame_may_have_and_says_so() {
     assert_eq!(report.statistics.mirror_views, 16);
     let said = report.left_out.iter().any(|said| said.contains("16 views of mirrors at most"));
     assert!(said, "{:?}", report.left_out);
+}
+
+/// From anywhere, also from within a mirror's plane, from inside of glass and from very near, in half floats and with several samples: the probe finds no value that is not
+/// finite.
+#[test]
+fn no_view_of_mirrors_and_glass_breaks_a_frame() {
+    let mut world = room(Material { double_sided: true, ..mirror(0.9) });
+    add_mirror(&mut world, mirror(1.0));
+    world.resource_mut::<SceneSettings>().two_sided = true;
+    let ice = Material { transmission: Vec3::ONE, double_sided: true, ior: 2.4, ..mirror(0.1) };
+    for (thin, place) in [(false, DVec3::new(0.1, 0.6, 1.0)), (true, DVec3::new(-1.2, 1.4, 1.6))] {
+        let medium = Medium { thin, fresnel: true, ..Medium::default() };
+        let ball = Mesh(Arc::new(shapes::uv_sphere(0.5, 16, 8)));
+        world.spawn((ball, ice.clone(), medium, Transform::from_translation(place)));
+    }
+    let camera = world.query_filtered::<Entity, With<Camera>>().single(&world).unwrap();
+    for step in 0..60 {
+        let t = f64::from(step);
+        let [x, y, z] = [1.7, 2.3, 3.1].map(|speed| (t * speed).sin());
+        let eye = match step % 4 {
+            // In the plane of a mirror, and a hair before it.
+            0 => DVec3::new(0.5 + 2.0 * x, 1.3, 5.0),
+            1 => DVec3::new(0.5 + x, 1.3 + y, 5.0 - 1e-6),
+            // Inside of the ball of glass.
+            2 => DVec3::new(0.1 + 0.3 * x, 0.6 + 0.2 * y, 1.0 + 0.2 * z),
+            _ => DVec3::new(4.0 * x, 1.5 + 1.4 * y, 4.0 * z),
+        };
+        let toward = eye + DVec3::new(z, 0.3 * x, y + 0.01);
+        let place = Transform::from_translation(eye).looking_at(toward, DVec3::Y);
+        let projection = match step % 3 {
+            0 => Projection::Orthographic { half_width: 1.5, half_height: 1.0, near: 0.0, far: 9.0 },
+            1 => Projection::perspective(2.6),
+            _ => Projection::perspective(0.8),
+        };
+        world.entity_mut(camera).insert((place, Camera { projection, ..Camera::default() }));
+        let multisample = Some(step % 5 == 0);
+        let options = FrameOptions { multisample, mirror_depth: 3, ..FrameOptions::default() };
+        let pixels = shown(&mut world, 64, 48, &options);
+        assert_eq!(pixels.len(), 64 * 48 * 4);
+    }
 }

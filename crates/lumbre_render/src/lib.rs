@@ -3,7 +3,8 @@
 //! ```text
 //!   World ──► extract ─────────► draws ──────────────► effects ───────────────────► target
 //!             changed components  cull, sort, batch     shadows ► lightmap ►           Offscreen or
-//!             to GPU buffers      variants, light lists    forward ► transparent ►        WindowSurface
+//!             to GPU buffers      variants, light lists    forward ► mirrors ►            WindowSurface
+//!                 │               and again for mirrors    refraction ► transparent ►
 //!                 │                    │                   yours ► display ► yours
 //!                 └──── facts ─────────┴──► explain: what the scene calls for, and what not
 //! ```
