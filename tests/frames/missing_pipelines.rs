@@ -120,6 +120,15 @@ fn what_is_switched_on_for_the_first_time_is_shown_when_its_pipelines_are_there(
     scene.change("irradiance volume", true, |scene| {
         scene.world.spawn((volume(), Transform::from_scale(6.0)));
     });
+    scene.change("mirror", true, |scene| {
+        let mut materials = scene.world.query::<(&Mesh, &mut Material)>();
+        let (_, mut floor) =
+            materials.iter_mut(&mut scene.world).min_by_key(|(mesh, _)| mesh.0.triangle_count()).unwrap();
+        floor.mirror = Vec3::splat(0.5);
+    });
+    scene.change("glass", true, |scene| {
+        scene.world.get_mut::<Material>(scene.ball).unwrap().transmission = Vec3::splat(0.4);
+    });
     scene.change("flat shading", true, |scene| scene.options.shading = Some(Shading::Flat));
     // Several samples are drawn into another format, and shown by a pass of their own.
     scene.change("multisampling", true, |scene| scene.options.multisample = Some(true));

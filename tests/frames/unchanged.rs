@@ -15,7 +15,7 @@ use lumbre_render::{
 };
 use lumbre_scene::{
     ActiveCamera, AmbientCube, Camera, ChildOf, EmissiveLight, Hidden, IrradianceVolume, MaterialTextures,
-    Mesh, SceneSettings, Transform,
+    Medium, Mesh, SceneSettings, Transform,
 };
 use lumbre_tests::panes::{image, sharp};
 
@@ -142,7 +142,7 @@ type Change = (&'static str, fn(&mut Scene));
 
 #[test]
 fn whatever_changes_is_seen() {
-    let changes: [Change; 18] = [
+    let changes: [Change; 20] = [
         ("transform", |s| s.world.get_mut::<Transform>(s.ball).unwrap().translation.x += 0.3),
         ("transform of a parent", |s| {
             let parent = s.world.get::<ChildOf>(s.ball).unwrap().parent();
@@ -153,6 +153,10 @@ fn whatever_changes_is_seen() {
             s.world.entity_mut(s.ball).insert(ChildOf(parent));
         }),
         ("material", |s| s.world.get_mut::<Material>(s.ball).unwrap().front.diffuse = Vec3::X),
+        ("transmission", |s| s.world.get_mut::<Material>(s.ball).unwrap().transmission = Vec3::splat(0.7)),
+        ("medium", |s| {
+            s.world.entity_mut(s.ball).insert(Medium { thin: true, ..Medium::default() });
+        }),
         ("mesh", |s| {
             let cube = Mesh(Arc::new(shapes::cuboid(Vec3::ONE, 1)));
             s.world.entity_mut(s.ball).insert(cube);

@@ -217,6 +217,11 @@ impl Draws {
         }
     }
 
+    /// Draws what refracts with the other opaque surfaces, where it has no pass of its own yet.
+    pub fn draw_refractive_opaque(&mut self) {
+        self.opaque.append(&mut self.refractive);
+    }
+
     /// A batch's instances among those of all views of the frame.
     pub fn instances_of(&self, batch: &Batch) -> Range<u32> {
         self.first_instance + batch.instances.start..self.first_instance + batch.instances.end

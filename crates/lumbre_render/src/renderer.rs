@@ -568,6 +568,10 @@ impl Renderer {
         for (called, declared) in decided.called_for.iter_mut().zip(&decided.declared) {
             *called &= declared;
         }
+        let mut declared = self.effects.iter().zip(&decided.declared).filter(|(_, declared)| **declared);
+        if !declared.any(|(effect, _)| effect.name() == BuiltIn::Refraction.name()) {
+            decided.draws.draw_refractive_opaque();
+        }
         Ok(())
     }
 

@@ -7,14 +7,14 @@ use bevy_ecs::world::WorldId;
 use lumbre_optics::{Light, Material, ReflectionModel, Shading};
 use lumbre_scene::{
     ActiveCamera, Camera, ChildOf, Children, DynamicObject, EmissiveLight, GlobalTransform, Hidden,
-    IrradianceVolume, Lightmap, MaterialTextures, Mesh, Name, SceneSettings, StaticObject, Transform,
+    IrradianceVolume, Lightmap, MaterialTextures, Medium, Mesh, Name, SceneSettings, StaticObject, Transform,
 };
 
 /// What changed in any way that a frame may show.
 type Changes = Or<(
     Or<(Changed<Mesh>, Changed<Material>, Changed<MaterialTextures>, Changed<Lightmap>)>,
     Or<(Changed<Shading>, Changed<ReflectionModel>, Changed<EmissiveLight>, Changed<Hidden>)>,
-    Or<(Changed<StaticObject>, Changed<DynamicObject>, Changed<Name>)>,
+    Or<(Changed<StaticObject>, Changed<DynamicObject>, Changed<Name>, Changed<Medium>)>,
     Or<(Changed<Transform>, Changed<GlobalTransform>, Changed<ChildOf>, Changed<Children>)>,
     Or<(Changed<Light>, Changed<IrradianceVolume>, Changed<Camera>, Changed<ActiveCamera>)>,
 )>;
