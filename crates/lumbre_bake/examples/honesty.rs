@@ -1,4 +1,4 @@
-//! How honest the stated error is: `honesty IN.glb|SCENE [--map-size N] [--error X[,X…]] [--draft] [--raw] [--open-seams] [--alone] [--truth FILE] [--pictures FOLDER]` bakes a file (or a
+//! How honest the stated error is: `honesty IN.glb|SCENE [--map-size N|--texels-per-meter N|--automatic] [--error X[,X…]] [--draft] [--raw] [--open-seams] [--alone] [--truth FILE] [--pictures FOLDER]` bakes a file (or a
 //! held-out scene by its name) as asked and to convergence, texel by texel the same maps, and prints the true error beside the stated one,
 //! with where they differ most; with `--alone` only what it cost, without the converged bake. With `--truth FILE` the converged maps are kept there, or taken from there. Pictures show the true error over twice the stated one: grey below 1, red above.
 
@@ -28,6 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         match argument.as_str() {
             "--map-size" => options.density = Density::MapSize(value()?.parse()?),
             "--texels-per-meter" => options.density = Density::TexelsPerMeter(value()?.parse()?),
+            "--automatic" => options.density = Density::Automatic,
             "--error" => errors = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?,
             "--seed" => options.seed = value()?.parse()?,
             "--draft" => options.quality = Quality::Draft,
@@ -167,6 +168,8 @@ fn compare(report: &BakeReport, found: &[(String, Map)], truth: &[(String, Map)]
         100.0 * (squares / count).sqrt() / mean,
         100.0 * within / count
     );
+    let pairs: Vec<(Vec3, Vec3)> = texels.iter().map(|texel| (texel.6, texel.7)).collect();
+    by_light(&pairs);
     type Worst<'a> = (f64, f64, f64, &'a String, u32, u32, Vec3, Vec3);
     let mut list = |title: &str, key: &dyn Fn(&Worst<'_>) -> f64| {
         texels.sort_by(|a, b| key(b).total_cmp(&key(a)));
@@ -196,6 +199,36 @@ fn compare(report: &BakeReport, found: &[(String, Map)], truth: &[(String, Map)]
     for (name, all, failures) in maps.iter().take(12) {
         let share = 100.0 * f64::from(*failures) / f64::from(*all);
         println!("  {name}: {failures} of {all} texels, {share:.1} %");
+    }
+}
+
+/// Errors relative to a texel's own light, by how much light that is: dim texels are many, and say nothing beside the mean of a sunlit level.
+fn by_light(texels: &[(Vec3, Vec3)]) {
+    /// Of bands of light: each is twice as bright as the one before.
+    const BANDS: usize = 24;
+    let grey = |light: Vec3| f64::from(light.element_sum()) / 3.0;
+    let brightest = texels.iter().map(|(_, expected)| grey(*expected)).fold(0.0, f64::max);
+    println!("by light, relative to a texel's own");
+    for band in (0..BANDS).rev() {
+        let above = brightest * 0.5f64.powi(band as i32 + 1);
+        let inside = texels.iter().filter(|(_, expected)| (above..2.0 * above).contains(&grey(*expected)));
+        let mut own: Vec<(f64, f64, f64)> = inside
+            .map(|&(texel, expected)| (grey(texel), grey(expected), apart(texel, expected) / grey(expected)))
+            .collect();
+        if own.len() < 100 {
+            continue;
+        }
+        own.sort_by(|a, b| a.2.total_cmp(&b.2));
+        let (found, expected) = own.iter().fold((0.0, 0.0), |sum, own| (sum.0 + own.0, sum.1 + own.1));
+        let percentile = |share: f64| 100.0 * own[(own.len() as f64 * share) as usize].2;
+        println!(
+            "  {above:9.4} to {:9.4}: {:7} texels, median {:6.2} %, p95 {:6.2} %, bias {:+6.2} %",
+            2.0 * above,
+            own.len(),
+            percentile(0.5),
+            percentile(0.95),
+            100.0 * (found / expected - 1.0)
+        );
     }
 }
 
