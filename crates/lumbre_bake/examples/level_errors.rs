@@ -1,6 +1,7 @@
 //! How far baked levels are off where one looks: `level_errors [NAME …] [--error X] [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N]
-//! [--cache FOLDER] [--flip] [--pictures FOLDER] [--stages]` bakes each (all levels without a name) and prints one row: errors relative to the light
-//! around a point, away from shadow edges, at reference points of the tests' folder or of the cache, which are computed where there are none.
+//! [--cache FOLDER] [--reference] [--anew|--paths] [--flip] [--pictures FOLDER] [--stages]` bakes each (all levels without a name) and prints one row: errors relative to the light
+//! around a point, away from shadow edges, at reference points of the cache or the tests' folder (not with `--anew`), which are computed where there
+//! are none; with `--paths` by paths to their very end, unbiased and noisy.
 //!
 //! With `--flip` the level's view is compared to that of a converged bake of the same texels, which the cache keeps, too; with `--pictures` the
 //! views are written, the converged one only with `--flip`.
@@ -20,7 +21,7 @@ mod common;
 #[path = "../tests/held_out/mod.rs"]
 mod held_out;
 
-use held_out::judgement::judge;
+use held_out::judgement::{Judgement, judge};
 use held_out::path_tracer::{Effort, Irradiance, PathTracer};
 use held_out::view::{View, write_png};
 use held_out::{reference_points, scenes};
@@ -29,6 +30,10 @@ use lumbre_trace::flip::mean_flip;
 /// Pixels of a view.
 const WIDTH: usize = 640;
 const HEIGHT: usize = 400;
+/// Batches of 576 paths for a point with `--paths`, at most.
+const MOST_BATCHES: usize = 1200;
+/// Points that are named.
+const WORST: usize = 24;
 /// What a converged bake may take.
 const PATIENCE: Duration = Duration::from_secs(900);
 
@@ -39,6 +44,10 @@ struct Request {
     flip: bool,
     pictures: Option<PathBuf>,
     stages: bool,
+    /// Whether the tests' points are left alone.
+    anew: bool,
+    /// Whether new reference points are unbiased paths to their end, with far more noise.
+    paths: bool,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -49,6 +58,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         flip: false,
         pictures: None,
         stages: false,
+        anew: false,
+        paths: false,
     };
     let mut names = Vec::new();
     let mut arguments = std::env::args().skip(1);
@@ -59,6 +70,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--error" => options.error = value()?.parse()?,
             "--time" => options.time = Some(Duration::try_from_secs_f64(value()?.parse()?)?),
             "--seed" => options.seed = value()?.parse()?,
+            "--anew" => request.anew = true,
+            "--paths" => (request.paths, request.anew) = (true, true),
+            "--reference" => options.quality = Quality::Reference,
             "--threads" => options.threads = Some(value()?.parse()?),
             "--texels-per-meter" => options.density = Density::TexelsPerMeter(value()?.parse()?),
             "--points" => request.points = value()?.parse()?,
@@ -119,8 +133,45 @@ fn row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
     );
     if request.stages {
         println!("\n{found}\n{}\n{report}", found.local);
+        worst(&found, &points);
     }
     Ok(())
+}
+
+/// The points in the region, away from shadow edges, that are farthest off, relative to their own light.
+fn worst(found: &Judgement, points: &[Irradiance]) {
+    let counts = |position: DVec3| points.iter().any(|p| p.position == position && p.inside && !p.edge);
+    let grey = |light: DVec3| light.element_sum() / 3.0;
+    let mut rows: Vec<(f64, &[DVec3; 5])> = found
+        .rows
+        .iter()
+        .filter(|row| counts(row[0]) && grey(row[3]) > 0.0)
+        .map(|row| ((grey(row[2]) - grey(row[3])) / grey(row[3]), row))
+        .collect();
+    if rows.is_empty() {
+        return;
+    }
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let at = |share: f64| 100.0 * rows[((rows.len() - 1) as f64 * share) as usize].0;
+    println!(
+        "signed errors of {} points, relative to their own light: {:+.2}, {:+.2}, {:+.2}, {:+.2}, {:+.2} % at the 5th, 25th, 50th, 75th and 95th percentile",
+        rows.len(),
+        at(0.05),
+        at(0.25),
+        at(0.5),
+        at(0.75),
+        at(0.95)
+    );
+    rows.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    for (off, [position, normal, value, expected, error]) in rows.into_iter().take(WORST) {
+        println!(
+            "  {:+7.2} % at {position:.3}, normal {normal:.1}: {:.4}, expected {:.4} ± {:.4}",
+            100.0 * off,
+            grey(*value),
+            grey(*expected),
+            grey(*error)
+        );
+    }
 }
 
 fn baked(world: &mut World, options: &BakeOptions) -> Result<BakeReport, Box<dyn Error>> {
@@ -131,12 +182,18 @@ fn baked(world: &mut World, options: &BakeOptions) -> Result<BakeReport, Box<dyn
 fn points(name: &str, world: &mut World, request: &Request) -> Result<Vec<Irradiance>, Box<dyn Error>> {
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
     let file = |folder: &Path| folder.join(name).with_extension("csv");
-    for folder in request.cache.iter().chain([&kept]) {
+    let kept = if request.anew { None } else { Some(&kept) };
+    for folder in request.cache.iter().chain(kept) {
         if file(folder).exists() {
             return Ok(reference_points::read(&file(folder)));
         }
     }
-    let found = PathTracer::new(world).with_bounced(7).points(request.points, Effort::reference(), 7);
+    let tracer = PathTracer::new(world);
+    let (tracer, effort) = match request.paths {
+        true => (tracer, Effort { batches: [16, MOST_BATCHES], ..Effort::reference() }),
+        false => (tracer.with_bounced(7), Effort::reference()),
+    };
+    let found = tracer.points(request.points, effort, 7);
     if let Some(folder) = &request.cache {
         reference_points::write(&file(folder), &found)?;
     }
