@@ -29,6 +29,7 @@ mod tests {
     use super::*;
     use crate::transport::direct::{Direct, Seen};
     use crate::transport::form_factors::Cast;
+    use crate::transport::patch_index::PatchIndex;
 
     #[test]
     fn what_is_written_is_read_to_the_last_bit() {
@@ -42,7 +43,7 @@ mod tests {
             seen: Seen { partly: true, signature: 0xdead_beef },
         };
         let cast = Cast {
-            met: [vec![(1, 2), (3, u32::MAX)], vec![]],
+            met: [vec![(PatchIndex(1), 2), (PatchIndex(3), u32::MAX)], vec![]],
             inside: [5, 6],
             missed: [7, 8],
             count: [9, 10],

@@ -328,7 +328,7 @@ impl<'a> Change<'a> {
         let arrives = match now {
             SurfaceHit::Lit { triangle, side, at, .. } if shows_new => {
                 let patch = light.patches.at(triangle, side, at);
-                [patch.map_or(Vec3::ZERO, |patch| light.exitance[patch as usize]); 2]
+                [patch.map_or(Vec3::ZERO, |patch| light.exitance[patch.place()]); 2]
             }
             // The back of something new.
             _ if is_black(now) => [Vec3::ZERO; 2],
@@ -369,7 +369,7 @@ impl<'a> Change<'a> {
         let Some(patch) = light.patches.at(triangle, side, (u, v)) else {
             return Some((Vec3::ZERO, [Vec3::ZERO; 2]));
         };
-        let patch = patch as usize;
+        let patch = patch.place();
         if light.unknown[patch] {
             return None;
         }

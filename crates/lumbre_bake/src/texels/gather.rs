@@ -14,6 +14,7 @@ use super::tile_sequence::TileSequence;
 use crate::sampling::Stream;
 use crate::scene::material::Side;
 use crate::transport::direct::Receiver;
+use crate::transport::patch_index::PatchIndex;
 
 /// Independent replicates per texel: their spread is the texel's error, apart from that of what they all read.
 pub(crate) const REPLICATES: usize = 4;
@@ -27,11 +28,10 @@ const NEAR_BOUNCES: u32 = 6;
 /// Samples that are followed together: what they read is then on its way from memory at the same time.
 const BATCH: usize = 16;
 
-/// Samples to follow, and how far they are.
-struct Batch {
+/// Samples to follow, each with what tells it from others, and how far they are.
+struct Batch<Name> {
     requests: [GatherRequest; BATCH],
-    /// Which they are.
-    numbers: [(usize, u32); BATCH],
+    names: [Name; BATCH],
     count: usize,
     paths: [SamplePath; BATCH],
     found: [IncidentSample; BATCH],
@@ -39,30 +39,38 @@ struct Batch {
 
 /// A batch of samples and one of those that check them.
 struct Batches {
-    samples: Batch,
+    /// By replicate and number of the sample.
+    samples: Batch<(usize, u32)>,
     readings: [Reading; BATCH],
-    checks: Batch,
+    /// By place of the sample and the patch that it read.
+    checks: Batch<(usize, PatchIndex)>,
 }
 
 thread_local! {
     /// Kept, as to clear them for every texel takes as long as some of its rays. What a batch leaves in them nothing reads.
     static BATCHES: RefCell<Batches> = const {
-        RefCell::new(Batches { samples: Batch::NONE, readings: [Reading::NONE; BATCH], checks: Batch::NONE })
+        RefCell::new(Batches {
+            samples: Batch::empty((0, 0)),
+            readings: [Reading::NONE; BATCH],
+            checks: Batch::empty((0, PatchIndex(0))),
+        })
     };
 }
 
-impl Batch {
-    const NONE: Self = Self {
-        requests: [GatherRequest::NOWHERE; BATCH],
-        numbers: [(0, 0); BATCH],
-        count: 0,
-        paths: [SamplePath::NONE; BATCH],
-        found: [IncidentSample::NOTHING; BATCH],
-    };
+impl<Name: Copy> Batch<Name> {
+    const fn empty(name: Name) -> Self {
+        Self {
+            requests: [GatherRequest::NOWHERE; BATCH],
+            names: [name; BATCH],
+            count: 0,
+            paths: [SamplePath::NONE; BATCH],
+            found: [IncidentSample::NOTHING; BATCH],
+        }
+    }
 
-    fn push(&mut self, request: GatherRequest, first: usize, second: u32) {
+    fn push(&mut self, request: GatherRequest, name: Name) {
         self.requests[self.count] = request;
-        self.numbers[self.count] = (first, second);
+        self.names[self.count] = name;
         self.count += 1;
     }
 
@@ -243,9 +251,9 @@ impl RadianceCache<'_> {
         for (replicate, sample) in numbers {
             let [x, y, u, v] = sequences[replicate].first(sample);
             if let Some(point) = texel.point(self.scene, x, y) {
-                let region = self.guide.regions.at(point.triangle, Side::Front, point.at);
+                let region = self.guide.region_at(point.triangle, Side::Front, point.at);
                 let request = GatherRequest { receiver: receiver(self.scene, &point), region, u, v };
-                batches.samples.push(request, replicate, sample);
+                batches.samples.push(request, (replicate, sample));
             }
             if batches.samples.count == BATCH {
                 self.gather_batch(texel, &sequences, batches, gathered);
@@ -265,8 +273,8 @@ impl RadianceCache<'_> {
     ) {
         samples.follow(self);
         checks.count = 0;
-        let numbers = &samples.numbers[..samples.count];
-        for (place, (found, &(replicate, sample))) in samples.found.iter().zip(numbers).enumerate() {
+        let names = &samples.names[..samples.count];
+        for (place, (found, &(replicate, sample))) in samples.found.iter().zip(names).enumerate() {
             let reading = &mut readings[place];
             *reading = Reading { light: found.light, weight: found.weight, ..Reading::NONE };
             let Some(hit) = &found.hit else { continue };
@@ -279,19 +287,19 @@ impl RadianceCache<'_> {
             let last = self.read(receiver, hit, &sequences[replicate], sample, reading);
             if let Some(last) = last.filter(|_| reading.checked) {
                 let [u, v, ..] = sequences[replicate].point(sample, 1);
-                let region = self.guide.regions.at(last.triangle, last.side, last.at);
+                let region = self.guide.region_at(last.triangle, last.side, last.at);
                 let request = GatherRequest { receiver: self.receiver_at(&last), region, u, v };
-                checks.push(request, place, last.patch);
+                checks.push(request, (place, last.patch));
             }
         }
         checks.follow(self);
-        for (found, &(place, patch)) in checks.found.iter().zip(&checks.numbers[..checks.count]) {
+        for (found, &(place, patch)) in checks.found.iter().zip(&checks.names[..checks.count]) {
             let leaving = |hit: &Hit| found.weight * hit.reflectance * (hit.direct + hit.indirect);
             let real = found.hit.as_ref().map_or(found.light, leaving);
             readings[place].rays += 1;
-            readings[place].difference *= self.patch_indirect[patch as usize] - real;
+            readings[place].difference *= self.patch_indirect[patch.place()] - real;
         }
-        for (reading, &(replicate, _)) in readings.iter().zip(numbers) {
+        for (reading, &(replicate, _)) in readings.iter().zip(names) {
             gathered.sums[replicate] += reading.light;
             gathered.weights[replicate].add(reading.weight, reading.light);
             gathered.rays += 1 + u64::from(reading.rays);
@@ -320,7 +328,7 @@ impl RadianceCache<'_> {
         let mut receiver = *receiver;
         // In a gap narrower than patches there may be many.
         for bounce in 0..NEAR_BOUNCES {
-            let is_coarse = last.variance.is_none() && last.distance < self.near[last.patch as usize];
+            let is_coarse = last.variance.is_none() && last.distance < self.near[last.patch.place()];
             if !is_coarse || weight == Vec3::ZERO {
                 break;
             }

@@ -11,14 +11,16 @@ use crate::scene::SurfaceHit;
 use crate::scene::material::Side;
 use crate::texel_index::MapTexel;
 use crate::transport::direct::Receiver;
-use crate::transport::sampling_guide::RowPart;
+use crate::transport::patch_index::PatchIndex;
+use crate::transport::patches::Patch;
+use crate::transport::sampling_guide::{Region, RowPart};
 
 /// A receiver that asks for a sample of its light by bounces.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GatherRequest {
     pub receiver: Receiver,
     /// Its region of the guide; without one cosine rays only.
-    pub region: Option<u32>,
+    pub region: Option<Region>,
     /// In the unit square.
     pub u: f32,
     pub v: f32,
@@ -45,7 +47,7 @@ pub(super) struct Hit {
     pub triangle: u32,
     pub side: Side,
     pub at: (f32, f32),
-    pub patch: u32,
+    pub patch: PatchIndex,
     pub reflectance: Vec3,
     /// Irradiance there: direct, and the texel's or patch's by bounces.
     pub direct: Vec3,
@@ -65,7 +67,7 @@ impl Hit {
         triangle: 0,
         side: Side::Front,
         at: (0.0, 0.0),
-        patch: 0,
+        patch: PatchIndex(0),
         reflectance: Vec3::ZERO,
         direct: Vec3::ZERO,
         indirect: Vec3::ZERO,
@@ -97,7 +99,7 @@ pub(super) enum Aim {
     /// In a direction about the receiver's normal.
     Around(Vec3),
     /// At a point of a region that the guide named with this probability, as it would be met; and the point just off it.
-    At(u32, f32, Hit, Vec3),
+    At(Region, f32, Hit, Vec3),
     Nowhere,
 }
 
@@ -110,7 +112,7 @@ pub(super) struct SamplePath {
     /// Part of the guide's row that is asked next.
     part: RowPart,
     /// Region and texel met, where they count, and the texel's direct light.
-    region: Option<u32>,
+    region: Option<Region>,
     texel: MapTexel,
     direct: Vec3,
     reflectance: Vec3,
@@ -182,7 +184,7 @@ impl RadianceCache<'_> {
             };
             path.region = match path.aim {
                 Aim::At(region, ..) => Some(region),
-                _ if path.share.is_some() => self.guide.regions.at(hit.triangle, hit.side, hit.at),
+                _ if path.share.is_some() => self.guide.region_at(hit.triangle, hit.side, hit.at),
                 _ => None,
             };
             hit.patch = patch;
@@ -204,8 +206,8 @@ impl RadianceCache<'_> {
                     hit.variance = Some(texel.variance);
                 }
                 None => {
-                    hit.indirect = self.patch_indirect[hit.patch as usize];
-                    hit.error = self.patch_error[hit.patch as usize];
+                    hit.indirect = self.patch_indirect[hit.patch.place()];
+                    hit.error = self.patch_error[hit.patch.place()];
                 }
             }
             if let (Aim::Around(_), Some(own), Some(region)) = (&path.aim, request.region, path.region) {
@@ -281,7 +283,7 @@ impl RadianceCache<'_> {
             _ => self.guide.probability(&path.part, region),
         };
         // Densities over the surfaces' area.
-        let by_guide = probability / self.guide.regions.list[region as usize].area;
+        let by_guide = probability / self.guide.region(region).area;
         let normal = self.scene.triangles[hit.triangle as usize].side_normal(hit.side);
         let cosine = -hit.direction.dot(normal);
         let by_cosine = kernel(&request.receiver, hit.direction) * cosine / (hit.distance * hit.distance);
@@ -291,10 +293,9 @@ impl RadianceCache<'_> {
 
     /// A point of a region, if it and the receiver face each other.
     #[inline]
-    fn point_of(&self, receiver: &Receiver, index: u32, probability: f32, u: f32, v: f32) -> Option<Aim> {
-        let region = &self.guide.regions.list[index as usize];
-        let (triangle, side) = (region.triangle, region.side);
-        let at = self.guide.regions.point(region, triangle_point(u, v));
+    fn point_of(&self, receiver: &Receiver, region: Region, probability: f32, u: f32, v: f32) -> Option<Aim> {
+        let Patch { triangle, side, .. } = *self.guide.region(region);
+        let at = self.guide.point(region, triangle_point(u, v));
         let surface = &self.scene.triangles[triangle as usize];
         let position = surface.position(at.0, at.1);
         let apart = position - receiver.position;
@@ -307,7 +308,7 @@ impl RadianceCache<'_> {
         }
         let end = self.scene.off_surface_seen_from(triangle, side, position, receiver.origin);
         let hit = Hit { triangle, side, at, direction, distance, ..Hit::UNREAD };
-        Some(Aim::At(index, probability, hit, end))
+        Some(Aim::At(region, probability, hit, end))
     }
 
     /// The receiver at a surface that was met.

@@ -19,7 +19,7 @@ pub(crate) fn from_patches(cache: &RadianceCache<'_>, texels: &[Texel], gathered
     let of_patch = |texel: &Texel| -> Vec3 {
         let Some(point) = texel.point(cache.scene, 0.5, 0.5) else { return Vec3::ZERO };
         let patch = cache.patches.at(point.triangle, Side::Front, point.at);
-        patch.map_or(Vec3::ZERO, |patch| cache.patch_indirect[patch as usize])
+        patch.map_or(Vec3::ZERO, |patch| cache.patch_indirect[patch.place()])
     };
     let grey = |light: Vec3| f64::from(light.element_sum()) / 3.0;
     let (mut apart, mut all, mut count) = (0.0, 0.0, 0u32);

@@ -29,7 +29,7 @@ pub(crate) fn patch_light(
         let (half, light) = (((texel.x + texel.y) & 1) as usize, direct.total().as_dvec3());
         for_each_point(scene, texel, |triangle, at, share| {
             if let Some(patch) = patches.at(triangle, Side::Front, at) {
-                let (sum, weight) = &mut sums[patch as usize][half];
+                let (sum, weight) = &mut sums[patch.place()][half];
                 *sum += light * share;
                 *weight += share;
             }

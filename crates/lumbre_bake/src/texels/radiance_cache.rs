@@ -13,6 +13,7 @@ use crate::scene::{BakeScene, LightmapLayout};
 use crate::texel_index::MapTexel;
 use crate::transport::direct::Sources;
 use crate::transport::exchange::Exchange;
+use crate::transport::patch_index::PatchIndex;
 use crate::transport::patches::Patches;
 use crate::transport::sampling_guide::SamplingGuide;
 use crate::{BakeError, BakeOptions, BakeReport};
@@ -106,7 +107,7 @@ impl RadianceCache<'_> {
         let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
         let texel = self.texel_at(triangle, side, at);
         let gathered = self.gathered.at(texel).map(|texel| texel.irradiance);
-        let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch as usize]);
+        let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch.place()]);
         let direct = self.direct_of(texel);
         let direct = direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch));
         let irradiance = direct + indirect;
@@ -134,11 +135,17 @@ impl RadianceCache<'_> {
 
     /// Where the texel has none: of its part or of the patch.
     #[cold]
-    pub(super) fn direct_of_part(&self, triangle: u32, side: Side, at: (f32, f32), patch: u32) -> Vec3 {
+    pub(super) fn direct_of_part(
+        &self,
+        triangle: u32,
+        side: Side,
+        at: (f32, f32),
+        patch: PatchIndex,
+    ) -> Vec3 {
         let (texel, uv) = self.place_at(triangle, at);
         let texel = texel.filter(|_| side == Side::Front);
         let divided = texel.and_then(|texel| self.divided.at(texel, uv.fract()));
-        divided.unwrap_or_else(|| self.patch_direct[patch as usize])
+        divided.unwrap_or_else(|| self.patch_direct[patch.place()])
     }
 
     /// The texel at a point, if it is on the map, and the point on the map.

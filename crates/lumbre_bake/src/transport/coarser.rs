@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use super::form_factors::FormFactors;
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use super::solver::gather;
 use crate::options::Solver;
@@ -31,12 +32,12 @@ pub(super) fn size_error(
         return vec![0.0; patches.list.len()];
     }
     let count = larger.list.len();
-    let within: Vec<usize> = patches
+    let within: Vec<PatchIndex> = patches
         .list
         .iter()
         .map(|patch| {
             let middle = patches.point(patch, (1.0 / 3.0, 1.0 / 3.0));
-            larger.at(patch.triangle, patch.side, middle).unwrap_or(0) as usize
+            larger.at(patch.triangle, patch.side, middle).unwrap_or(PatchIndex(0))
         })
         .collect();
     let emission: Vec<f64> = reflectance.iter().zip(first).map(|(rho, light)| rho * light).collect();
@@ -46,7 +47,7 @@ pub(super) fn size_error(
     let summed = |of: &dyn Fn(usize) -> f64| {
         let mut sums = vec![0.0; count];
         for (patch, &large) in within.iter().enumerate() {
-            sums[large] += areas[patch] * of(patch);
+            sums[large.place()] += areas[patch] * of(patch);
         }
         sums
     };
@@ -59,16 +60,16 @@ pub(super) fn size_error(
     let solution = solver.solve(&coarse, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
     let found = gather(&coarse, &solution.radiosity);
     let expected = mean(&|i| fine[i]);
-    within.iter().map(|&large| (LEFT * (found[large] - expected[large])) as f32).collect()
+    within.iter().map(|&large| (LEFT * (found[large.place()] - expected[large.place()])) as f32).collect()
 }
 
 /// The exchange between sums of patches.
-fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors {
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); areas.len()];
-    for (patch, &large) in within.iter().enumerate() {
-        members[large].push(patch);
+fn merged(factors: &FormFactors, within: &[PatchIndex], areas: &[f64]) -> FormFactors {
+    let mut members: Vec<Vec<PatchIndex>> = vec![Vec::new(); areas.len()];
+    for (patch, large) in PatchIndex::all(within.len()).zip(within) {
+        members[large.place()].push(patch);
     }
-    let rows: Vec<Vec<(u32, f32)>> = members
+    let rows: Vec<Vec<(PatchIndex, f32)>> = members
         .par_iter()
         .map_init(
             || vec![0.0f64; areas.len()],
@@ -78,14 +79,14 @@ fn merged(factors: &FormFactors, within: &[usize], areas: &[f64]) -> FormFactors
                 }
                 let mut touched = Vec::new();
                 for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
-                    let large = within[other];
-                    if exchange[large] == 0.0 && g > 0.0 {
-                        touched.push(large as u32);
+                    let large = within[other.place()];
+                    if exchange[large.place()] == 0.0 && g > 0.0 {
+                        touched.push(large);
                     }
-                    exchange[large] += g;
+                    exchange[large.place()] += g;
                 }
                 touched.sort_unstable();
-                let entry = |large: u32| (large, std::mem::take(&mut exchange[large as usize]) as f32);
+                let entry = |large: PatchIndex| (large, std::mem::take(&mut exchange[large.place()]) as f32);
                 touched.into_iter().map(entry).collect()
             },
         )

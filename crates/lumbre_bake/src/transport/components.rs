@@ -2,6 +2,7 @@
 //! room beside a bright one is as well solved as alone. Not the solving.
 
 use super::form_factors::FormFactors;
+use super::patch_index::PatchIndex;
 
 /// For each patch, the number of its part; and how many parts there are.
 pub(crate) fn components(factors: &FormFactors) -> (Vec<u32>, usize) {
@@ -9,16 +10,16 @@ pub(crate) fn components(factors: &FormFactors) -> (Vec<u32>, usize) {
     let mut part = vec![NONE; factors.len()];
     let mut count = 0;
     let mut open = Vec::new();
-    for start in 0..part.len() {
-        if part[start] != NONE {
+    for start in PatchIndex::all(part.len()) {
+        if part[start.place()] != NONE {
             continue;
         }
-        part[start] = count;
+        part[start.place()] = count;
         open.push(start);
         while let Some(patch) = open.pop().filter(|_| !factors.stop.is_cancelled()) {
             for (other, g) in factors.row(patch) {
-                if g > 0.0 && part[other] == NONE {
-                    part[other] = count;
+                if g > 0.0 && part[other.place()] == NONE {
+                    part[other.place()] = count;
                     open.push(other);
                 }
             }

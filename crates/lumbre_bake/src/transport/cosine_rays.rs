@@ -2,6 +2,7 @@
 //! Stratified within each patch. Not what becomes of the counts: that is `form_factors`.
 
 use super::form_factors::{Cast, counted};
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::in_chunks;
@@ -35,19 +36,25 @@ pub(super) fn cast(
     let clock = watch.clock();
     let cast = in_chunks(patches.list.len(), watch, |index| {
         let count = if clock.late() { LATE_RAYS } else { counts[index] };
-        of_patch(scene, patches, index as u32, count, seed)
+        of_patch(scene, patches, PatchIndex::new(index), count, seed)
     })?;
     let rays = cast.iter().flat_map(|cast| cast.count).map(u64::from).sum();
     Ok((cast, rays))
 }
 
 /// `count` rays of one patch; the even ones are one half, the odd ones the other.
-pub(super) fn of_patch(scene: &BakeScene, patches: &Patches, index: u32, count: u32, seed: u32) -> Cast {
-    let patch = &patches.list[index as usize];
+pub(super) fn of_patch(
+    scene: &BakeScene,
+    patches: &Patches,
+    index: PatchIndex,
+    count: u32,
+    seed: u32,
+) -> Cast {
+    let patch = &patches.list[index.place()];
     let triangle = &scene.triangles[patch.triangle as usize];
     let normal = triangle.side_normal(patch.side);
     let [p, q, r] = patches.corners(scene, patch);
-    let sequence = Sequence::new(seed, Stream::FormFactors, index);
+    let sequence = Sequence::new(seed, Stream::FormFactors, index.0);
     let mut met = [Vec::with_capacity(count as usize / 2 + 1), Vec::with_capacity(count as usize / 2)];
     let (mut inside, mut missed) = ([0; 2], [0; 2]);
     for ray in 0..count {

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::coarser::size_error;
 use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
+use super::patch_index::PatchIndex;
 use super::patches::{Patch, Patches};
 use super::sampling_guide::SamplingGuide;
 use super::solver;
@@ -93,13 +94,14 @@ impl Exchange {
         let known = watch.during(0.1, || direct_light(&patches))?;
         let mut direct_halves = [Vec::new(), Vec::new()];
         for (half, of_half) in (0..).zip(&mut direct_halves) {
-            let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |index| {
-                match known.get(index) {
-                    Some(Some(halves)) if factors.open[index] > 0.0 => return (halves[half as usize], 0),
+            let found: Vec<(Vec3, u32)> = in_chunks(patches.list.len(), watch, |place| {
+                match known.get(place) {
+                    Some(Some(halves)) if factors.open[place] > 0.0 => return (halves[half as usize], 0),
                     _ => {}
                 }
-                let sequence = Sequence::new(options.seed, Stream::PatchLight(half), index as u32);
-                patch_direct(scene, sources, &patches, index, factors.open[index], sequence)
+                let index = PatchIndex::new(place);
+                let sequence = Sequence::new(options.seed, Stream::PatchLight(half), index.0);
+                patch_direct(scene, sources, &patches, index, factors.open[place], sequence)
             })?;
             report.rays += found.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
             *of_half = found.into_iter().map(|(direct, _)| direct).collect::<Vec<Vec3>>();
@@ -183,11 +185,11 @@ pub(super) fn patch_direct(
     scene: &BakeScene,
     sources: &Sources<'_>,
     patches: &Patches,
-    index: usize,
+    index: PatchIndex,
     open: f32,
     sequence: Sequence,
 ) -> (Vec3, u32) {
-    let patch = &patches.list[index];
+    let patch = &patches.list[index.place()];
     // What reflects nothing, a lamp mostly, hands nothing on.
     if open <= 0.0 || patch.reflectance == Vec3::ZERO {
         return (Vec3::ZERO, 0);

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::TriangleMesh;
 
 use super::form_factors::FormFactors;
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::cancel_token::CancelToken;
 use crate::options::FormFactorMethod;
@@ -52,10 +53,10 @@ fn factor(objects: &[&[[Vec3; 3]]], side: f32, method: FormFactorMethod) -> (f64
     let mut carry_on = carry_on;
     let watch = &mut Watch::new(&mut carry_on, None);
     let (factors, _) = FormFactors::sample(&scene, &patches, method, 200_000, 7, watch).unwrap();
-    let object = |patch: usize| scene.triangles[patches.list[patch].triangle as usize].object;
+    let object = |patch: PatchIndex| scene.triangles[patches.list[patch.place()].triangle as usize].object;
     let (mut exchange, mut area) = (0.0, 0.0);
-    for i in (0..factors.len()).filter(|&i| object(i) == 0) {
-        area += f64::from(factors.areas[i]);
+    for i in PatchIndex::all(factors.len()).filter(|&i| object(i) == 0) {
+        area += f64::from(factors.areas[i.place()]);
         exchange += factors.row(i).filter(|&(j, _)| object(j) == 1).map(|(_, g)| g).sum::<f64>();
     }
     let rays = match method {
@@ -140,9 +141,9 @@ fn a_closed_room_is_reciprocal_and_its_rows_sum_to_one() {
         let mut carry_on = carry_on;
         let watch = &mut Watch::new(&mut carry_on, None);
         let (factors, _) = FormFactors::sample(&scene, &patches, method, 100_000, 3, watch).unwrap();
-        for i in 0..factors.len() {
+        for i in PatchIndex::all(factors.len()) {
             // Twelve rounds of scaling leave what f32 and their own convergence leave.
-            assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "{method:?} row {i}: {}", factors.row_sum(i));
+            assert!((factors.row_sum(i) - 1.0).abs() < 2e-3, "{method:?} row {i:?}: {}", factors.row_sum(i));
             assert!(factors.row_sum(i) <= 1.0 + 1e-6);
             for (j, g) in factors.row(i) {
                 let back = factors.row(j).find(|&(k, _)| k == i).map(|(_, g)| g);
@@ -164,17 +165,22 @@ fn pairs_that_share_an_edge_are_exact_in_both_halves() {
         let watch = &mut Watch::new(&mut carry_on, None);
         let (factors, halves) = FormFactors::sample(&scene, &patches, method, 50_000, 3, watch).unwrap();
         let mut checked = 0;
-        for i in 0..factors.len() {
+        for i in PatchIndex::all(factors.len()) {
             for (j, g) in factors.row(i) {
-                let shared = corners[i].iter().filter(|corner| corners[j].contains(corner)).count();
-                let expected = super::lambert_integral::triangle_to_triangle(&corners[i], &corners[j]);
+                let (own, other) = (&corners[i.place()], &corners[j.place()]);
+                let shared = own.iter().filter(|corner| other.contains(corner)).count();
+                let expected = super::lambert_integral::triangle_to_triangle(own, other);
                 if shared < 2 || expected < 0.05 {
                     continue;
                 }
                 checked += 1;
-                let area = f64::from(patches.list[i].area);
+                let area = f64::from(patches.list[i.place()].area);
                 // Some 200 rays would leave .02.
-                assert!((g / area - expected).abs() < 1e-4, "{method:?} {i} {j}: {} {expected}", g / area);
+                assert!(
+                    (g / area - expected).abs() < 1e-4,
+                    "{method:?} {i:?} {j:?}: {} {expected}",
+                    g / area
+                );
                 for half in &halves {
                     assert_eq!(half.row(i).find(|&(k, _)| k == j).map(|(_, g)| g), Some(g));
                 }
@@ -182,8 +188,8 @@ fn pairs_that_share_an_edge_are_exact_in_both_halves() {
         }
         assert!(checked > 50, "{checked}");
         assert_eq!(
-            factors.row(0).map(|(_, g)| g).sum::<f64>(),
-            factors.row_sum(0) * f64::from(factors.areas[0])
+            factors.row(PatchIndex(0)).map(|(_, g)| g).sum::<f64>(),
+            factors.row_sum(PatchIndex(0)) * f64::from(factors.areas[0])
         );
     }
 }

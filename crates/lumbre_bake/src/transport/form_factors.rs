@@ -3,10 +3,13 @@
 //! are scaled to the share of rays that met a surface, which is the exact row sum's own estimate (1 in a closed scene).
 //! Not the counting (`cosine_rays`, `global_lines`), nor the solution of the system they make.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::near_pairs::{NearPairs, near_pairs};
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use super::{cosine_rays, global_lines};
 use crate::BakeError;
@@ -20,7 +23,7 @@ use crate::scene::BakeScene;
 pub(crate) struct FormFactors {
     /// Row i is `starts[i]..starts[i + 1]` of the other two.
     pub starts: Vec<usize>,
-    pub columns: Vec<u32>,
+    pub columns: Vec<PatchIndex>,
     /// G_ij, square canonical units.
     pub exchange: Vec<f32>,
     /// A_i: the area in the open, not inside other geometry.
@@ -111,10 +114,15 @@ impl FormFactors {
     }
 
     /// The entries of row i: (j, G_ij).
-    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let range = self.starts[i]..self.starts[i + 1];
+    pub fn row(&self, i: PatchIndex) -> impl Iterator<Item = (PatchIndex, f64)> + '_ {
+        let range = self.places(i);
         let columns = self.columns[range.clone()].iter();
-        columns.zip(&self.exchange[range]).map(|(&j, &g)| (j as usize, f64::from(g)))
+        columns.zip(&self.exchange[range]).map(|(&j, &g)| (j, f64::from(g)))
+    }
+
+    /// Where the entries of row i are.
+    fn places(&self, i: PatchIndex) -> Range<usize> {
+        self.starts[i.place()]..self.starts[i.place() + 1]
     }
 
     /// Number of patches.
@@ -123,8 +131,8 @@ impl FormFactors {
     }
 
     /// Sum over j of F_ij.
-    pub fn row_sum(&self, i: usize) -> f64 {
-        self.row(i).map(|(_, g)| g).sum::<f64>() / f64::from(self.areas[i])
+    pub fn row_sum(&self, i: PatchIndex) -> f64 {
+        self.row(i).map(|(_, g)| g).sum::<f64>() / f64::from(self.areas[i.place()])
     }
 
     /// Symmetric scaling d_i G_ij d_j towards the given row sums (Sinkhorn and Knopp), but of what is `exact`; then what still exceeds
@@ -142,9 +150,9 @@ impl FormFactors {
             let next: Vec<f64> = (0..self.len())
                 .into_par_iter()
                 .map(|i| {
-                    let entries = self.row(i).zip(&exact[self.starts[i]..]);
+                    let entries = self.row(PatchIndex::new(i)).zip(&exact[self.starts[i]..]);
                     let counted = entries.filter(|(_, exact)| !**exact);
-                    let sum: f64 = counted.map(|((j, g), _)| g * scale[j]).sum::<f64>() * scale[i];
+                    let sum: f64 = counted.map(|((j, g), _)| g * scale[j.place()]).sum::<f64>() * scale[i];
                     let target = targets[i] * f64::from(self.areas[i]) - exact_sums[i];
                     // A patch that sees what does not see it keeps its own estimate within a factor.
                     if sum > 0.0 && targets[i] > 0.0 {
@@ -157,7 +165,7 @@ impl FormFactors {
             scale = next;
         }
         let scale: Vec<f64> = scale.iter().map(|s| s.clamp(0.25, 4.0)).collect();
-        self.multiply(|k, i, j| if exact[k] { 1.0 } else { scale[i] * scale[j] });
+        self.multiply(|k, i, j| if exact[k] { 1.0 } else { scale[i.place()] * scale[j.place()] });
         let before = self.total();
         let counted_sums = self.sums(|k| !exact[k]);
         let over: Vec<f64> = (0..self.len())
@@ -166,10 +174,10 @@ impl FormFactors {
                 if counted_sums[i] > room { room / counted_sums[i] } else { 1.0 }
             })
             .collect();
-        self.multiply(|k, i, j| if exact[k] { 1.0 } else { over[i].min(over[j]) });
+        self.multiply(|k, i, j| if exact[k] { 1.0 } else { over[i.place()].min(over[j.place()]) });
         // Only what rounding leaves.
-        let over: Vec<f64> = (0..self.len()).map(|i| 1.0 / self.row_sum(i).max(1.0)).collect();
-        self.multiply(|_, i, j| over[i].min(over[j]));
+        let over: Vec<f64> = PatchIndex::all(self.len()).map(|i| 1.0 / self.row_sum(i).max(1.0)).collect();
+        self.multiply(|_, i, j| over[i.place()].min(over[j.place()]));
         self.energy_lost = if before > 0.0 { 1.0 - self.total() / before } else { 0.0 };
     }
 
@@ -179,25 +187,27 @@ impl FormFactors {
 
     /// Of each row the sum of the entries that `of` picks by their place.
     fn sums(&self, of: impl Fn(usize) -> bool) -> Vec<f64> {
-        let entries = |i: usize| (self.starts[i]..self.starts[i + 1]).filter(|&k| of(k));
-        (0..self.len()).map(|i| entries(i).map(|k| f64::from(self.exchange[k])).sum()).collect()
+        let entries = |i: PatchIndex| self.places(i).filter(|&k| of(k));
+        PatchIndex::all(self.len()).map(|i| entries(i).map(|k| f64::from(self.exchange[k])).sum()).collect()
     }
 
     /// By a factor of an entry's place, row and column.
-    fn multiply(&mut self, factor: impl Fn(usize, usize, usize) -> f64) {
-        for i in (0..self.areas.len()).take_while(|_| !self.stop.is_cancelled()) {
-            for k in self.starts[i]..self.starts[i + 1] {
-                self.exchange[k] =
-                    (f64::from(self.exchange[k]) * factor(k, i, self.columns[k] as usize)) as f32;
+    fn multiply(&mut self, factor: impl Fn(usize, PatchIndex, PatchIndex) -> f64) {
+        for i in PatchIndex::all(self.len()) {
+            if self.stop.is_cancelled() {
+                break;
+            }
+            for k in self.places(i) {
+                self.exchange[k] = (f64::from(self.exchange[k]) * factor(k, i, self.columns[k])) as f32;
             }
         }
     }
 }
 
-/// Rays of one patch, in two halves: how many met each other patch, by index, began inside other geometry, met nothing.
+/// Rays of one patch, in two halves: how many met each other patch, began inside other geometry, met nothing.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Cast {
-    pub met: [Vec<(u32, u32)>; 2],
+    pub met: [Vec<(PatchIndex, u32)>; 2],
     pub inside: [u32; 2],
     pub missed: [u32; 2],
     /// How many they were.
@@ -207,7 +217,7 @@ pub(crate) struct Cast {
 /// The same, of one half or of both together.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Counts {
-    pub met: Vec<(u32, u32)>,
+    pub met: Vec<(PatchIndex, u32)>,
     pub inside: u32,
     pub missed: u32,
     pub count: u32,
@@ -253,28 +263,28 @@ impl Cast {
     }
 }
 
-fn merged(a: &[(u32, u32)], b: &[(u32, u32)]) -> Vec<(u32, u32)> {
+fn merged(a: &[(PatchIndex, u32)], b: &[(PatchIndex, u32)]) -> Vec<(PatchIndex, u32)> {
     let mut both = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
         let next = [a.peek().map(|own| own.0), b.peek().map(|own| own.0)];
-        let Some(number) = next.into_iter().flatten().min() else { return both };
-        let is_next = |&&(own, _): &&(u32, u32)| own == number;
+        let Some(patch) = next.into_iter().flatten().min() else { return both };
+        let is_next = |&&(own, _): &&(PatchIndex, u32)| own == patch;
         both.push((
-            number,
+            patch,
             a.next_if(is_next).map_or(0, |own| own.1) + b.next_if(is_next).map_or(0, |own| own.1),
         ));
     }
 }
 
-/// How often each number occurs, in order.
-pub(super) fn counted(mut numbers: Vec<u32>) -> Vec<(u32, u32)> {
-    numbers.sort_unstable();
-    let mut row: Vec<(u32, u32)> = Vec::new();
-    for number in numbers {
+/// How often each patch occurs, in order.
+pub(super) fn counted(mut met: Vec<PatchIndex>) -> Vec<(PatchIndex, u32)> {
+    met.sort_unstable();
+    let mut row: Vec<(PatchIndex, u32)> = Vec::new();
+    for patch in met {
         match row.last_mut() {
-            Some((last, n)) if *last == number => *n += 1,
-            _ => row.push((number, 1)),
+            Some((last, n)) if *last == patch => *n += 1,
+            _ => row.push((patch, 1)),
         }
     }
     row
@@ -292,21 +302,18 @@ fn pool(
     let incoming = Incoming::new(counts, stop);
     let rates: Vec<f64> =
         counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
-    let row = |i: usize| -> Vec<(u32, f32, bool)> {
+    let row = |i: PatchIndex| -> Vec<(PatchIndex, f32, bool)> {
         if stop.is_cancelled() {
             return Vec::new();
         }
-        let (out, into, known) = (&counts[i].met[..], incoming.row(i), near.row(i));
+        let (out, into, known) = (&counts[i.place()].met[..], incoming.row(i), near.row(i));
         let (mut x, mut y, mut z) = (0, 0, 0);
         let mut row = Vec::with_capacity(out.len() + into.len() + known.len());
-        let number = |list: &[(u32, u32)], at: usize| list.get(at).map_or(u32::MAX, |entry| entry.0);
+        let next = |list: &[(PatchIndex, u32)], at: usize| list.get(at).map(|entry| entry.0);
         loop {
-            let [a, b] = [number(out, x), number(into, y)];
-            let c = known.get(z).map_or(u32::MAX, |entry| entry.0);
-            let j = a.min(b).min(c);
-            if j == u32::MAX {
-                return row;
-            }
+            let [a, b, c] = [next(out, x), next(into, y), known.get(z).map(|entry| entry.0)];
+            let j = [a, b, c].into_iter().flatten().min();
+            let Some(column) = j else { return row };
             let mut n = 0;
             if a == j {
                 (n, x) = (n + out[x].1, x + 1);
@@ -315,10 +322,11 @@ fn pool(
                 (n, y) = (n + into[y].1, y + 1);
             }
             if c == j {
-                row.push((j, known[z].1, true));
+                row.push((column, known[z].1, true));
                 z += 1;
             } else {
-                row.push((j, (f64::from(n) / (rates[i] + rates[j as usize])) as f32, false));
+                let rate = rates[i.place()] + rates[column.place()];
+                row.push((column, (f64::from(n) / rate) as f32, false));
             }
         }
     };
@@ -326,7 +334,10 @@ fn pool(
     let mut exact = Vec::new();
     // Some rows at a time, so that they are not all there twice.
     for first in (0..counts.len()).step_by(ROWS) {
-        let rows: Vec<_> = (first..(first + ROWS).min(counts.len())).into_par_iter().map(row).collect();
+        let rows: Vec<_> = (first..(first + ROWS).min(counts.len()))
+            .into_par_iter()
+            .map(|i| row(PatchIndex::new(i)))
+            .collect();
         for row in rows {
             factors.columns.extend(row.iter().map(|entry| entry.0));
             factors.exchange.extend(row.iter().map(|entry| entry.1));
@@ -344,30 +355,30 @@ const ROWS: usize = 4096;
 /// The counts by who was met: (who has met it, how often), ascending.
 struct Incoming {
     starts: Vec<usize>,
-    list: Vec<(u32, u32)>,
+    list: Vec<(PatchIndex, u32)>,
 }
 
 impl Incoming {
     fn new(counts: &[Counts], stop: &CancelToken) -> Self {
         let mut starts = vec![0usize; counts.len() + 1];
         for &(met, _) in counts.iter().flat_map(|own| &own.met) {
-            starts[met as usize + 1] += 1;
+            starts[met.place() + 1] += 1;
         }
         for place in 1..starts.len() {
             starts[place] += starts[place - 1];
         }
         let mut next = starts.clone();
-        let mut list = vec![(0, 0); starts.last().copied().unwrap_or(0)];
-        for (i, own) in counts.iter().enumerate().take_while(|_| !stop.is_cancelled()) {
+        let mut list = vec![(PatchIndex(0), 0); starts.last().copied().unwrap_or(0)];
+        for (i, own) in PatchIndex::all(counts.len()).zip(counts).take_while(|_| !stop.is_cancelled()) {
             for &(met, n) in &own.met {
-                list[next[met as usize]] = (i as u32, n);
-                next[met as usize] += 1;
+                list[next[met.place()]] = (i, n);
+                next[met.place()] += 1;
             }
         }
         Self { starts, list }
     }
 
-    fn row(&self, i: usize) -> &[(u32, u32)] {
-        &self.list[self.starts[i]..self.starts[i + 1]]
+    fn row(&self, i: PatchIndex) -> &[(PatchIndex, u32)] {
+        &self.list[self.starts[i.place()]..self.starts[i.place() + 1]]
     }
 }

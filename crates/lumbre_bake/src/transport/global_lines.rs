@@ -7,9 +7,11 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::cosine_rays::{self, LEAST_RAYS};
 use super::form_factors::{Cast, counted};
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::{in_chunks, in_chunks_in_time};
@@ -21,10 +23,29 @@ use crate::scene::crossings::Face;
 /// Lines of one value of the list that is computed in chunks.
 const BATCH: u32 = 64;
 
-/// What stands at an end of a line's part, where it is no patch.
-const NOTHING: u32 = u32::MAX;
-const BACK: u32 = u32::MAX - 1;
-const INSIDE: u32 = u32::MAX - 2;
+/// What stands at an end of a line's part: a patch, or one of three numbers that no patch has, as a list of them may be very long.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+struct LineEnd(u32);
+
+impl LineEnd {
+    const NOTHING: Self = Self(u32::MAX);
+    const BACK: Self = Self(u32::MAX - 1);
+    const INSIDE: Self = Self(u32::MAX - 2);
+
+    fn new(patches: &Patches, face: Face) -> Self {
+        match face {
+            Face::Lit { triangle, side, at } => {
+                patches.at(triangle, side, at).map_or(Self::BACK, |patch| Self(patch.0))
+            }
+            Face::Back => Self::BACK,
+            Face::Inside => Self::INSIDE,
+        }
+    }
+
+    fn patch(self) -> Option<PatchIndex> {
+        (self.0 < Self::INSIDE.0).then_some(PatchIndex(self.0))
+    }
+}
 
 /// Lines that cost about as much as `rays` rays, and how many they were, with the rays of small patches.
 ///
@@ -44,12 +65,13 @@ pub(super) fn cast(
     let lines = parts.len() as u64 * u64::from(BATCH);
     let mut cast = counts_of(&parts, patches.list.len());
     let few = |cast: &Cast| cast.count.iter().sum::<u32>() < LEAST_RAYS;
-    let seldom: Vec<u32> = (0..cast.len() as u32).filter(|&index| few(&cast[index as usize])).collect();
+    let seldom: Vec<PatchIndex> =
+        PatchIndex::all(cast.len()).filter(|index| few(&cast[index.place()])).collect();
     let rays = in_chunks(seldom.len(), watch, |place| {
         cosine_rays::of_patch(scene, patches, seldom[place], LEAST_RAYS, seed)
     })?;
-    for (&index, rays) in seldom.iter().zip(&rays) {
-        cast[index as usize].add(rays);
+    for (index, rays) in seldom.iter().zip(&rays) {
+        cast[index.place()].add(rays);
     }
     Ok((cast, lines + rays.len() as u64 * u64::from(LEAST_RAYS)))
 }
@@ -95,22 +117,22 @@ impl Lines {
     }
 
     /// What stands at both ends of each part of a batch's lines, where one of them is a patch. Batches take turns in the halves.
-    fn parts(&self, scene: &BakeScene, patches: &Patches, batch: u32) -> Vec<(u32, u32)> {
+    fn parts(&self, scene: &BakeScene, patches: &Patches, batch: u32) -> Vec<(LineEnd, LineEnd)> {
         let reach = self.center.length() + self.radius;
         let mut parts = Vec::with_capacity(2 * BATCH as usize);
         for line in 0..BATCH {
             let (origin, direction) = self.line(batch % 2, batch / 2 * BATCH + line);
-            let mut behind = NOTHING;
-            let mut add = |a: u32, b: u32| {
-                if a < INSIDE || b < INSIDE {
+            let mut behind = LineEnd::NOTHING;
+            let mut add = |a: LineEnd, b: LineEnd| {
+                if a.patch().or(b.patch()).is_some() {
                     parts.push((a, b));
                 }
             };
             for crossing in scene.crossings(origin, direction, reach) {
-                add(behind, code(patches, crossing.before));
-                behind = code(patches, crossing.beyond);
+                add(behind, LineEnd::new(patches, crossing.before));
+                behind = LineEnd::new(patches, crossing.beyond);
             }
-            add(behind, NOTHING);
+            add(behind, LineEnd::NOTHING);
         }
         parts
     }
@@ -119,30 +141,21 @@ impl Lines {
 /// Of a line that meets nothing, in rays.
 const LINE: f64 = 1.0;
 
-fn code(patches: &Patches, face: Face) -> u32 {
-    match face {
-        Face::Lit { triangle, side, at } => patches.at(triangle, side, at).unwrap_or(BACK),
-        Face::Back => BACK,
-        Face::Inside => INSIDE,
-    }
-}
-
 /// Both ends of each part count it.
-fn counts_of(batches: &[Vec<(u32, u32)>], patches: usize) -> Vec<Cast> {
+fn counts_of(batches: &[Vec<(LineEnd, LineEnd)>], patches: usize) -> Vec<Cast> {
     let mut cast = vec![Cast::default(); patches];
     for half in 0..2 {
-        let mut met: Vec<Vec<u32>> = vec![Vec::new(); patches];
+        let mut met: Vec<Vec<PatchIndex>> = vec![Vec::new(); patches];
         for &(a, b) in batches.iter().skip(half).step_by(2).flatten() {
-            for (from, to) in [(a, b), (b, a)].into_iter().filter(|&(from, _)| from < INSIDE) {
-                let own = &mut cast[from as usize];
+            for (from, to) in [(a, b), (b, a)] {
+                let Some(from) = from.patch() else { continue };
+                let own = &mut cast[from.place()];
                 own.count[half] += 1;
                 match to {
-                    NOTHING => own.missed[half] += 1,
-                    BACK => {}
-                    INSIDE => own.inside[half] += 1,
+                    LineEnd::NOTHING => own.missed[half] += 1,
+                    LineEnd::INSIDE => own.inside[half] += 1,
                     // What a patch sees of itself across a rounded edge is nothing.
-                    patch if patch == from => {}
-                    patch => met[from as usize].push(patch),
+                    _ => met[from.place()].extend(to.patch().filter(|&patch| patch != from)),
                 }
             }
         }

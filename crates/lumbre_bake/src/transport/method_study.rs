@@ -10,6 +10,7 @@ use super::direct::Sources;
 use super::emitters::emitters;
 use super::exchange::patch_direct;
 use super::form_factors::FormFactors;
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use super::solver::gather;
 use crate::cancel_token::CancelToken;
@@ -69,10 +70,10 @@ pub fn form_factor_errors(
         let (factors, _) = sample(method, converged, options.seed.wrapping_add(1))?;
         references.push(factors);
     }
-    let direct: Vec<Vec3> = (0..patches.list.len())
+    let direct: Vec<Vec3> = PatchIndex::all(patches.list.len())
         .map(|index| {
-            let sequence = Sequence::new(options.seed, Stream::PatchLight(0), index as u32);
-            patch_direct(&scene, &sources, &patches, index, references[0].open[index], sequence).0
+            let sequence = Sequence::new(options.seed, Stream::PatchLight(0), index.0);
+            patch_direct(&scene, &sources, &patches, index, references[0].open[index.place()], sequence).0
         })
         .collect();
     let irradiance = |factors: &FormFactors| solution(factors, &patches, &direct, sources.sky);
@@ -109,7 +110,7 @@ fn solution(factors: &FormFactors, patches: &Patches, direct: &[Vec3], sky: Vec3
 /// |G - G*| / |G*|, over all entries of either.
 fn exchange_apart(found: &FormFactors, expected: &FormFactors) -> f64 {
     let (mut apart, mut all) = (0.0, 0.0);
-    for i in 0..expected.len() {
+    for i in PatchIndex::all(expected.len()) {
         let mut own = found.row(i).peekable();
         for (j, g) in expected.row(i) {
             while let Some((_, other)) = own.next_if(|&(k, _)| k < j) {

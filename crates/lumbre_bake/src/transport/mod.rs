@@ -27,6 +27,7 @@ mod light_tree;
 mod mean_of_points;
 pub(crate) mod method_study;
 mod near_pairs;
+pub(crate) mod patch_index;
 #[cfg(test)]
 mod patch_tests;
 pub(crate) mod patches;

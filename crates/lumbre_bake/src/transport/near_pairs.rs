@@ -6,20 +6,21 @@ use rayon::prelude::*;
 
 use super::contour::exchange_area;
 use super::form_factors::{Cast, FormFactors};
-use super::patches::Patches;
+use super::patch_index::PatchIndex;
+use super::patches::{Patch, Patches};
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
 
 /// Exact exchange areas, row by row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NearPairs {
-    rows: Vec<Vec<(u32, f32)>>,
+    rows: Vec<Vec<(PatchIndex, f32)>>,
 }
 
 impl NearPairs {
     /// The entries of row i, ascending: (j, G_ij).
-    pub fn row(&self, i: usize) -> &[(u32, f32)] {
-        self.rows.get(i).map_or(&[], Vec::as_slice)
+    pub fn row(&self, i: PatchIndex) -> &[(PatchIndex, f32)] {
+        self.rows.get(i.place()).map_or(&[], Vec::as_slice)
     }
 
     /// Pairs, each counted once.
@@ -60,31 +61,33 @@ pub(crate) fn near_pairs(
     seed: u32,
 ) -> NearPairs {
     let shapes: Vec<Shape> =
-        (0..cast.len()).into_par_iter().map(|index| shape(scene, patches, index, &cast[index])).collect();
+        cast.par_iter().zip(&patches.list).map(|(cast, patch)| shape(scene, patches, patch, cast)).collect();
     let rays: u64 = cast.iter().flat_map(|cast| cast.count).map(u64::from).sum();
     // (about how many rays, i, j, those that were counted).
-    let mut candidates: Vec<(f64, u32, u32, f64)> = (0..cast.len())
+    let mut candidates: Vec<(f64, PatchIndex, PatchIndex, f64)> = (0..cast.len())
         .into_par_iter()
         .flat_map_iter(|i| {
-            let shapes = &shapes;
-            let later = factors.row(i).filter(move |&(j, _)| j > i && shapes[i].rate > 0.0);
+            let (i, shapes) = (PatchIndex::new(i), &shapes);
+            let one = &shapes[i.place()];
+            let later = factors.row(i).filter(move |&(j, _)| j > i && one.rate > 0.0);
             later.filter_map(move |(j, g)| {
-                let rate = shapes[i].rate + shapes[j].rate;
-                let about = about(&shapes[i], &shapes[j])? * rate;
-                (about > 0.5 * LEAST_EXPECTED).then_some((about, i as u32, j as u32, g * rate))
+                let two = &shapes[j.place()];
+                let rate = one.rate + two.rate;
+                let about = about(one, two)? * rate;
+                (about > 0.5 * LEAST_EXPECTED).then_some((about, i, j, g * rate))
             })
         })
         .collect();
     // By geometry alone, not by counts: those that chance has left few must not be left so more often.
     candidates.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     candidates.truncate((rays / RAYS_FOR_A_PAIR) as usize);
-    let exact: Vec<(u32, u32, f32)> = candidates
+    let exact: Vec<(PatchIndex, PatchIndex, f32)> = candidates
         .into_par_iter()
         .filter_map(|(_, i, j, found)| {
             if scene.stop.is_cancelled() {
                 return None;
             }
-            let (one, two) = (&shapes[i as usize], &shapes[j as usize]);
+            let (one, two) = (&shapes[i.place()], &shapes[j.place()]);
             let exchange = exchange_area(&one.corners, &two.corners);
             let expected = exchange * (one.rate + two.rate);
             let seen = exchange.is_finite()
@@ -97,15 +100,14 @@ pub(crate) fn near_pairs(
         .collect();
     let mut rows = vec![Vec::new(); cast.len()];
     for (i, j, g) in exact {
-        rows[i as usize].push((j, g));
-        rows[j as usize].push((i, g));
+        rows[i.place()].push((j, g));
+        rows[j.place()].push((i, g));
     }
     rows.par_iter_mut().for_each(|row| row.sort_unstable_by_key(|&(j, _)| j));
     NearPairs { rows }
 }
 
-fn shape(scene: &BakeScene, patches: &Patches, index: usize, cast: &Cast) -> Shape {
-    let patch = &patches.list[index];
+fn shape(scene: &BakeScene, patches: &Patches, patch: &Patch, cast: &Cast) -> Shape {
     let mut corners = patches.corners(scene, patch);
     let normal = scene.triangles[patch.triangle as usize].side_normal(patch.side);
     if (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(normal) < 0.0 {
@@ -141,12 +143,17 @@ fn about(one: &Shape, two: &Shape) -> Option<f64> {
 }
 
 /// Whether all of some lines between points spread over both patches are free.
-fn nothing_between(scene: &BakeScene, patches: &Patches, (i, j): (u32, u32), seed: u32) -> bool {
-    let sequence = Sequence::new(seed, Stream::NearPairs, i).of(j);
+fn nothing_between(
+    scene: &BakeScene,
+    patches: &Patches,
+    (i, j): (PatchIndex, PatchIndex),
+    seed: u32,
+) -> bool {
+    let sequence = Sequence::new(seed, Stream::NearPairs, i.0).of(j.0);
     (0..SIGHT_LINES).all(|line| {
         let [a, b, c, d] = sequence.point(line, 0);
         let [from, to] = [(i, a, b), (j, c, d)].map(|(index, x, y)| {
-            let patch = &patches.list[index as usize];
+            let patch = &patches.list[index.place()];
             let (u, v) = patches.point(patch, triangle_point(x, y));
             let position = scene.triangles[patch.triangle as usize].position(u, v);
             scene.off_surface(patch.triangle, patch.side, position)

@@ -8,6 +8,7 @@ use lumbre_optics::Material;
 use lumbre_scene::{Image, MaterialTextures, Sampler, TextureReference};
 
 use super::form_factor_tests::{scene, square};
+use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::sampling::{Sequence, Stream, triangle_point};
 use crate::scene::BakeScene;
@@ -23,8 +24,8 @@ fn check(objects: &[&[[Vec3; 3]]], side: f32, apart: impl Fn(Vec3) -> u32) {
     assert!((area / expected - 1.0).abs() < 1e-5, "{area} {expected}");
     let place = |position: Vec3| apart(scene.space.world(position).as_vec3());
     let mut crossed = 0.0;
-    for (index, patch) in patches.list.iter().enumerate() {
-        let sequence = Sequence::new(1, Stream::Test(2), index as u32);
+    for (index, patch) in PatchIndex::all(patches.list.len()).zip(&patches.list) {
+        let sequence = Sequence::new(1, Stream::Test(2), index.0);
         let mut places = Vec::new();
         for sample in 0..64 {
             let [x, y, ..] = sequence.point(sample, 0);
@@ -32,7 +33,7 @@ fn check(objects: &[&[[Vec3; 3]]], side: f32, apart: impl Fn(Vec3) -> u32) {
             let (u, v) = triangle_point(x, y);
             let (u, v) = (0.02 + 0.94 * u, 0.02 + 0.94 * v);
             let at = patches.point(patch, (u, v));
-            assert_eq!(patches.at(patch.triangle, patch.side, at), Some(index as u32), "{patch:?} {at:?}");
+            assert_eq!(patches.at(patch.triangle, patch.side, at), Some(index), "{patch:?} {at:?}");
             places.push(place(scene.triangles[patch.triangle as usize].position(at.0, at.1)));
         }
         if patch.triangle < 2 && patch.side == Side::Front {

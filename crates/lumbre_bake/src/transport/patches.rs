@@ -13,6 +13,7 @@ use super::box_tree::BoxTree;
 use super::contacts::{PlaneFrame, contacts};
 use super::cuts::{Corners, CutCell, Cuts};
 use super::mean_of_points::mean_of_points;
+use super::patch_index::PatchIndex;
 
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, SceneTriangle};
@@ -35,8 +36,8 @@ pub(crate) struct Patch {
 struct Cut {
     /// Pieces along each edge; 0 for a triangle that light does not meet.
     divisions: u32,
-    front: u32,
-    back: Option<u32>,
+    front: PatchIndex,
+    back: Option<PatchIndex>,
     /// Of the front's first patch and the back's: of all, where it does not vary.
     reflectance: [Vec3; 2],
     varies: bool,
@@ -112,7 +113,7 @@ impl Patches {
             }
         }
         for cut in patches.cuts.iter_mut().filter(|cut| cut.divisions > 0) {
-            let first = |patch: u32| patches.list[patch as usize].reflectance;
+            let first = |patch: PatchIndex| patches.list[patch.place()].reflectance;
             cut.reflectance = [first(cut.front), cut.back.map_or(Vec3::ZERO, first)];
         }
         let coarse = texels.into_iter().map(|(object, most)| {
@@ -136,7 +137,7 @@ impl Patches {
             if triangle.superseded || scene.stop.is_cancelled() {
                 cuts.push(Cut {
                     divisions: 0,
-                    front: 0,
+                    front: PatchIndex(0),
                     back: None,
                     reflectance: [Vec3::ZERO; 2],
                     varies: false,
@@ -159,7 +160,7 @@ impl Patches {
                 }
             }
             let mut add = |side: Side| {
-                let first = list.len() as u32;
+                let first = PatchIndex::new(list.len());
                 let patch = |cell: u32| {
                     let corners = corners_of(&lines, divisions, cell);
                     let area = match cell & PIECE {
@@ -173,7 +174,7 @@ impl Patches {
                 for (cell, cut) in &cut {
                     let mut pieces = (cut.first..cut.first + cut.count).map(|piece| patch(PIECE | piece));
                     if let Some(own) = pieces.next() {
-                        list[(first + cell) as usize] = own;
+                        list[first.place() + *cell as usize] = own;
                     }
                     list.extend(pieces);
                 }
@@ -197,7 +198,7 @@ impl Patches {
     }
 
     /// The patch at a point of a triangle's side; none where light does not arrive.
-    pub fn at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Option<u32> {
+    pub fn at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Option<PatchIndex> {
         let cut = &self.cuts[triangle as usize];
         if cut.divisions == 0 {
             return None;
@@ -210,10 +211,10 @@ impl Patches {
         if cut.roots != UNCUT {
             let root = self.roots[(cut.roots + cell) as usize];
             if root != UNCUT {
-                return Some(first + self.lines.find(root, u, v));
+                return Some(PatchIndex(first.0 + self.lines.find(root, u, v)));
             }
         }
-        Some(first + cell)
+        Some(PatchIndex(first.0 + cell))
     }
 
     /// Reflectance of a triangle's side, if it has the same all over.

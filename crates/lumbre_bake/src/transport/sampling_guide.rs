@@ -5,14 +5,20 @@
 use glam::Vec3;
 
 use super::form_factors::FormFactors;
-use super::patches::Patches;
+use super::patch_index::PatchIndex;
+use super::patches::{Patch, Patches};
 use crate::scene::BakeScene;
+use crate::scene::material::Side;
+
+/// A region of the guide, by its place among all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Region(u32);
 
 /// For each region, those that light it by bounces, with a probability in proportion to the irradiance they bring.
 #[derive(Clone, Debug)]
 pub(crate) struct SamplingGuide {
     /// Cut as patches are, but larger.
-    pub regions: Patches,
+    regions: Patches,
     rows: Rows,
 }
 
@@ -38,20 +44,20 @@ impl SamplingGuide {
         if scene.stop.is_cancelled() {
             return Self { regions, rows: Rows::new(0) };
         }
-        let region_of: Vec<u32> = patches
+        let region_of: Vec<PatchIndex> = patches
             .list
             .iter()
             .map(|patch| {
                 let middle = patches.point(patch, (1.0 / 3.0, 1.0 / 3.0));
-                regions.at(patch.triangle, patch.side, middle).unwrap_or(0)
+                regions.at(patch.triangle, patch.side, middle).unwrap_or(PatchIndex(0))
             })
             .collect();
-        let mut members: Vec<Vec<u32>> = vec![Vec::new(); regions.list.len()];
+        let mut members: Vec<Vec<PatchIndex>> = vec![Vec::new(); regions.list.len()];
         let mut bright = vec![0.0f64; regions.list.len()];
-        for (patch, &region) in region_of.iter().enumerate() {
-            members[region as usize].push(patch as u32);
-            let share = patches.list[patch].area / regions.list[region as usize].area;
-            bright[region as usize] += f64::from(radiosity[patch].max(0.0) * share);
+        for (patch, region) in PatchIndex::all(patches.list.len()).zip(&region_of) {
+            members[region.place()].push(patch);
+            let share = patches.list[patch.place()].area / regions.list[region.place()].area;
+            bright[region.place()] += f64::from(radiosity[patch.place()].max(0.0) * share);
         }
         let mut rows = Rows::new(regions.list.len());
         let mut exchange = vec![0.0f64; regions.list.len()];
@@ -59,25 +65,25 @@ impl SamplingGuide {
             if scene.stop.is_cancelled() {
                 break;
             }
-            let mut touched: Vec<u32> = Vec::new();
-            for (other, g) in members.iter().flat_map(|&member| factors.row(member as usize)) {
-                let region = region_of[other] as usize;
-                if exchange[region] == 0.0 && g > 0.0 {
-                    touched.push(region as u32);
+            let mut touched: Vec<PatchIndex> = Vec::new();
+            for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
+                let region = region_of[other.place()];
+                if exchange[region.place()] == 0.0 && g > 0.0 {
+                    touched.push(region);
                 }
-                exchange[region] += g;
+                exchange[region.place()] += g;
             }
             touched.sort_unstable();
             let flux: Vec<(u32, f64)> = touched
                 .iter()
                 .map(|&region| {
-                    let g = std::mem::take(&mut exchange[region as usize]);
-                    (region, g * bright[region as usize])
+                    let g = std::mem::take(&mut exchange[region.place()]);
+                    (region.0, g * bright[region.place()])
                 })
                 .collect();
             let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
-            let of_sky = |&member: &u32| {
-                f64::from(factors.areas[member as usize] * sky[member as usize].element_sum())
+            let of_sky = |member: &PatchIndex| {
+                f64::from(factors.areas[member.place()] * sky[member.place()].element_sum())
             };
             let by_sky: f64 = members.iter().map(of_sky).sum();
             let share = by_bounces / (by_bounces + by_sky);
@@ -87,30 +93,46 @@ impl SamplingGuide {
         Self { regions, rows }
     }
 
+    /// The region at a point of a triangle's side; none where light does not arrive.
+    pub fn region_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> Option<Region> {
+        self.regions.at(triangle, side, at).map(|region| Region(region.0))
+    }
+
+    /// Its surface.
+    pub fn region(&self, region: Region) -> &Patch {
+        &self.regions.list[region.0 as usize]
+    }
+
+    /// Barycentric weights (second, third vertex) of a point of a region given by weights of its own.
+    pub fn point(&self, region: Region, at: (f32, f32)) -> (f32, f32) {
+        self.regions.point(self.region(region), at)
+    }
+
     /// The share of the samples at a region that it places, in [0, 1); none if the solution knows of no light by bounces that arrives there.
-    pub fn share(&self, region: u32) -> Option<f32> {
-        self.rows.share(region)
+    pub fn share(&self, region: Region) -> Option<f32> {
+        self.rows.share(region.0)
     }
 
     /// Where in the list of those that light `region` to look for the one at `u` in [0, 1).
-    pub fn near(&self, region: u32, u: f32) -> RowPart {
-        self.rows.near(region, u)
+    pub fn near(&self, region: Region, u: f32) -> RowPart {
+        self.rows.near(region.0, u)
     }
 
     /// Of those that light a region, the one at `u`, of which `part` is [near](Self::near); the place within its interval, stretched to
     /// [0, 1); its probability.
-    pub fn pick(&self, part: &RowPart, u: f32) -> Option<(u32, f32, f32)> {
-        self.rows.pick(part, u)
+    pub fn pick(&self, part: &RowPart, u: f32) -> Option<(Region, f32, f32)> {
+        let (region, u, probability) = self.rows.pick(part, u)?;
+        Some((Region(region), u, probability))
     }
 
     /// Where in the list of those that light `region` to look for `other`.
-    pub fn near_region(&self, region: u32, other: u32) -> RowPart {
-        self.rows.near_column(region, other)
+    pub fn near_region(&self, region: Region, other: Region) -> RowPart {
+        self.rows.near_column(region.0, other.0)
     }
 
     /// The probability that [`pick`](Self::pick) takes `other`, of which `part` is [near](Self::near_region).
-    pub fn probability(&self, part: &RowPart, other: u32) -> f32 {
-        self.rows.probability(part, other)
+    pub fn probability(&self, part: &RowPart, other: Region) -> f32 {
+        self.rows.probability(part, other.0)
     }
 }
 

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::components::levels;
 use super::form_factors::FormFactors;
+use super::patch_index::PatchIndex;
 use crate::conjugate_gradients::{self, System};
 use crate::options::Solver;
 
@@ -63,8 +64,13 @@ impl Solver {
 pub(crate) fn gather(factors: &FormFactors, x: &[f64]) -> Vec<f64> {
     (0..factors.len())
         .into_par_iter()
-        .map(|i| factors.row(i).map(|(j, g)| g * x[j]).sum::<f64>() / f64::from(factors.areas[i]))
+        .map(|i| exchanged(factors, i, x) / f64::from(factors.areas[i]))
         .collect()
+}
+
+/// Σ_j G_ij x_j of the patch at place i.
+fn exchanged(factors: &FormFactors, i: usize, x: &[f64]) -> f64 {
+    factors.row(PatchIndex::new(i)).map(|(j, g)| g * x[j.place()]).sum()
 }
 
 fn norm(factors: &FormFactors, x: &[f64]) -> f64 {
@@ -80,7 +86,7 @@ fn jacobi_sweep(factors: &FormFactors, reflectance: &[f64], emission: &[f64], x:
 
 fn gauss_seidel_sweep(factors: &FormFactors, reflectance: &[f64], emission: &[f64], x: &mut [f64]) {
     for i in 0..x.len() {
-        let gathered = factors.row(i).map(|(j, g)| g * x[j]).sum::<f64>() / f64::from(factors.areas[i]);
+        let gathered = exchanged(factors, i, x) / f64::from(factors.areas[i]);
         x[i] = emission[i] + reflectance[i] * gathered;
     }
 }
@@ -161,11 +167,7 @@ impl System for Radiosity<'_> {
     fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let Self { factors, reflectance, diagonal, .. } = self;
         let row = |i: usize| {
-            if reflectance[i] > 0.0 {
-                diagonal[i] * x[i] - factors.row(i).map(|(j, g)| g * x[j]).sum::<f64>()
-            } else {
-                0.0
-            }
+            if reflectance[i] > 0.0 { diagonal[i] * x[i] - exchanged(factors, i, x) } else { 0.0 }
         };
         (0..x.len()).into_par_iter().map(row).collect()
     }
@@ -195,7 +197,7 @@ mod tests {
             FormFactors { starts: vec![0], areas: vec![1.0; f.len()], ..FormFactors::default() };
         for row in f {
             for (j, &f) in row.iter().enumerate().filter(|(_, f)| **f > 0.0) {
-                factors.columns.push(j as u32);
+                factors.columns.push(PatchIndex::new(j));
                 factors.exchange.push(f as f32);
             }
             factors.starts.push(factors.columns.len());
@@ -307,7 +309,7 @@ mod tests {
         // Two cubes that do not see each other: what each has is what it has alone.
         let cube = cube();
         let mut two = cube.clone();
-        two.columns.extend(cube.columns.iter().map(|column| column + 6));
+        two.columns.extend(cube.columns.iter().map(|column| PatchIndex(column.0 + 6)));
         two.exchange.extend_from_slice(&cube.exchange);
         two.areas.extend_from_slice(&cube.areas);
         two.starts.extend(cube.starts[1..].iter().map(|start| start + cube.columns.len()));
