@@ -1,9 +1,11 @@
-//! What a bake of many patches really takes: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES] [--final]`. Prints the
+//! What a bake of many patches really takes: `peak_memory TRIANGLES_ALONG_A_WALL MAP_SIZE [--memory BYTES] [--final]`. Tells the stages as they begin, and prints the
 //! estimate, the peak of the process (VmHWM of Linux) before and after, and the patches.
 
 use std::error::Error;
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::time::Instant;
 
 use bevy_ecs::world::World;
 use glam::{Vec2, Vec3};
@@ -33,7 +35,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     wall(&mut panel, 1, Vec3::new(-0.3, 0.9, -0.3), [Vec3::X * 0.6, Vec3::Z * 0.6], Vec2::ZERO, 1.0);
     world.spawn((Mesh(Arc::new(panel)), Material { front: lamp, ..Material::default() }, StaticObject));
     let before = peak()?;
-    let report = Bake::new(&options).run(&mut world)?;
+    let begun = Instant::now();
+    let mut shown = None;
+    let report = Bake::new(&options)
+        .progress(|progress| {
+            if shown != Some(progress.stage) {
+                eprintln!("{:8.1} s: {}", begun.elapsed().as_secs_f64(), progress.stage);
+                shown = Some(progress.stage);
+            }
+            ControlFlow::Continue(())
+        })
+        .run(&mut world)?;
     eprint!("{report}");
     writeln!(
         std::io::stdout(),

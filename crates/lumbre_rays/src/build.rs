@@ -2,11 +2,10 @@
 //! Not traversal, and not a judge of triangles: those without area never come here.
 
 use glam::{Vec3, Vec3A};
-use obvhs::{
-    aabb::Aabb,
-    bvh2::reinsertion::ReinsertionOptimizer,
-    ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
-};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::bvh2::{Bvh2, node::Bvh2Node};
+use obvhs::ploc::{PlocBuilder, SortPrecision};
 
 use crate::collapse::collapse;
 use crate::median_split::build_balanced;
@@ -19,6 +18,13 @@ const REINSERTED_NODES: f32 = 80_000.0;
 
 /// The least and the largest share of the nodes that it tries.
 const REINSERTED_SHARE: [f32; 2] = [0.15, 0.6];
+
+/// Of the box around all, how far the one in which the Morton curve runs reaches beyond it: two of its 2^21 cells.
+const BEYOND: f32 = 1.0 / (1 << 20) as f32;
+
+/// Clusters each way among which PLOC looks for the one to merge with; and rounds at first in which it looks at the next ones only.
+const SEARCH_DISTANCE: usize = 14;
+const NEIGHBOURS_ONLY: usize = 3;
 
 /// PLOC and reinsertion choose by surface area, so among n equal boxes both take quadratic time. A mesh with a pile
 /// of more than this many is split at the median instead.
@@ -35,18 +41,33 @@ pub(crate) fn build(triangles: &[(u32, [Vec3; 3])]) -> WideTree {
         build_balanced(&mut tree, triangles);
         return tree;
     }
-    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
-        PlocSearchDistance::Medium,
-        &boxes,
-        (0..boxes.len() as u32).collect(),
-        SortPrecision::U64,
-        3,
-    );
+    let mut binary = clustered(&boxes);
     let [least, largest] = REINSERTED_SHARE;
     let share = (REINSERTED_NODES / binary.nodes.len() as f32).clamp(least, largest);
     ReinsertionOptimizer::default().run(&mut binary, share, None);
     collapse(&mut tree, &binary, triangles);
     tree
+}
+
+/// A binary tree over the boxes by PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
+/// Construction", 2018). Done by its parts, as the whole sorts the boxes along a Morton curve that wraps around: what lies in the highest planes
+/// of the box around all, a room's ceiling and two of its walls, was sorted among what lies in the lowest, and merged with it. Among 200,000
+/// triangles on the six walls of a room a ray then met 326 nodes instead of 12.
+fn clustered(boxes: &[Aabb]) -> Bvh2 {
+    let mut binary = Bvh2::zeroed(boxes.len());
+    binary.primitive_indices = (0..boxes.len() as u32).collect();
+    let mut builder = PlocBuilder::with_capacity(boxes.len());
+    builder.current_nodes.clear();
+    builder.current_nodes.extend((0..).zip(boxes).map(|(index, own)| Bvh2Node::new(*own, 1, index)));
+    let mut around = boxes.iter().fold(Aabb::empty(), |around, own| around.union(own));
+    around.max += around.diagonal().max_element() * BEYOND;
+    builder.build_ploc_from_leaves::<SEARCH_DISTANCE, false>(
+        &mut binary,
+        around,
+        SortPrecision::U64,
+        NEIGHBOURS_ONLY,
+    );
+    binary
 }
 
 /// Size of the largest set of equal boxes.
@@ -57,4 +78,51 @@ fn most_coincident(boxes: &[Aabb]) -> usize {
         .collect();
     keys.sort_unstable();
     keys.chunk_by(|a, b| a == b).map(<[_]>::len).max().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The boxes of the triangles on the six walls of a room, each cut into `2 n²`.
+    fn walls(n: u32) -> Vec<Aabb> {
+        let mut boxes = Vec::new();
+        let step = 2.0 / n as f32;
+        for axis in 0..3 {
+            for side in [-1.0f32, 1.0] {
+                for cell in 0..n * n {
+                    let along = [(cell % n) as f32, (cell / n) as f32].map(|at| at * step - 1.0);
+                    let corner = |offset: f32| {
+                        let mut corner = [side; 3];
+                        corner[(axis + 1) % 3] = along[0] + offset;
+                        corner[(axis + 2) % 3] = along[1] + offset;
+                        Vec3A::from_array(corner)
+                    };
+                    let own = Aabb::new(corner(0.0), corner(step));
+                    boxes.extend([own; 2]);
+                }
+            }
+        }
+        boxes
+    }
+
+    /// Area of all nodes with children over that of the first: what a ray meets of them, about.
+    fn nodes_met(binary: &Bvh2) -> f64 {
+        let inner = binary.nodes.iter().filter(|node| !node.is_leaf());
+        let area = inner.map(|node| f64::from(node.aabb().half_area())).sum::<f64>();
+        area / f64::from(binary.nodes[0].aabb().half_area())
+    }
+
+    #[test]
+    fn what_lies_in_the_highest_planes_is_not_clustered_with_what_lies_in_the_lowest() {
+        for n in [4, 12, 40, 120] {
+            let boxes = walls(n);
+            let met = nodes_met(&clustered(&boxes));
+            // Each level of walls, their quarters and so on has about the area of the room, and there are somewhat more of them than in a tree that
+            // is balanced. Joined across the room most nodes are as long as it, and there are n² of them: 4 to 47 times as many are met then.
+            let levels = f64::from(boxes.len() as u32).log2();
+            println!("{} boxes: {met:.1} nodes met, {levels:.1} levels", boxes.len());
+            assert!(met < 3.0 * levels, "{met} of {levels} levels");
+        }
+    }
 }
