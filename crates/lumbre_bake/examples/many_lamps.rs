@@ -1,4 +1,4 @@
-//! What more lamps cost: `many_lamps [NAME …] [--error X] [--time SECONDS] [--plot FILE.svg]` bakes one room under 1 to 10,000 lamps of the same power
+//! What more lamps cost: `many_lamps [NAME …] [--error X] [--time SECONDS] [--stages] [--plot FILE.svg]` bakes one room under 1 to 10,000 lamps of the same power
 //! in all, under as many point lights, a bulb of 70,000 triangles and a screen of 4096 by 2048 texels, and prints a table. The plot shows the
 //! seconds of the first two against the number of lamps.
 
@@ -24,13 +24,14 @@ struct Measured {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut options = BakeOptions { error: 0.02, ..BakeOptions::default() };
-    let (mut names, mut plot) = (Vec::new(), None);
+    let (mut names, mut plot, mut stages) = (Vec::new(), None, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
         match argument.as_str() {
             "--error" => options.error = value()?.parse()?,
             "--time" => options.time = Some(std::time::Duration::try_from_secs_f64(value()?.parse()?)?),
+            "--stages" => stages = true,
             "--plot" => plot = Some(PathBuf::from(value()?)),
             _ => names.push(argument),
         }
@@ -62,6 +63,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             report.mean_irradiance.iter().sum::<f64>() / 3.0,
             report.ended.to_string().split(':').next_back().unwrap_or_default().trim()
         );
+        if stages {
+            println!("\n{report}");
+        }
         measured.push(Measured { kind, count: count as f64, report });
     }
     if let Some(path) = plot {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cut_out::Pieces;
 use super::emitter_tree::{EXACT_EMITTERS, EmitterTree, TERM_ERROR};
+use super::emitter_walk::Chosen;
 use super::emitters::{Emitter, lamps};
 use super::light_cut::{FEW_LIGHTS, LightCut};
 use super::light_tree::{LightTree, has_place};
@@ -327,8 +328,8 @@ impl<'a> Sources<'a> {
             let at = group_of(sample, samples);
             let [x, y, u, v] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
-            let (chosen, u, probability) = self.emitter_tree.pick(part, anchor, u);
-            let emitter = &self.emitters[chosen];
+            let Chosen { emitter, u, probability } = self.emitter_tree.pick(part, anchor, u);
+            let emitter = &self.emitters[emitter as usize];
             let Some(sample) = sample_emitter(emitter, &receiver, (u, v)) else { continue };
             let light = sample.light / probability;
             if !light.is_finite() {

@@ -41,32 +41,76 @@ impl EmitterBounds {
 }
 
 /// Groups side by side.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 /// Numbers of one group: its centre, radius, axis, spread and power.
 const NUMBERS: usize = 9;
 
-/// The bounds of several groups, number by number.
+/// The bounds of up to eight groups, number by number.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BoundsEight([[f32; LANES]; NUMBERS]);
+
+/// The bounds of several groups, eight by eight.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct BoundsLanes {
-    eights: Vec<[[f32; LANES]; NUMBERS]>,
+    eights: Vec<BoundsEight>,
     count: usize,
 }
 
+/// A receiver's place and normal in all lanes.
+#[derive(Clone, Copy)]
+pub(super) struct ReceiverLanes<S: Simd> {
+    position: [f32x8<S>; 3],
+    normal: [f32x8<S>; 3],
+    simd: S,
+}
+
+impl<S: Simd> ReceiverLanes<S> {
+    #[inline(always)]
+    pub fn new(simd: S, receiver: &Receiver) -> Self {
+        let splat = |vector: Vec3| vector.to_array().map(|number| simd.splat_f32x8(number));
+        Self { position: splat(receiver.position), normal: splat(receiver.normal), simd }
+    }
+}
+
 /// The instructions that this machine has; every level computes the same bits.
-static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
+pub(super) static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
+
+impl BoundsEight {
+    /// Of at most eight; the lanes that are left weigh nothing that may be read.
+    pub fn new(groups: &[EmitterBounds]) -> Self {
+        let mut numbers = [[0.0; LANES]; NUMBERS];
+        for (lane, group) in groups.iter().enumerate().take(LANES) {
+            let EmitterBounds { center, radius, axis, spread, power } = *group;
+            let own = [center.x, center.y, center.z, radius, axis.x, axis.y, axis.z, spread, power];
+            numbers.iter_mut().zip(own).for_each(|(number, own)| number[lane] = own);
+        }
+        Self(numbers)
+    }
+
+    /// The [`EmitterBounds::weight`] of each group.
+    #[inline(always)]
+    pub fn weights<S: Simd>(&self, receiver: &ReceiverLanes<S>) -> [f32; LANES] {
+        let ReceiverLanes { position, normal, simd } = *receiver;
+        let one = simd.splat_f32x8(1.0);
+        let [x, y, z, radius, along_x, along_y, along_z, spread, power] =
+            self.0.each_ref().map(|number| f32x8::from_slice(simd, number));
+        let towards = [x - position[0], y - position[1], z - position[2]];
+        let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let squared = dot(towards, towards) + radius * radius;
+        let inverse = one / squared.sqrt();
+        let subtends = radius * inverse;
+        let receives = (dot(towards, normal) * inverse + subtends).max(LEAST_COSINE).min(1.0);
+        let emits = spread + subtends - dot(towards, [along_x, along_y, along_z]) * inverse;
+        let emits = emits.max(LEAST_COSINE).min(1.0);
+        let mut found = [0.0; LANES];
+        (power * receives * emits * inverse * inverse).store_slice(&mut found);
+        found
+    }
+}
 
 impl BoundsLanes {
     pub fn new(groups: &[EmitterBounds]) -> Self {
-        let eight = |some: &[EmitterBounds]| {
-            let mut numbers = [[0.0; LANES]; NUMBERS];
-            for (lane, group) in some.iter().enumerate() {
-                let EmitterBounds { center, radius, axis, spread, power } = *group;
-                let own = [center.x, center.y, center.z, radius, axis.x, axis.y, axis.z, spread, power];
-                numbers.iter_mut().zip(own).for_each(|(number, own)| number[lane] = own);
-            }
-            numbers
-        };
-        Self { eights: groups.chunks(LANES).map(eight).collect(), count: groups.len() }
+        Self { eights: groups.chunks(LANES).map(BoundsEight::new).collect(), count: groups.len() }
     }
 
     /// How many groups there are.
@@ -88,23 +132,9 @@ impl BoundsLanes {
 
     #[inline(always)]
     fn weights_with<S: Simd>(&self, simd: S, receiver: &Receiver, weights: &mut [f32]) {
-        let splat = |vector: Vec3| vector.to_array().map(|number| simd.splat_f32x8(number));
-        let (position, normal) = (splat(receiver.position), splat(receiver.normal));
-        let one = simd.splat_f32x8(1.0);
-        for (numbers, weights) in self.eights.iter().zip(weights[..self.count].chunks_mut(LANES)) {
-            let [x, y, z, radius, along_x, along_y, along_z, spread, power] =
-                numbers.each_ref().map(|number| f32x8::from_slice(simd, number));
-            let towards = [x - position[0], y - position[1], z - position[2]];
-            let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            let squared = dot(towards, towards) + radius * radius;
-            let inverse = one / squared.sqrt();
-            let subtends = radius * inverse;
-            let receives = (dot(towards, normal) * inverse + subtends).max(LEAST_COSINE).min(1.0);
-            let emits = spread + subtends - dot(towards, [along_x, along_y, along_z]) * inverse;
-            let emits = emits.max(LEAST_COSINE).min(1.0);
-            let mut found = [0.0; LANES];
-            (power * receives * emits * inverse * inverse).store_slice(&mut found);
-            weights.copy_from_slice(&found[..weights.len()]);
+        let receiver = ReceiverLanes::new(simd, receiver);
+        for (eight, weights) in self.eights.iter().zip(weights[..self.count].chunks_mut(LANES)) {
+            weights.copy_from_slice(&eight.weights(&receiver)[..weights.len()]);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Emissive triangles as a hierarchy: lamps (pieces that hang together), lamps of lamps, and the parts of a lamp, each with the
 //! ball it lies in, where it shines to and how much (after Conty Estevez and Kulla, "Importance Sampling of Many Lights with
 //! Adaptive Tree Splitting", 2018). It tells about how much of the light each part brings, and how much exactly where nothing is between, and
-//! takes samples. Not visibility: that is `direct`; not which parts have samples of their own: that is `light_cut`.
+//! lets samples walk down. Not visibility: that is `direct`; not which parts have samples of their own: that is `light_cut`.
 
 use std::f32::consts::PI;
 
@@ -9,6 +9,7 @@ use glam::{DVec3, Mat3, Vec3};
 
 use super::direct::Receiver;
 use super::emitter_bounds::EmitterBounds;
+use super::emitter_walk::{Chosen, EmitterWalk, Kind};
 use super::emitters::Emitter;
 use super::polygon::point_to_triangle;
 
@@ -18,8 +19,7 @@ pub(crate) struct EmitterTree {
     /// Children after their parents; the first is the root.
     nodes: Vec<Node>,
     bounds: Vec<EmitterBounds>,
-    /// Of each node what a sample asks on its way down, side by side: it is one read from memory for each step.
-    steps: Vec<Step>,
+    walk: EmitterWalk,
     /// The emitters, those of each part side by side.
     order: Vec<u32>,
 }
@@ -38,22 +38,6 @@ struct Node {
     first: u32,
     emitters: u32,
     kind: Kind,
-}
-
-/// The two children of a node: nothing where it has none.
-#[derive(Clone, Copy, Debug, Default)]
-struct Step {
-    bounds: [EmitterBounds; 2],
-    children: [u32; 2],
-    /// Of a child that is one emitter, its number.
-    leaves: [Option<u32>; 2],
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Kind {
-    /// One emitter, by number.
-    Leaf(u32),
-    Inner([u32; 2]),
 }
 
 /// Up to this many emitters every one is summed exactly wherever it is.
@@ -76,7 +60,7 @@ impl EmitterTree {
     pub fn new(emitters: &[Emitter], lamps: &[u32]) -> Self {
         let room = 2 * emitters.len();
         let (nodes, bounds) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        let mut tree = Self { nodes, bounds, order: Vec::new(), steps: Vec::new() };
+        let mut tree = Self { nodes, bounds, order: Vec::new(), walk: EmitterWalk::default() };
         if emitters.is_empty() {
             return tree;
         }
@@ -88,21 +72,8 @@ impl EmitterTree {
         members.retain(|members| !members.is_empty());
         let mut order: Vec<u32> = (0..members.len() as u32).collect();
         tree.add_lamps(emitters, &members, &mut order);
-        let step = |node: &Node| match node.kind {
-            Kind::Leaf(_) => Step::default(),
-            Kind::Inner(children) => {
-                let leaf = |child: u32| match tree.nodes[child as usize].kind {
-                    Kind::Leaf(emitter) => Some(emitter),
-                    Kind::Inner(_) => None,
-                };
-                Step {
-                    bounds: children.map(|child| tree.bounds(child)),
-                    children,
-                    leaves: children.map(leaf),
-                }
-            }
-        };
-        tree.steps = tree.nodes.iter().map(step).collect();
+        let kinds: Vec<Kind> = tree.nodes.iter().map(|node| node.kind).collect();
+        tree.walk = EmitterWalk::new(&kinds, &tree.bounds);
         tree
     }
 
@@ -292,27 +263,9 @@ impl EmitterTree {
         sum.as_vec3()
     }
 
-    /// An emitter of a part at `u` in [0, 1), the place within its interval stretched to [0, 1), and its probability: about in
-    /// proportion to what it brings a receiver.
-    pub fn pick(&self, part: u32, receiver: &Receiver, mut u: f32) -> (usize, f32, f32) {
-        if let Kind::Leaf(emitter) = self.nodes[part as usize].kind {
-            return (emitter as usize, u, 1.0);
-        }
-        let (mut index, mut probability) = (part, 1.0f32);
-        loop {
-            let step = &self.steps[index as usize];
-            let [a, b] = step.bounds.each_ref().map(|bounds| bounds.weight(receiver, 0.0));
-            let first = if a + b > 0.0 && (a + b).is_finite() { a / (a + b) } else { 0.5 };
-            let is_first = u < first;
-            u = if is_first { u / first } else { (u - first) / (1.0 - first) };
-            u = u.clamp(0.0, 1.0 - f32::EPSILON);
-            probability *= if is_first { first } else { 1.0 - first };
-            let child = usize::from(!is_first);
-            if let Some(emitter) = step.leaves[child] {
-                return (emitter as usize, u, probability);
-            }
-            index = step.children[child];
-        }
+    /// An emitter of a part at `u` in [0, 1): about in proportion to what it brings a receiver.
+    pub fn pick(&self, part: u32, receiver: &Receiver, u: f32) -> Chosen {
+        self.walk.choose(&self.bounds, part, receiver, u)
     }
 
     /// About what a part brings receivers within `reach` of one (irradiance, sum of the channels); positive.

@@ -12,6 +12,7 @@ pub(crate) mod cuts;
 pub(crate) mod direct;
 mod emitter_bounds;
 mod emitter_tree;
+mod emitter_walk;
 pub(crate) mod emitters;
 pub(crate) mod exchange;
 #[cfg(test)]

@@ -6,6 +6,7 @@ use glam::Vec3;
 use lumbre_optics::BakeMode;
 
 use super::direct::{Direct, GROUPS, Receiver, Sources, group_of, sample_emitter, variance_of_mean};
+use super::emitter_walk::Chosen;
 use super::light_cut::{Branch, Rest};
 use super::punctual::{self, FIRST_ID};
 use crate::sampling::Sequence;
@@ -37,8 +38,8 @@ impl Sources<'_> {
         };
         match branch {
             Branch::Emitters(part) => {
-                let (emitter, _, probability) = self.emitter_tree.pick(part, receiver, choice);
-                let emitter = &self.emitters[emitter];
+                let Chosen { emitter, probability, .. } = self.emitter_tree.pick(part, receiver, choice);
+                let emitter = &self.emitters[emitter as usize];
                 let Some(sample) = sample_emitter(emitter, receiver, (u, v)) else { return nothing };
                 let light = sample.light / (probability * of_branch);
                 if !light.is_finite() {
