@@ -24,7 +24,7 @@ use crate::texels::patch_light::patch_light;
 use crate::texels::radiance_cache::RadianceCache;
 use crate::texels::resolution_error::{compare, dense_points};
 use crate::texels::rounds::{self, Bounced};
-use crate::texels::seams::{Maps, close_seams};
+use crate::texels::seams::{Maps, Shown, close_seams};
 use crate::texels::separate_light::separate;
 use crate::texels::worst_places::worst_places;
 use crate::transport::exchange::Exchange;
@@ -317,7 +317,7 @@ fn run(
     };
     watch.advance(0.2)?;
     let known = (light.as_slice(), variances.cautious.as_slice());
-    let (mut filled, errors) = watch.during(0.2, || fill(&texels, known, options.gap, &scene.stop))?;
+    let (mut filled, mut errors) = watch.during(0.2, || fill(&texels, known, options.gap, &scene.stop))?;
     watch.advance(1.0)?;
 
     watch.stage(Stage::Seams, report)?;
@@ -326,10 +326,10 @@ fn run(
         layout: &layout,
         texels: &texels.list,
         charts: &texels.charts,
-        variances: &errors,
         mean: report.mean_irradiance.iter().sum::<f64>() / 3.0,
     };
-    close_seams(&maps, &mut filled, options, watch, report)?;
+    let shown = Shown { light: &mut filled, variances: &mut errors };
+    close_seams(&maps, shown, options, watch, report)?;
     watch.advance(0.9)?;
     report.resolution = watch.during(0.9, || compare(&scene, &layout, &filled, &errors, &points))?;
     let pages = watch.during(0.9, || Pages::new(&layout, options.atlas_size, options.gap))?;

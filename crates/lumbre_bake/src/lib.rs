@@ -78,5 +78,4 @@ pub use report::{
     StageTime, WorstPlace,
 };
 pub use scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
-pub use transport::method_study::{FormFactorErrors, form_factor_errors};
 pub use unwrapped_from::UnwrappedFrom;

@@ -17,8 +17,9 @@ use crate::transport::patches::{Patch, Patches};
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Of a triangle: itself, its corners for the hierarchy and with its index while it is built, two nodes of the binary tree that is built first,
-/// and of what rays meet: its lane of a block that may be half empty, and its share of nodes of eight (256 bytes each, one in four triangles at worst).
-const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4) as u64;
+/// and of what rays meet: its lane of a block that may be half empty, and its share of nodes of eight (256 bytes each, one in four triangles at worst);
+/// of the tree of boxes its number, and a node at worst.
+const TRIANGLE: u64 = (size_of::<SceneTriangle>() + 36 + 40 + 2 * 64 + 2 * 40 + 256 / 4 + 4 + 32) as u64;
 
 /// Of a texel that shows a surface: what it has gathered before and after a round, raw and smoothed estimates with their guides, and
 /// sixteen lists of one number each for the errors; the light around it, and its block. (What it has of shared samples is less, and gone by then.)

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::progress::Watch;
-use crate::scene::{BakeScene, Canonical, LightmapLayout, StaticScene, lay_out_with};
+use crate::scene::{BakeScene, Canonical, LightmapLayout, StaticScene, lay_out};
 use crate::transport::direct::{Sources, shines_inside_only};
 use crate::transport::emitters::{Emitter, coarse_textures, emitters};
 use crate::{BakeError, BakeOptions, BakeReport};
@@ -24,7 +24,7 @@ pub(crate) fn layout(
     let (input, options, stop) = (Arc::clone(input), *options, watch.stop().clone());
     let (layout, warnings) = watch.apart(0.0, move || {
         let mut warnings = Vec::new();
-        (lay_out_with(&input.objects, space, density, &options, &stop, &mut warnings), warnings)
+        (lay_out(&input.objects, space, density, &options, &stop, &mut warnings), warnings)
     })?;
     report.warnings.extend(warnings);
     layout

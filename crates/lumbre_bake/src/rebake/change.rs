@@ -28,7 +28,7 @@ use crate::transport::direct::{Direct, Receiver, Sources};
 use crate::transport::exchange::Exchange;
 use crate::transport::form_factors::FormFactors;
 use crate::transport::patches::{Patch, Patches};
-use crate::transport::solver::gather;
+use crate::transport::solution::gather;
 use crate::{BakeError, BakeOptions};
 
 /// Rays of a patch and of a block of texels; every other one towards what has changed.

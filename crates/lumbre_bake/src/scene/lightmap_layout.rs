@@ -78,19 +78,8 @@ pub(crate) fn density_of(objects: &[SceneObject], space: Canonical, options: &Ba
     }
 }
 
-/// Lays out every object, as densely as the options ask.
-pub(crate) fn lay_out(
-    objects: &[SceneObject],
-    space: Canonical,
-    options: &BakeOptions,
-    warnings: &mut Vec<String>,
-) -> Result<LightmapLayout, BakeError> {
-    let density = density_of(objects, space, options);
-    lay_out_with(objects, space, density, options, &CancelToken::default(), warnings)
-}
-
 /// Lays out every object, with so many texels per canonical unit.
-pub(crate) fn lay_out_with(
+pub(crate) fn lay_out(
     objects: &[SceneObject],
     space: Canonical,
     density: f64,

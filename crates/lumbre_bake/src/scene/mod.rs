@@ -1,10 +1,13 @@
 //! The static scene as light meets it: triangles in one space, what they reflect and emit, where their texels are.
 //! Not the World: `from_world` reads it once, before, and nothing here writes it.
 
+mod box_tree;
 pub(crate) mod crossings;
 mod duplicates;
 mod from_world;
 mod hidden_side;
+#[cfg(test)]
+pub(crate) mod laid_out;
 mod leaks;
 mod lightmap_layout;
 pub(crate) mod material;
@@ -16,7 +19,7 @@ mod texture_coordinates;
 mod triangles;
 
 pub(crate) use from_world::{Entities, from_world};
-pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, lay_out_with, world_points};
+pub(crate) use lightmap_layout::{LightmapLayout, density_of, lay_out, world_points};
 pub(crate) use material::SurfaceMaterial;
 pub(crate) use occlusion::SurfaceHit;
 pub use static_scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};

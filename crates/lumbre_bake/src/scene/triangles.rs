@@ -5,6 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use lumbre_rays::{Bvh, triangle_extent};
 use serde::{Deserialize, Serialize};
 
+use super::box_tree::BoxTree;
 use super::duplicates::superseded;
 use super::hidden_side::closed_pieces;
 use super::leaks::Leaks;
@@ -129,7 +130,10 @@ pub(crate) struct BakeScene {
     /// Of the objects, for people.
     pub names: Vec<String>,
     pub surfaces: Vec<SurfaceMaterial>,
+    /// What rays meet.
     pub bvh: Bvh,
+    /// What lies near a place.
+    pub boxes: BoxTree,
     /// Whether some surface lets light through in places.
     pub masked: bool,
     /// Rays that ended where none should.
@@ -178,6 +182,7 @@ impl BakeScene {
         Ok(Self {
             space,
             bvh: Bvh::build(&solid),
+            boxes: BoxTree::new(&triangles, stop),
             triangles,
             names: objects.iter().map(|object| object.name.clone()).collect(),
             surfaces,

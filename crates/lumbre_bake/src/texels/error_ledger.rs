@@ -4,7 +4,7 @@
 //! ```text
 //!   term           what it is                                               found by                       in a whole map
 //!   ─────────────  ───────────────────────────────────────────────────────  ─────────────────────────────  ──────────────────────────
-//!   direct light   spread of interleaved groups of shadow samples           transport::direct, shared_light without its caution
+//!   direct light   spread of batches of shadow samples                      transport::direct, shared_light without its caution
 //!   noise          spread of four replicates, after smoothing               error_estimate::spread         the neighbours' mean
 //!   smoothing      half of the replicates smoothed against the other raw    smoothing_bias                 as it is
 //!   form factors   half the difference of two half solutions, and to one    transport::exchange, coarser,  as it is
@@ -17,8 +17,12 @@
 //!   arithmetic     what cracks as wide as rounded coordinates let through   here                           as it is
 //! ```
 //!
+//! The finished map states two things more, texel by texel, which no round can make smaller and the whole map's figure does not have: `fill` tells
+//! what the sum above leaves at a texel's centre, where its neighbours' slope brings it, and `seams` adds by how much a texel was moved.
+//!
 //! Of a single texel a cautious figure is stated, of the whole map the expected one: cautious figures of many texels add up to far more than the map's
-//! error. The tests `honest_error` hold both against converged bakes and the tests' path tracer.
+//! error. The tests `honest_error` hold both against converged bakes, and `coverage` holds the former against the tests' path
+//! tracer, in scenes that no constant was chosen on.
 //!
 //! Not in it: the map's own resolution, and what a penumbra hides that all samples of a texel and of its neighbours missed.
 

@@ -14,7 +14,6 @@ use crate::progress::{Clock, Watch};
 use crate::sampling::{Sequence, Stream, cosine_about};
 use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
 use crate::texel_index::MapTexel;
-use crate::transport::box_tree::BoxTree;
 use crate::transport::shaft::is_free_before;
 
 /// Seed of all rays here.
@@ -115,7 +114,6 @@ fn odd(
 
 /// Of each tile, whether its texels have to be looked at one by one.
 fn suspect(scene: &BakeScene, texels: &[Texel], tiles: &Tiles) -> Vec<bool> {
-    let tree = BoxTree::new(&scene.triangles, &scene.stop);
     tiles
         .members
         .par_iter()
@@ -127,7 +125,7 @@ fn suspect(scene: &BakeScene, texels: &[Texel], tiles: &Tiles) -> Vec<bool> {
             let mut positions = Vec::new();
             members.iter().for_each(|texel| positions_of(scene, texel, &mut positions));
             let free = members.first().and_then(|first| area(scene, first.triangle, &positions));
-            let free = free.is_some_and(|area| is_free_before(&area, scene, &tree));
+            let free = free.is_some_and(|area| is_free_before(&area, scene));
             let of_tile =
                 (0..TILE_PROBES).map(|ray| members[ray as usize * members.len() / TILE_PROBES as usize]);
             let fine = |(ray, texel): (usize, &Texel)| probe(scene, texel, ray as u32) == Probe::Clear;

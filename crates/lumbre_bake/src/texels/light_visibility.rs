@@ -4,7 +4,6 @@ use glam::DVec3;
 use lumbre_optics::{LightKind, SpotCone};
 
 use crate::scene::{BakeScene, PlacedLight};
-use crate::transport::box_tree::BoxTree;
 use crate::transport::cut_out::{Pieces, Shadow};
 use crate::transport::direct::Sources;
 use crate::transport::shadow_clipping::{LightVisibility, Origin};
@@ -16,7 +15,6 @@ pub(super) fn visibilities(
     lights: &[u32],
     area: &Area,
     texel_side: f32,
-    tree: &BoxTree,
 ) -> Vec<(u32, LightVisibility)> {
     let of_light = |&index: &u32| {
         if sources.scene.stop.is_cancelled() {
@@ -26,7 +24,7 @@ pub(super) fn visibilities(
         let visibility = match is_out_of_range(sources.scene, placed, area) {
             true => LightVisibility::Dark,
             false if is_even(sources.scene, placed, area, texel_side) => {
-                visibility(sources.scene, placed, area, tree)?
+                visibility(sources.scene, placed, area)?
             }
             false => return None,
         };
@@ -83,12 +81,7 @@ const NEAR: f64 = 2.0;
 const AFAR: f64 = (1 << 14) as f64;
 
 /// `None` where rays have to tell.
-fn visibility(
-    scene: &BakeScene,
-    placed: &PlacedLight,
-    area: &Area,
-    tree: &BoxTree,
-) -> Option<LightVisibility> {
+fn visibility(scene: &BakeScene, placed: &PlacedLight, area: &Area) -> Option<LightVisibility> {
     let light = &placed.light;
     let (shaft, origin) = match light.kind {
         LightKind::Directional => {
@@ -108,7 +101,7 @@ fn visibility(
         }
     };
     let Some(shaft) = shaft else { return Some(LightVisibility::Dark) };
-    let blockers = shaft.triangles(scene, tree, MOST_BLOCKERS)?;
+    let blockers = shaft.triangles(scene, MOST_BLOCKERS)?;
     if blockers.is_empty() {
         return Some(LightVisibility::Clear);
     }

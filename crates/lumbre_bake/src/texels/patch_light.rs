@@ -76,10 +76,10 @@ mod tests {
     use super::super::direct_light::direct_light;
     use super::super::footprint::{FootprintPoint, receiver};
     use super::*;
-    use crate::cancel_token::CancelToken;
     use crate::progress::Watch;
     use crate::sampling::{Sequence, Stream, triangle_point};
-    use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene, lay_out};
+    use crate::scene::laid_out::laid_out;
+    use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
     use crate::transport::direct::Sources;
     use crate::{BakeOptions, BakeReport, Density};
 
@@ -100,9 +100,7 @@ mod tests {
             vec![PlacedLight { light: lamp, position: DVec3::new(-0.5, 1.0, 0.2), axis: DVec3::NEG_Y }];
         let input = StaticScene { objects, lights, ..StaticScene::default() }.checked().unwrap();
         let options = BakeOptions { density: Density::TexelsPerMeter(14.0), ..BakeOptions::default() };
-        let (space, stop) = (input.space(), CancelToken::default());
-        let layout = lay_out(&input.objects, space, &options, &mut Vec::new()).unwrap();
-        let scene = BakeScene::new(&input.objects, &layout, space, &stop, &mut Vec::new()).unwrap();
+        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let sources = Sources::new(&scene, Vec::new(), input.lights.clone(), Vec3::ZERO);
         let mut carry_on = |_| ControlFlow::Continue(());
         let (mut watch, mut report) = (Watch::new(&mut carry_on, None), BakeReport::default());

@@ -12,7 +12,6 @@ use super::light_visibility::visibilities;
 use super::tiles::{Tiles, area, positions_of, shows_plane};
 use crate::scene::BakeScene;
 use crate::texel_index::CoveredTexel;
-use crate::transport::box_tree::BoxTree;
 use crate::transport::direct::Sources;
 use crate::transport::light_cut::LightCut;
 use crate::transport::shadow_clipping::{LightVisibility, ReceiverShape};
@@ -59,7 +58,6 @@ impl<'a> Shafts<'a> {
         }
         let Tiles { members, tile_of } = Tiles::new(texels);
         shafts.tile_of = tile_of;
-        let tree = BoxTree::new(&scene.triangles, &scene.stop);
         shafts.tiles = members
             .par_iter()
             .map(|members| {
@@ -69,7 +67,7 @@ impl<'a> Shafts<'a> {
                 let cut = cuts.of(members[0] as usize);
                 let asked = members.iter().copied().find(|&place| !texels[place as usize].is_hidden());
                 let members = || members.iter().map(|&place| &texels[place as usize]);
-                let found = shafts.of_tile(&tree, cut, members).unwrap_or_default();
+                let found = shafts.of_tile(cut, members).unwrap_or_default();
                 OfTile { asked, ..found }
             })
             .collect();
@@ -79,7 +77,6 @@ impl<'a> Shafts<'a> {
     /// `None` where rays have to tell.
     fn of_tile<'t, T: Iterator<Item = &'t Texel>>(
         &self,
-        tree: &BoxTree,
         cut: &LightCut,
         members: impl Fn() -> T,
     ) -> Option<OfTile> {
@@ -102,13 +99,13 @@ impl<'a> Shafts<'a> {
                     return None;
                 }
                 if let Some(shaft) = Shaft::new(&area, &self.sources.emitters[emitter as usize]) {
-                    found.push((emitter, shaft.triangles(self.scene, tree, MOST_BLOCKERS)?));
+                    found.push((emitter, shaft.triangles(self.scene, MOST_BLOCKERS)?));
                 }
             }
             Some(OfPart { part, emitters: found })
         };
         let parts = cut.lamps.iter().filter_map(lamp).collect();
-        let lights = visibilities(self.sources, &cut.lights, &area, first.side(self.scene), tree);
+        let lights = visibilities(self.sources, &cut.lights, &area, first.side(self.scene));
         Some(OfTile { parts, lights, asked: None })
     }
 

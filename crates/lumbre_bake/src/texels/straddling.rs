@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::footprint::{Footprint, Texel};
 use crate::scene::{BakeScene, LightmapLayout};
 use crate::texel_index::{CoveredTexel, MapTexel};
-use crate::transport::box_tree::BoxTree;
+use crate::transport::clipping::clip_segment;
 use crate::transport::contacts::{PlaneFrame, contacts};
 
 /// Texels of a contact line below which it divides nothing.
@@ -23,10 +23,9 @@ pub(crate) struct Straddling {
 
 /// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
 pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
-    let tree = BoxTree::new(&scene.triangles, &scene.stop);
     let mut lines: Vec<(MapTexel, [DVec2; 2])> = (0..scene.triangles.len())
         .into_par_iter()
-        .flat_map_iter(|index| divisions(scene, layout, &tree, index))
+        .flat_map_iter(|index| divisions(scene, layout, index))
         .collect();
     // Millions, where a mesh is as fine as its texels.
     if scene.stop.is_cancelled() {
@@ -60,12 +59,7 @@ pub(crate) fn straddling(
 }
 
 /// The texels that contact lines of a triangle cross, with the lines' parts in their unit squares.
-fn divisions(
-    scene: &BakeScene,
-    layout: &LightmapLayout,
-    tree: &BoxTree,
-    index: usize,
-) -> Vec<(MapTexel, [DVec2; 2])> {
+fn divisions(scene: &BakeScene, layout: &LightmapLayout, index: usize) -> Vec<(MapTexel, [DVec2; 2])> {
     let triangle = &scene.triangles[index];
     let map = &layout.maps[triangle.object as usize];
     let [a, b, c] = triangle.uv.map(|uv| uv.as_dvec2());
@@ -81,8 +75,9 @@ fn divisions(
         return Vec::new();
     }
     let mut found = Vec::new();
-    for segment in contacts(scene, tree, index as u32, &frame, side as f32) {
-        let Some(segment) = inside([p, q, r], segment) else { continue };
+    for segment in contacts(scene, index as u32, &frame, side as f32) {
+        // Beyond its edges the plane is not what anything stands on.
+        let Some(segment) = clip_segment(&[p, q, r], segment) else { continue };
         let [start, end] = segment.map(|point| a + to_texels * (point - p));
         // What touches with a corner only.
         if start.distance(end) < MARGIN {
@@ -113,26 +108,6 @@ fn divisions(
         }
     }
     found
-}
-
-/// The part of a line inside of a triangle: beyond its edges the plane is not what anything stands on.
-fn inside([p, q, r]: [DVec2; 3], [start, end]: [DVec2; 2]) -> Option<[DVec2; 2]> {
-    let turn = (q - p).perp_dot(r - p).signum();
-    let (mut from, mut to) = (0.0f64, 1.0f64);
-    for (corner, next) in [(p, q), (q, r), (r, p)] {
-        let height = |point: DVec2| turn * (next - corner).perp_dot(point - corner);
-        let (s, e) = (height(start), height(end));
-        if s < 0.0 && e < 0.0 {
-            return None;
-        }
-        if s < 0.0 {
-            from = from.max(s / (s - e));
-        }
-        if e < 0.0 {
-            to = to.min(s / (s - e));
-        }
-    }
-    (from < to).then(|| [start.lerp(end, from), start.lerp(end, to)])
 }
 
 /// The part of a line's parameter, in [0, 1], within a box.
@@ -178,8 +153,8 @@ mod tests {
     use lumbre_mesh::{TriangleMesh, shapes};
 
     use super::*;
-    use crate::cancel_token::CancelToken;
-    use crate::scene::{PlacedPrimitive, SceneObject, StaticScene, lay_out};
+    use crate::scene::laid_out::laid_out;
+    use crate::scene::{PlacedPrimitive, SceneObject, StaticScene};
     use crate::{BakeOptions, Density};
 
     /// How many texels are crossed in a scene of meshes at their places.
@@ -192,9 +167,7 @@ mod tests {
         let objects = meshes.into_iter().map(object).collect();
         let input = StaticScene { objects, sky: Vec3::ONE, ..StaticScene::default() }.checked().unwrap();
         let options = BakeOptions { density: Density::TexelsPerMeter(8.0), ..BakeOptions::default() };
-        let (space, stop) = (input.space(), CancelToken::default());
-        let layout = lay_out(&input.objects, space, &options, &mut Vec::new()).unwrap();
-        let scene = BakeScene::new(&input.objects, &layout, space, &stop, &mut Vec::new()).unwrap();
+        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
         let mut texels: Vec<MapTexel> =
             crossed(&scene, &layout).into_iter().map(|(texel, _)| texel).collect();
         texels.dedup();

@@ -3,12 +3,11 @@
 //! "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993): by Richardson's extrapolation a third of what differs between the
 //! two is what the finer one is still off by. Not the noise of form factors: that is told by two halves of the rays.
 
-use rayon::prelude::*;
-
 use super::form_factors::FormFactors;
+use super::larger_patches::LargerPatches;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
-use super::solver::gather;
+use super::solution::gather;
 use crate::options::Solver;
 use crate::scene::BakeScene;
 
@@ -27,26 +26,16 @@ pub(super) fn size_error(
     (reflectance, first): (&[f64], &[f64]),
     (solver, tolerance): (Solver, f64),
 ) -> Vec<f32> {
-    let larger = Patches::outlines(scene, COARSER * side);
-    if scene.stop.is_cancelled() {
+    let Some(larger) = LargerPatches::new(scene, patches, COARSER * side) else {
         return vec![0.0; patches.list.len()];
-    }
-    let count = larger.list.len();
-    let within: Vec<PatchIndex> = patches
-        .list
-        .iter()
-        .map(|patch| {
-            let middle = patches.point(patch, (1.0 / 3.0, 1.0 / 3.0));
-            larger.at(patch.triangle, patch.side, middle).unwrap_or(PatchIndex(0))
-        })
-        .collect();
+    };
     let emission: Vec<f64> = reflectance.iter().zip(first).map(|(rho, light)| rho * light).collect();
     let fine = gather(factors, &solver.solve(factors, reflectance, &emission, tolerance).radiosity);
     // Means by area.
     let areas: Vec<f64> = factors.areas.iter().map(|&area| f64::from(area)).collect();
     let summed = |of: &dyn Fn(usize) -> f64| {
-        let mut sums = vec![0.0; count];
-        for (patch, &large) in within.iter().enumerate() {
+        let mut sums = vec![0.0; larger.patches.list.len()];
+        for (patch, &large) in larger.of.iter().enumerate() {
             sums[large.place()] += areas[patch] * of(patch);
         }
         sums
@@ -56,47 +45,23 @@ pub(super) fn size_error(
         let over_area = |(sum, area): (f64, &f64)| if *area > 0.0 { sum / area } else { 0.0 };
         summed(of).into_iter().zip(&total).map(over_area).collect()
     };
-    let coarse = merged(factors, &within, &total);
+    let coarse = exchange(factors, &larger, &total);
     let solution = solver.solve(&coarse, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
     let found = gather(&coarse, &solution.radiosity);
     let expected = mean(&|i| fine[i]);
-    within.iter().map(|&large| (LEFT * (found[large.place()] - expected[large.place()])) as f32).collect()
+    let left = |large: &PatchIndex| (LEFT * (found[large.place()] - expected[large.place()])) as f32;
+    larger.of.iter().map(left).collect()
 }
 
-/// The exchange between sums of patches.
-fn merged(factors: &FormFactors, within: &[PatchIndex], areas: &[f64]) -> FormFactors {
-    let mut members: Vec<Vec<PatchIndex>> = vec![Vec::new(); areas.len()];
-    for (patch, large) in PatchIndex::all(within.len()).zip(within) {
-        members[large.place()].push(patch);
-    }
-    let rows: Vec<Vec<(PatchIndex, f32)>> = members
-        .par_iter()
-        .map_init(
-            || vec![0.0f64; areas.len()],
-            |exchange, members| {
-                if factors.stop.is_cancelled() {
-                    return Vec::new();
-                }
-                let mut touched = Vec::new();
-                for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
-                    let large = within[other.place()];
-                    if exchange[large.place()] == 0.0 && g > 0.0 {
-                        touched.push(large);
-                    }
-                    exchange[large.place()] += g;
-                }
-                touched.sort_unstable();
-                let entry = |large: PatchIndex| (large, std::mem::take(&mut exchange[large.place()]) as f32);
-                touched.into_iter().map(entry).collect()
-            },
-        )
-        .collect();
+/// Between the larger patches, of these areas.
+fn exchange(factors: &FormFactors, larger: &LargerPatches, areas: &[f64]) -> FormFactors {
     let mut coarse = FormFactors { starts: vec![0], stop: factors.stop.clone(), ..FormFactors::default() };
+    let single =
+        |row: Vec<(PatchIndex, f64)>| row.into_iter().map(|(larger, g)| (larger, g as f32)).collect();
+    let rows: Vec<Vec<(PatchIndex, f32)>> = larger.rows(factors, |_, row| single(row));
     for row in rows {
-        for (large, g) in row {
-            coarse.columns.push(large);
-            coarse.exchange.push(g);
-        }
+        coarse.columns.extend(row.iter().map(|entry| entry.0));
+        coarse.exchange.extend(row.iter().map(|entry| entry.1));
         coarse.starts.push(coarse.columns.len());
     }
     coarse.areas = areas.iter().map(|&area| area.max(f64::from(f32::MIN_POSITIVE)) as f32).collect();

@@ -3,40 +3,26 @@
 
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
+use crate::disjoint_sets::DisjointSets;
 
-/// For each patch, the number of its part; and how many parts there are.
-pub(crate) fn components(factors: &FormFactors) -> (Vec<u32>, usize) {
-    const NONE: u32 = u32::MAX;
-    let mut part = vec![NONE; factors.len()];
-    let mut count = 0;
-    let mut open = Vec::new();
-    for start in PatchIndex::all(part.len()) {
-        if part[start.place()] != NONE {
-            continue;
+/// For each patch, the first one of its part.
+fn components(factors: &FormFactors) -> Vec<u32> {
+    let mut parts = DisjointSets::new(factors.len());
+    for patch in PatchIndex::all(factors.len()).take_while(|_| !factors.stop.is_cancelled()) {
+        // Each pair once.
+        for (other, _) in factors.row(patch).filter(|&(other, g)| other > patch && g > 0.0) {
+            parts.join(patch.0, other.0);
         }
-        part[start.place()] = count;
-        open.push(start);
-        while let Some(patch) = open.pop().filter(|_| !factors.stop.is_cancelled()) {
-            for (other, g) in factors.row(patch) {
-                if g > 0.0 && part[other.place()] == NONE {
-                    part[other.place()] = count;
-                    open.push(other);
-                }
-            }
-        }
-        count += 1;
     }
-    (part, count as usize)
+    parts.into_sets()
 }
 
 /// What brings the emission of every part to the same size, 1 for the brightest: by patch, a factor (1 where nothing emits). And how many
 /// parts have some.
 pub(crate) fn levels(factors: &FormFactors, emission: &[f64]) -> (Vec<f64>, usize) {
-    let (part, count) = components(factors);
-    if factors.stop.is_cancelled() {
-        return (vec![1.0; emission.len()], 1);
-    }
-    let mut squares = vec![0.0f64; count];
+    let part = components(factors);
+    // By the first patch of a part; 0 at all others.
+    let mut squares = vec![0.0f64; part.len()];
     for ((&part, emission), &area) in part.iter().zip(emission).zip(&factors.areas) {
         squares[part as usize] += emission * emission * f64::from(area);
     }

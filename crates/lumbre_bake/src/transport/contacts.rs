@@ -5,7 +5,6 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::box_tree::BoxTree;
 use crate::scene::{BakeScene, SceneTriangle};
 
 /// A frame in the plane of a triangle: origin at its first corner, unit axes.
@@ -45,13 +44,7 @@ const LYING: f64 = 0.98;
 
 /// The segments in which others meet a triangle's plane near it, in that plane's frame; what is `side` wide counts as a patch. A mesh's next
 /// triangle, beyond an edge that both share, meets it nowhere else.
-pub(crate) fn contacts(
-    scene: &BakeScene,
-    tree: &BoxTree,
-    index: u32,
-    frame: &PlaneFrame,
-    side: f32,
-) -> Vec<[DVec2; 2]> {
+pub(crate) fn contacts(scene: &BakeScene, index: u32, frame: &PlaneFrame, side: f32) -> Vec<[DVec2; 2]> {
     let triangle = &scene.triangles[index as usize];
     let reach = REACH * f64::from(side);
     let [a, b, c] = triangle.corners;
@@ -59,7 +52,7 @@ pub(crate) fn contacts(
     let (low, high) = (a.min(b).min(c) - margin, a.max(b).max(c) + margin);
     let mut found = Vec::new();
     let mut outlines: HashMap<[[u32; 3]; 2], Option<[DVec2; 2]>> = HashMap::new();
-    tree.near(low, high, |other| {
+    scene.boxes.near(low, high, |other| {
         let other_triangle = &scene.triangles[other as usize];
         if other == index {
             return;

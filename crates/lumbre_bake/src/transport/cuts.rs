@@ -4,6 +4,8 @@
 
 use glam::{DMat2, DVec2};
 
+use super::clipping::{clip, clip_segment};
+
 /// One line and what lies on its sides.
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -112,7 +114,7 @@ impl Cell<'_> {
         self.left = self.left.saturating_sub(1);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             let line = Line { normal: line.normal * sign, offset: line.offset * sign };
-            let part = clip(polygon, line);
+            let part = clipped(polygon, line);
             let rest: Vec<[DVec2; 2]> = segments
                 .iter()
                 .filter(|segment| segment.iter().any(|&p| line.height(p) > near))
@@ -197,7 +199,7 @@ impl Cell<'_> {
                 continue;
             }
             let pieces = [1.0, -1.0].map(|sign| {
-                area(&clip(polygon, Line { normal: line.normal * sign, offset: line.offset * sign }))
+                area(&clipped(polygon, Line { normal: line.normal * sign, offset: line.offset * sign }))
             });
             if pieces.iter().all(|&piece| piece >= self.smallest) {
                 best = Some((support, line));
@@ -234,35 +236,10 @@ fn area(polygon: &[DVec2]) -> f64 {
 }
 
 /// The part of a convex polygon on a line's first side.
-fn clip(polygon: &[DVec2], line: Line) -> Vec<DVec2> {
+fn clipped(polygon: &[DVec2], line: Line) -> Vec<DVec2> {
     let mut part = Vec::with_capacity(polygon.len() + 1);
-    for (i, &p) in polygon.iter().enumerate() {
-        let q = polygon[(i + 1) % polygon.len()];
-        let (hp, hq) = (line.height(p), line.height(q));
-        if hp >= 0.0 {
-            part.push(p);
-        }
-        if (hp > 0.0 && hq < 0.0) || (hp < 0.0 && hq > 0.0) {
-            part.push(p.lerp(q, hp / (hp - hq)));
-        }
-    }
+    clip(polygon, |corner| line.height(corner), |corner| part.push(corner));
     part
-}
-
-/// The part of a segment in a counter-clockwise convex polygon.
-fn clip_segment(polygon: &[DVec2], [p, q]: [DVec2; 2]) -> Option<[DVec2; 2]> {
-    let (mut from, mut to) = (0.0f64, 1.0f64);
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (hp, hq) = ((b - a).perp_dot(p - a), (b - a).perp_dot(q - a));
-        match (hp >= 0.0, hq >= 0.0) {
-            (true, true) => {}
-            (false, false) => return None,
-            (true, false) => to = to.min(hp / (hp - hq)),
-            (false, true) => from = from.max(hp / (hp - hq)),
-        }
-    }
-    (from < to).then(|| [p.lerp(q, from), p.lerp(q, to)])
 }
 
 #[cfg(test)]
@@ -319,7 +296,10 @@ mod tests {
                 for piece in &cuts.pieces {
                     let corners = piece.map(|(u, v)| DVec2::new(f64::from(u), f64::from(v)) * 2.0);
                     let parts = [1.0, -1.0].map(|sign| {
-                        area(&clip(&corners, Line { normal: line.normal * sign, offset: line.offset * sign }))
+                        area(&clipped(
+                            &corners,
+                            Line { normal: line.normal * sign, offset: line.offset * sign },
+                        ))
                     });
                     let across = clip_segment(&corners, [*p, *q]).map_or(0.0, |[p, q]| p.distance(q));
                     let crossed = parts.iter().all(|&part| part > 0.01) && across > 0.1;

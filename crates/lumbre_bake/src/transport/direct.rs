@@ -93,23 +93,24 @@ pub(crate) struct Sources<'a> {
     pub sky: Vec3,
 }
 
-/// Runs of samples whose spread tells the error of their mean: each is a low-discrepancy sequence of its own. (One in every four samples
-/// is not: their spread is several times larger than the error.) All together are spread better than apart, so that the true error is smaller.
-pub(super) const GROUPS: usize = 4;
+/// Batches of samples whose spread tells the error of their mean (the method of batch means): each is a low-discrepancy sequence of its own. (One
+/// in every four samples is not: their spread is several times larger than the error.) All together are spread better than apart, so that the true
+/// error is smaller.
+pub(super) const BATCHES: usize = 4;
 
-/// The run of one of so many samples.
-pub(super) fn group_of(sample: u32, samples: u32) -> usize {
-    (sample as usize * GROUPS / samples.max(1) as usize).min(GROUPS - 1)
+/// The batch of one of so many samples.
+pub(super) fn batch_of(sample: u32, samples: u32) -> usize {
+    (sample as usize * BATCHES / samples.max(1) as usize).min(BATCHES - 1)
 }
 
-/// Four groups tell their own spread badly, and at straight edges runs agree better than they should: it counts twice.
-const FEW_GROUPS: f32 = 2.0;
+/// Four batches tell their own spread badly, and at straight edges they agree better than they should: it counts twice.
+const FEW_BATCHES: f32 = 2.0;
 
-/// Variance of the mean of all groups, from each group's mean.
-pub(super) fn variance_of_mean(groups: [f32; GROUPS]) -> f32 {
-    let mean = groups.iter().sum::<f32>() / GROUPS as f32;
-    let squares: f32 = groups.iter().map(|group| (group - mean).powi(2)).sum();
-    FEW_GROUPS * squares / (GROUPS * (GROUPS - 1)) as f32
+/// Variance of the mean of all batches, from each batch's mean.
+pub(super) fn variance_of_mean(batches: [f32; BATCHES]) -> f32 {
+    let mean = batches.iter().sum::<f32>() / BATCHES as f32;
+    let squares: f32 = batches.iter().map(|batch| (batch - mean).powi(2)).sum();
+    FEW_BATCHES * squares / (BATCHES * (BATCHES - 1)) as f32
 }
 
 /// Whether all that shines is inside of rooms: outside of them it is dark. `sky` is its radiance.
@@ -273,8 +274,8 @@ impl<'a> Sources<'a> {
         point: &impl Fn(f32, f32) -> Option<Receiver>,
         direct: &mut Direct,
     ) -> Option<(Vec3, f32)> {
-        let points = (samples / RAYS_OF_A_POINT).max(GROUPS as u32);
-        let (mut sums, mut counts) = ([Vec3::ZERO; GROUPS], [0u32; GROUPS]);
+        let points = (samples / RAYS_OF_A_POINT).max(BATCHES as u32);
+        let (mut sums, mut counts) = ([Vec3::ZERO; BATCHES], [0u32; BATCHES]);
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut seen, mut hidden) = (0, 0);
         let mut room = Pieces::new();
@@ -293,9 +294,9 @@ impl<'a> Sources<'a> {
             (least, most) = (least.min(grey), most.max(grey));
             seen += u32::from(grey > 0.0);
             hidden += u32::from(cut);
-            let group = group_of(sample, points);
-            sums[group] += light;
-            counts[group] += 1;
+            let batch = batch_of(sample, points);
+            sums[batch] += light;
+            counts[batch] += 1;
         }
         direct.seen.add(occluders.part, seen, hidden);
         direct.sampled = true;
@@ -304,11 +305,11 @@ impl<'a> Sources<'a> {
             return Some((Vec3::ZERO, 0.0));
         }
         let mean = sums.iter().sum::<Vec3>() / count as f32;
-        let of_group = |group: usize| match counts[group] {
+        let of_batch = |batch: usize| match counts[batch] {
             0 => mean.element_sum() / 3.0,
-            own => sums[group].element_sum() / (3 * own) as f32,
+            own => sums[batch].element_sum() / (3 * own) as f32,
         };
-        Some((mean, uneven_variance(std::array::from_fn(of_group), most - least, count)))
+        Some((mean, uneven_variance(std::array::from_fn(of_batch), most - least, count)))
     }
 
     /// The share of a part's light that is seen, by so many samples of dimension set `set`.
@@ -323,9 +324,9 @@ impl<'a> Sources<'a> {
     ) -> Share {
         let (mut all, mut seen) = (Vec3::ZERO, Vec3::ZERO);
         let (mut visible, mut hidden) = (0u32, 0u32);
-        let (mut group_all, mut group_seen) = ([0.0f32; GROUPS], [0.0f32; GROUPS]);
+        let (mut batch_all, mut batch_seen) = ([0.0f32; BATCHES], [0.0f32; BATCHES]);
         for sample in 0..samples {
-            let at = group_of(sample, samples);
+            let at = batch_of(sample, samples);
             let [x, y, u, v] = sequence.point(sample, set);
             let Some(receiver) = point(x, y) else { continue };
             let Chosen { emitter, u, probability } = self.emitter_tree.pick(part, anchor, u);
@@ -336,13 +337,13 @@ impl<'a> Sources<'a> {
                 continue;
             }
             all += light;
-            group_all[at] += light.element_sum() / 3.0;
+            batch_all[at] += light.element_sum() / 3.0;
             if self.hides(emitter, &sample, &receiver) {
                 hidden += 1;
             } else {
                 visible += 1;
                 seen += light;
-                group_seen[at] += light.element_sum() / 3.0;
+                batch_seen[at] += light.element_sum() / 3.0;
             }
         }
         direct.rays += visible + hidden;
@@ -350,9 +351,9 @@ impl<'a> Sources<'a> {
         direct.seen.add(part, visible, hidden);
         let share = |seen: f32, all: f32| if all > 0.0 { seen / all } else { 0.0 };
         let mean = Vec3::new(share(seen.x, all.x), share(seen.y, all.y), share(seen.z, all.z));
-        let grey = share(group_seen.iter().sum(), group_all.iter().sum());
-        let shares = std::array::from_fn(|at| match group_all[at] > 0.0 {
-            true => group_seen[at] / group_all[at],
+        let grey = share(batch_seen.iter().sum(), batch_all.iter().sum());
+        let shares = std::array::from_fn(|at| match batch_all[at] > 0.0 {
+            true => batch_seen[at] / batch_all[at],
             false => grey,
         });
         let asked = visible + hidden;
@@ -465,8 +466,8 @@ const SAMPLES_OF_REST: u32 = 4;
 /// The dimension sets of lamps begin here: before it are the punctual lights'.
 const FIRST_SET: u32 = 34;
 
-/// Of `samples` for the brightest source, those of one that brings `part` of it: a power of two, as runs are best spread.
+/// Of `samples` for the brightest source, those of one that brings `part` of it: a power of two, as batches are best spread.
 pub(super) fn allotted(samples: u32, part: f32) -> u32 {
-    let least = (samples / 4).max(GROUPS as u32).min(samples);
+    let least = (samples / 4).max(BATCHES as u32).min(samples);
     ((samples as f32 * part) as u32).next_power_of_two().clamp(least, samples)
 }

@@ -10,7 +10,7 @@ use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::{Patch, Patches};
 use super::sampling_guide::SamplingGuide;
-use super::solver;
+use super::solution::gather;
 use crate::chunks::in_chunks;
 use crate::options::Solver;
 use crate::progress::{Stage, Watch};
@@ -224,7 +224,7 @@ fn solution_error(
         let emission: Vec<f64> =
             lit.map(|((light, sky), patch)| grey((*light + *sky) * patch.reflectance)).collect();
         let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
-        let gathered = solver::gather(factors, &solution.radiosity);
+        let gathered = gather(factors, &solution.radiosity);
         gathered.iter().zip(&sky[half]).map(|(light, sky)| light + grey(*sky)).collect::<Vec<f64>>()
     });
     a.iter().zip(&b).map(|(a, b)| (0.5 * (a - b)) as f32).collect()
@@ -247,7 +247,7 @@ fn solve(
             let emission: Vec<f64> =
                 first.iter().zip(&reflectance).map(|(e, &rho)| f64::from(e[channel]) * rho).collect();
             let solution = solver.solve(factors, &reflectance, &emission, TOLERANCE);
-            let gathered = solver::gather(factors, &solution.radiosity);
+            let gathered = gather(factors, &solution.radiosity);
             (gathered, solution.iterations, solution.residual)
         })
         .collect();

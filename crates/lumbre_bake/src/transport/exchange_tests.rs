@@ -1,4 +1,4 @@
-//! The exchange as a whole: solvers against each other, and both ways to count form factors against each other.
+//! The exchange as a whole: solvers against each other. Both ways to count form factors: that is `method_study_tests`.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -9,18 +9,17 @@ use glam::Vec3;
 use super::direct::Sources;
 use super::emitters::emitters;
 use super::exchange::{Exchange, Resolution};
-use super::method_study::form_factor_errors;
 use super::patches::Patches;
-use crate::cancel_token::CancelToken;
-use crate::options::{FormFactorMethod, Solver};
+use crate::options::Solver;
 use crate::progress::Watch;
-use crate::scene::{BakeScene, from_world, lay_out};
+use crate::scene::from_world;
+use crate::scene::laid_out::laid_out;
 use crate::{BakeOptions, BakeReport, Density, Quality};
 
-const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
+pub(super) const MODELS: [&str; 2] = ["models/cornell_box.glb", "conformance/bake/alcove.glb"];
 
 /// Measured data beside the checkout; `None`, loudly, where it is missing.
-fn model(name: &str) -> Option<World> {
+pub(super) fn model(name: &str) -> Option<World> {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")).join(name);
     if !path.exists() {
         eprintln!("SKIPPED: {} is missing; nothing was compared", path.display());
@@ -40,10 +39,7 @@ fn solved(world: &mut World, solver: Solver) -> (Vec<Vec3>, BakeReport) {
         ..BakeOptions::default()
     };
     let input = from_world(world).0.checked().unwrap();
-    let space = input.space();
-    let layout = lay_out(&input.objects, space, &options, &mut Vec::new()).unwrap();
-    let scene =
-        BakeScene::new(&input.objects, &layout, space, &CancelToken::default(), &mut Vec::new()).unwrap();
+    let (_, scene) = laid_out(&input.objects, input.space(), &options);
     let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let mut carry_on = |_| ControlFlow::Continue(());
     let mut watch = Watch::new(&mut carry_on, None);
@@ -77,23 +73,5 @@ fn solvers_agree_on_cornell_and_alcove() {
         // Reading what the same sweep has found is never slower.
         let [_, seidel, jacobi] = found.each_ref().map(|(_, report)| report.iterations[0]);
         assert!(seidel < jacobi, "{name}: {seidel} {jacobi}");
-    }
-}
-
-#[test]
-fn cosine_rays_and_global_lines_converge_to_the_same() {
-    for name in MODELS {
-        let Some(mut world) = model(name) else { continue };
-        let options =
-            BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() };
-        let rows = form_factor_errors(&mut world, &options, &[150_000, 2_400_000], 4_000_000).unwrap();
-        for method in [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines] {
-            let own: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
-            println!("{name} {own:?}");
-            // Against the mean of both: sixteen times the rays, a quarter of the noise, but for what the references have themselves.
-            let rays = own[1].rays as f64 / own[0].rays as f64;
-            let gain = own[0].irradiance / own[1].irradiance;
-            assert!(gain > 0.55 * rays.sqrt(), "{name} {method:?}: {gain} by {rays} times the rays: {own:?}");
-        }
     }
 }

@@ -9,10 +9,10 @@ use lumbre_mesh::TriangleMesh;
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
-use crate::cancel_token::CancelToken;
 use crate::options::FormFactorMethod;
 use crate::progress::{Progress, Watch};
-use crate::scene::{BakeScene, Canonical, PlacedPrimitive, SceneObject, lay_out};
+use crate::scene::laid_out::laid_out;
+use crate::scene::{BakeScene, Canonical, PlacedPrimitive, SceneObject};
 use crate::{BakeOptions, Density};
 
 fn carry_on(_: Progress) -> ControlFlow<()> {
@@ -40,8 +40,7 @@ pub(super) fn scene(objects: &[&[[Vec3; 3]]]) -> BakeScene {
     let points = objects.iter().flat_map(|o| &o.primitives[0].mesh.positions).map(|p| p.as_dvec3());
     let space = Canonical::of(points);
     let options = BakeOptions { density: Density::MapSize(16), ..BakeOptions::default() };
-    let layout = lay_out(&objects, space, &options, &mut Vec::new()).unwrap();
-    BakeScene::new(&objects, &layout, space, &CancelToken::default(), &mut Vec::new()).unwrap()
+    laid_out(&objects, space, &options).1
 }
 
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];

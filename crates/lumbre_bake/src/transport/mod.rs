@@ -1,9 +1,9 @@
 //! How light gets from surface to surface: patches, form factors, the linear system, direct light.
 //! Not the texels that show it.
 
-pub(crate) mod box_tree;
+pub(crate) mod clipping;
 mod coarser;
-pub(crate) mod components;
+mod components;
 pub(crate) mod contacts;
 mod contour;
 mod cosine_rays;
@@ -23,10 +23,12 @@ pub(crate) mod form_factors;
 mod global_lines;
 #[cfg(test)]
 mod lambert_integral;
+mod larger_patches;
 pub(crate) mod light_cut;
 mod light_tree;
 mod mean_of_points;
-pub(crate) mod method_study;
+#[cfg(test)]
+mod method_study_tests;
 mod near_pairs;
 pub(crate) mod patch_index;
 #[cfg(test)]
@@ -41,6 +43,8 @@ pub(crate) mod shadow_clipping;
 pub(crate) mod shaft;
 mod share_variance;
 pub(crate) mod shared_samples;
-pub(crate) mod solver;
+pub(crate) mod solution;
+mod solver;
+mod stationary;
 pub(crate) mod visibility;
 mod visible_part;

@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use glam::{DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
-use super::box_tree::BoxTree;
 use super::contacts::{PlaneFrame, contacts};
 use super::cuts::{Corners, CutCell, Cuts};
 use super::mean_of_points::mean_of_points;
@@ -80,12 +79,12 @@ impl Patches {
 
     /// How many [`Patches::new`] would make.
     pub fn count(scene: &BakeScene, side: f32) -> u64 {
-        let (tree, mut lines) = (BoxTree::new(&scene.triangles, &scene.stop), Cuts::default());
+        let mut lines = Cuts::default();
         let met = scene.triangles.iter().enumerate().filter(|(_, triangle)| !triangle.superseded);
         let met = met.take_while(|_| !scene.stop.is_cancelled());
         met.map(|(index, triangle)| {
             let divisions = divisions(triangle, side);
-            let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
+            let cut = cut_cells(scene, index, divisions, side, &mut lines);
             let more: u64 = cut.iter().map(|(_, cut)| u64::from(cut.count - 1)).sum();
             (u64::from(divisions).pow(2) + more) * (1 + u64::from(triangle.two_sided))
         })
@@ -129,7 +128,7 @@ impl Patches {
 
     /// The same, of which nobody asks what they reflect.
     pub fn outlines(scene: &BakeScene, side: f32) -> Self {
-        let (tree, mut lines) = (BoxTree::new(&scene.triangles, &scene.stop), Cuts::default());
+        let mut lines = Cuts::default();
         let (mut list, mut cuts) = (Vec::new(), Vec::with_capacity(scene.triangles.len()));
         let mut roots = Vec::new();
         let mut full: BTreeMap<u32, usize> = BTreeMap::new();
@@ -148,7 +147,7 @@ impl Patches {
             let divisions = divisions(triangle, side);
             let cells = divisions * divisions;
             let before = lines.full;
-            let cut = cut_cells(scene, &tree, index, divisions, side, &mut lines);
+            let cut = cut_cells(scene, index, divisions, side, &mut lines);
             if lines.full > before {
                 *full.entry(triangle.object).or_default() += lines.full - before;
             }
@@ -274,7 +273,6 @@ const WORTH_CUTTING: f32 = 0.125;
 /// Cuts the cells of a triangle along what stands on it; returns which.
 fn cut_cells(
     scene: &BakeScene,
-    tree: &BoxTree,
     index: usize,
     divisions: u32,
     side: f32,
@@ -286,7 +284,7 @@ fn cut_cells(
         return Vec::new();
     }
     let frame = PlaneFrame::new(triangle);
-    let segments = contacts(scene, tree, index as u32, &frame, side);
+    let segments = contacts(scene, index as u32, &frame, side);
     let [a, b, c] = triangle.corners.map(|corner| frame.flat(corner.as_dvec3()));
     let weights = DMat2::from_cols(b - a, c - a).inverse();
     if segments.is_empty() || !weights.is_finite() {

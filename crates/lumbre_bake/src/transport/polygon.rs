@@ -6,6 +6,8 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use super::clipping::clip;
+
 /// Form factor from a point with unit `normal` to a triangle seen from its front (the counter-clockwise side).
 /// 0 from behind.
 pub(crate) fn point_to_triangle(point: DVec3, normal: DVec3, triangle: &[DVec3; 3]) -> f64 {
@@ -15,9 +17,18 @@ pub(crate) fn point_to_triangle(point: DVec3, normal: DVec3, triangle: &[DVec3; 
     if facing >= 0.0 {
         return 0.0;
     }
-    let mut clipped = [DVec3::ZERO; 4];
-    let count = clip(&relative, normal, &mut clipped);
-    lambert(normal, &clipped[..count]).clamp(0.0, 1.0)
+    // A triangle has at most four corners above the horizon.
+    let (mut above, mut count) = ([DVec3::ZERO; 4], 0);
+    clip(
+        &relative,
+        |corner| corner.dot(normal),
+        |corner| {
+            if let Some(place) = above.get_mut(count) {
+                (*place, count) = (corner, count + 1);
+            }
+        },
+    );
+    lambert(normal, &above[..count]).clamp(0.0, 1.0)
 }
 
 /// The sum over the edges of a polygon, seen from its front, above the horizon and relative to the point.
@@ -34,24 +45,6 @@ pub(super) fn lambert(normal: DVec3, corners: &[DVec3]) -> f64 {
     }
     // Seen from the front the corners run counter-clockwise about the direction to the eye, so clockwise about ours.
     -sum / TAU
-}
-
-/// The part of a triangle above the horizon: at most four corners.
-fn clip(triangle: &[DVec3; 3], normal: DVec3, out: &mut [DVec3; 4]) -> usize {
-    let heights = triangle.map(|corner| corner.dot(normal));
-    let mut count = 0;
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if heights[i] >= 0.0 && count < 4 {
-            out[count] = triangle[i];
-            count += 1;
-        }
-        if (heights[i] >= 0.0) != (heights[j] >= 0.0) && count < 4 {
-            out[count] = triangle[i].lerp(triangle[j], heights[i] / (heights[i] - heights[j]));
-            count += 1;
-        }
-    }
-    count
 }
 
 #[cfg(test)]

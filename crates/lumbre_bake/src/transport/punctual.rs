@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use lumbre_optics::{BakeMode, LightKind};
 
 use super::cut_out::{GAP, Pieces};
-use super::direct::{Direct, GROUPS, Receiver, Sources, group_of, variance_of_mean};
+use super::direct::{BATCHES, Direct, Receiver, Sources, batch_of, variance_of_mean};
 use super::punctual_irradiance::{PunctualIrradiance, of_center, punctual_irradiance};
 use super::receiver_quadrature::ReceiverQuadrature;
 use super::shadow_clipping::{LightVisibility, ReceiverShape};
@@ -36,9 +36,9 @@ pub(super) struct LightSample {
 /// A light at a receiver, by all its samples.
 #[derive(Default)]
 struct Sum {
-    center: [f32; GROUPS],
-    disc: [f32; GROUPS],
-    seen: [f32; GROUPS],
+    center: [f32; BATCHES],
+    disc: [f32; BATCHES],
+    seen: [f32; BATCHES],
     visible: u32,
     hidden: u32,
     /// Some of the disc is under the horizon.
@@ -46,13 +46,13 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, part: &LightSample, group: usize) {
-        self.center[group] += part.center;
-        self.disc[group] += part.disc;
+    fn add(&mut self, part: &LightSample, batch: usize) {
+        self.center[batch] += part.center;
+        self.disc[batch] += part.disc;
         self.sets |= part.disc <= 0.0;
         if part.visible {
             self.visible += 1;
-            self.seen[group] += part.disc;
+            self.seen[batch] += part.disc;
         } else {
             self.hidden += 1;
         }
@@ -62,19 +62,19 @@ impl Sum {
     /// exact in full light and in full shadow; the seen disc's own mean where the horizon cuts it.
     fn mean(&self, samples: u32) -> (f32, f32) {
         let samples = samples.max(1) as f32;
-        let per_group = GROUPS as f32 / samples;
-        let total = |sums: &[f32; GROUPS]| sums.iter().sum::<f32>();
+        let per_batch = BATCHES as f32 / samples;
+        let total = |sums: &[f32; BATCHES]| sums.iter().sum::<f32>();
         let all = total(&self.disc);
         if self.sets || all <= 0.0 {
-            return (total(&self.seen) / samples, variance_of_mean(self.seen.map(|sum| sum * per_group)));
+            return (total(&self.seen) / samples, variance_of_mean(self.seen.map(|sum| sum * per_batch)));
         }
         let (center, share) = (total(&self.center) / samples, total(&self.seen) / all);
-        let of_group = |group: usize| match self.disc[group] > 0.0 {
-            true => self.seen[group] / self.disc[group],
+        let of_batch = |batch: usize| match self.disc[batch] > 0.0 {
+            true => self.seen[batch] / self.disc[batch],
             false => share,
         };
-        let shares = std::array::from_fn(of_group);
-        let uneven = variance_of_mean(self.center.map(|sum| sum * per_group));
+        let shares = std::array::from_fn(of_batch);
+        let uneven = variance_of_mean(self.center.map(|sum| sum * per_batch));
         let partly = share_variance(shares, share, self.visible + self.hidden);
         (center * share, center * center * partly + share * share * uneven)
     }
@@ -149,7 +149,7 @@ impl Sources<'_> {
             let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
             let Some(receiver) = point(x, y) else { continue };
             if let Some(part) = part(self.scene, light, &receiver, (u, v), clear) {
-                sum.add(&part, group_of(sample, samples));
+                sum.add(&part, batch_of(sample, samples));
             }
         }
         direct.rays += if clear { 0 } else { sum.visible + sum.hidden };

@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::form_factors::FormFactors;
+use super::larger_patches::LargerPatches;
 use super::patch_index::PatchIndex;
 use super::patches::{Patch, Patches};
 use crate::scene::BakeScene;
@@ -40,47 +41,21 @@ impl SamplingGuide {
         radiosity: &[f32],
         sky: &[Vec3],
     ) -> Self {
-        let regions = Patches::outlines(scene, REGION * side);
-        if scene.stop.is_cancelled() {
-            return Self { regions, rows: Rows::new(0) };
-        }
-        let region_of: Vec<PatchIndex> = patches
-            .list
-            .iter()
-            .map(|patch| {
-                let middle = patches.point(patch, (1.0 / 3.0, 1.0 / 3.0));
-                regions.at(patch.triangle, patch.side, middle).unwrap_or(PatchIndex(0))
-            })
-            .collect();
-        let mut members: Vec<Vec<PatchIndex>> = vec![Vec::new(); regions.list.len()];
-        let mut bright = vec![0.0f64; regions.list.len()];
-        for (patch, region) in PatchIndex::all(patches.list.len()).zip(&region_of) {
-            members[region.place()].push(patch);
-            let share = patches.list[patch.place()].area / regions.list[region.place()].area;
-            bright[region.place()] += f64::from(radiosity[patch.place()].max(0.0) * share);
-        }
-        let mut rows = Rows::new(regions.list.len());
-        let mut exchange = vec![0.0f64; regions.list.len()];
-        for members in members {
-            if scene.stop.is_cancelled() {
-                break;
-            }
-            let mut touched: Vec<PatchIndex> = Vec::new();
-            for (other, g) in members.iter().flat_map(|&member| factors.row(member)) {
-                let region = region_of[other.place()];
-                if exchange[region.place()] == 0.0 && g > 0.0 {
-                    touched.push(region);
-                }
-                exchange[region.place()] += g;
-            }
-            touched.sort_unstable();
-            let flux: Vec<(u32, f64)> = touched
-                .iter()
-                .map(|&region| {
-                    let g = std::mem::take(&mut exchange[region.place()]);
-                    (region.0, g * bright[region.place()])
-                })
-                .collect();
+        let Some(larger) = LargerPatches::new(scene, patches, REGION * side) else {
+            return Self { regions: Patches::outlines(scene, REGION * side), rows: Rows::new(0) };
+        };
+        let bright = |region: usize| -> f64 {
+            let area = larger.patches.list[region].area;
+            let of_member = |member: &PatchIndex| {
+                let share = patches.list[member.place()].area / area;
+                f64::from(radiosity[member.place()].max(0.0) * share)
+            };
+            larger.members[region].iter().map(of_member).sum()
+        };
+        let bright: Vec<f64> = (0..larger.members.len()).map(bright).collect();
+        let of_row = |members: &[PatchIndex], exchange: Vec<(PatchIndex, f64)>| {
+            let flux: Vec<(u32, f64)> =
+                exchange.into_iter().map(|(region, g)| (region.0, g * bright[region.place()])).collect();
             let by_bounces: f64 = flux.iter().map(|(_, flux)| flux).sum();
             let of_sky = |member: &PatchIndex| {
                 f64::from(factors.areas[member.place()] * sky[member.place()].element_sum())
@@ -88,8 +63,13 @@ impl SamplingGuide {
             let by_sky: f64 = members.iter().map(of_sky).sum();
             let share = by_bounces / (by_bounces + by_sky);
             let share = if share.is_finite() { (GUIDED * STEPS * share as f32).round() / STEPS } else { 0.0 };
-            rows.push(share, flux.into_iter().filter(|_| share > 0.0));
-        }
+            (share, if share > 0.0 { cumulative(flux) } else { Vec::new() })
+        };
+        let found = larger.rows(factors, of_row);
+        let mut rows = Rows::new(found.len());
+        rows.entries.reserve_exact(found.iter().map(|(_, row)| row.len()).sum());
+        found.into_iter().for_each(|(share, row)| rows.push(share, &row));
+        let regions = larger.patches;
         Self { regions, rows }
     }
 
@@ -189,6 +169,18 @@ impl RowPart {
 /// Parts of a row's index.
 const PARTS: usize = 64;
 
+/// The distribution in proportion to weights at ascending columns; empty if none is positive and finite.
+fn cumulative(mut weights: Vec<(u32, f64)>) -> Vec<Entry> {
+    weights.retain(|(_, weight)| weight.is_finite() && *weight > 0.0);
+    let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
+    let (last, mut running) = (weights.len().saturating_sub(1), 0.0);
+    let entry = |(place, (column, weight)): (usize, (u32, f64))| {
+        running += weight / sum;
+        Entry { column, end: if place == last { 1.0 } else { running as f32 } }
+    };
+    weights.into_iter().enumerate().map(entry).collect()
+}
+
 impl Rows {
     /// Of columns below `numbers`.
     fn new(numbers: usize) -> Self {
@@ -196,20 +188,10 @@ impl Rows {
         Self { part_bits, ..Self::default() }
     }
 
-    /// A row of weights at ascending numbers; empty if none is positive and finite.
-    fn push(&mut self, share: f32, weights: impl Iterator<Item = (u32, f64)>) {
-        let weights: Vec<(u32, f64)> =
-            weights.filter(|(_, weight)| weight.is_finite() && *weight > 0.0).collect();
-        let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
-        let mut running = 0.0;
-        let start = self.entries.len();
-        for (place, &(column, weight)) in weights.iter().enumerate() {
-            running += weight / sum;
-            let end = if place + 1 == weights.len() { 1.0 } else { running as f32 };
-            self.entries.push(Entry { column, end });
-        }
-        let row = &self.entries[start..];
-        self.heads.push(Head { start, count: row.len() as u32, share });
+    /// A row: ascending columns.
+    fn push(&mut self, share: f32, row: &[Entry]) {
+        self.heads.push(Head { start: self.entries.len(), count: row.len() as u32, share });
+        self.entries.extend_from_slice(row);
         for part in 0..=PARTS {
             let first = (part as u64) << self.part_bits;
             self.column_index.push(row.partition_point(|entry| u64::from(entry.column) < first) as u32);
@@ -277,9 +259,9 @@ mod tests {
 
     fn rows() -> Rows {
         let mut rows = Rows::new(8);
-        rows.push(0.4, [(1, 2.0), (4, 6.0), (7, 0.0)].into_iter());
-        rows.push(0.4, [(0, 0.0), (3, f64::NAN)].into_iter());
-        rows.push(0.25, std::iter::once((5, 1e-30)));
+        rows.push(0.4, &cumulative(vec![(1, 2.0), (4, 6.0), (7, 0.0)]));
+        rows.push(0.4, &cumulative(vec![(0, 0.0), (3, f64::NAN)]));
+        rows.push(0.25, &cumulative(vec![(5, 1e-30)]));
         rows
     }
 
@@ -315,8 +297,9 @@ mod tests {
     fn the_indices_find_what_a_search_through_the_whole_row_finds() {
         let mut rows = Rows::new(1000);
         let weight = |column: u32| if column % 7 < 3 { 0.0 } else { f64::from(column % 13).powi(4) };
-        rows.push(0.4, (0..1000).map(|column| (column, weight(column))));
-        rows.push(0.4, (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0)));
+        rows.push(0.4, &cumulative((0..1000).map(|column| (column, weight(column))).collect()));
+        let few = (0..1000).filter(|column| column % 250 == 3).map(|column| (column, 1.0));
+        rows.push(0.4, &cumulative(few.collect()));
         for row in 0..2 {
             let head = rows.heads[row as usize];
             let entries = &rows.entries[head.start..head.start + head.count as usize];

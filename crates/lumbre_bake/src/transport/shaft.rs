@@ -4,7 +4,6 @@
 
 use glam::DVec3;
 
-use super::box_tree::BoxTree;
 use super::emitters::Emitter;
 use crate::sampling::frame;
 use crate::scene::BakeScene;
@@ -37,7 +36,7 @@ struct Plane {
 
 /// Whether no triangle of a scene reaches into the space before an area, as high as the area is wide, or into as much beside it: what is
 /// inside something there, or outside, is so all over.
-pub(crate) fn is_free_before(area: &Area, scene: &BakeScene, tree: &BoxTree) -> bool {
+pub(crate) fn is_free_before(area: &Area, scene: &BakeScene) -> bool {
     let [a, b, c, d] = area.corners;
     let (row, across) = (b - a, d - a);
     let wide = row.length().max(across.length());
@@ -53,7 +52,7 @@ pub(crate) fn is_free_before(area: &Area, scene: &BakeScene, tree: &BoxTree) -> 
     }
     let sides = [area.normal, row.normalize_or_zero(), across.normalize_or_zero()];
     let mut looked_at = 0;
-    tree.near_while(low.as_vec3(), high.as_vec3(), |index| {
+    scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
         looked_at += 1;
         let triangle = &scene.triangles[index as usize];
         let corners = triangle.corners.map(|corner| corner.as_dvec3());
@@ -224,13 +223,13 @@ impl Shaft {
     }
 
     /// The triangles of a scene that may reach into it, if they are few and stop all light.
-    pub fn triangles(&self, scene: &BakeScene, tree: &BoxTree, most: usize) -> Option<Vec<u32>> {
+    pub fn triangles(&self, scene: &BakeScene, most: usize) -> Option<Vec<u32>> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for point in &self.points {
             (low, high) = (low.min(*point), high.max(*point));
         }
         let (mut found, mut looked_at) = (Vec::new(), 0);
-        let all = tree.near_while(low.as_vec3(), high.as_vec3(), |index| {
+        let all = scene.boxes.near_while(low.as_vec3(), high.as_vec3(), |index| {
             looked_at += 1;
             let triangle = &scene.triangles[index as usize];
             if self.may_meet(&triangle.corners.map(|corner| corner.as_dvec3()), f64::from(triangle.extent)) {

@@ -1,14 +1,14 @@
-//! The variance of the part of a source that is seen, from runs of shadow samples. Not the sampling.
+//! The variance of the part of a source that is seen, from batches of shadow samples. Not the sampling.
 
-use super::direct::{GROUPS, variance_of_mean};
+use super::direct::{BATCHES, variance_of_mean};
 
-/// Variance of the mean of `samples` shadow samples over runs that saw these shares, `mean` together.
+/// Variance of the mean of `samples` shadow samples over batches that saw these shares, `mean` together.
 ///
-/// Runs of a few samples see one of a few shares, n/16 say, and an even edge often shows the same to all four: their spread is then 0, and
+/// Batches of a few samples see one of a few shares, n/16 say, and an even edge often shows the same to all four: their spread is then 0, and
 /// whoever stops by it stops by luck, with an error of a whole sample. So it is at least what an edge leaves when its samples are as evenly
 /// spread as they can be: of √N strata that it crosses, each is in light or not with a variance of 1/6 on average (p (1 - p) over even p),
 /// which is about N^-3/2 / 5 where the edge crosses the whole disc, and less by its chord, √(4 s (1 - s)), where it cuts off a share s.
-pub(super) fn share_variance(shares: [f32; GROUPS], mean: f32, samples: u32) -> f32 {
+pub(super) fn share_variance(shares: [f32; BATCHES], mean: f32, samples: u32) -> f32 {
     let spread = variance_of_mean(shares);
     if !(mean > 0.0 && mean < 1.0) {
         return spread;
@@ -17,9 +17,9 @@ pub(super) fn share_variance(shares: [f32; GROUPS], mean: f32, samples: u32) -> 
     spread.max(EDGE * chord * (samples.max(1) as f32).powf(-1.5))
 }
 
-/// Variance of the mean of light at so many points of a receiver, by runs of them, that differs by `range`: at least what an edge leaves that
+/// Variance of the mean of light at so many points of a receiver, by batches of them, that differs by `range`: at least what an edge leaves that
 /// goes right across, with all of the range between its sides.
-pub(super) fn uneven_variance(means: [f32; GROUPS], range: f32, points: u32) -> f32 {
+pub(super) fn uneven_variance(means: [f32; BATCHES], range: f32, points: u32) -> f32 {
     let edge = EDGE * range * range * (points.max(1) as f32).powf(-1.5);
     variance_of_mean(means).max(edge)
 }
@@ -40,16 +40,16 @@ mod tests {
         const REPLICATES: u32 = 2000;
         for replicate in 0..REPLICATES {
             let sequence = Sequence::new(7, Stream::Test(1), replicate);
-            let mut groups = [0.0f32; GROUPS];
+            let mut batches = [0.0f32; BATCHES];
             for sample in 0..samples {
                 let [u, v, ..] = sequence.point(sample, 0);
                 // An edge along neither axis of the square.
                 let disc = cosine_direction(u, v);
                 let seen = disc.x * 0.8 + disc.y * 0.6 > height;
-                groups[(sample * GROUPS as u32 / samples) as usize] += f32::from(u8::from(seen));
+                batches[(sample * BATCHES as u32 / samples) as usize] += f32::from(u8::from(seen));
             }
-            let shares = groups.map(|sum| sum * GROUPS as f32 / samples as f32);
-            let mean = shares.iter().sum::<f32>() / GROUPS as f32;
+            let shares = batches.map(|sum| sum * BATCHES as f32 / samples as f32);
+            let mean = shares.iter().sum::<f32>() / BATCHES as f32;
             squares += (f64::from(mean) - exact).powi(2);
             stated += f64::from(share_variance(shares, mean, samples));
             none += usize::from(variance_of_mean(shares) == 0.0);
@@ -64,10 +64,10 @@ mod tests {
             for samples in [16, 64, 256, 1024] {
                 let (squared, stated, none) = of_chord(height, samples);
                 println!(
-                    "{height} {samples}: error {squared:.2e}, stated {stated:.2e}, runs that agree {none}"
+                    "{height} {samples}: error {squared:.2e}, stated {stated:.2e}, batches that agree {none}"
                 );
                 without += none;
-                // What is stated is no less than what is there, and no wild exaggeration: four runs and their double counting bring
+                // What is stated is no less than what is there, and no wild exaggeration: four batches and their double counting bring
                 // it to some times as much.
                 assert!(
                     stated > squared && stated < 8.0 * squared,
@@ -75,8 +75,8 @@ mod tests {
                 );
             }
         }
-        assert!(without > 100, "runs agree by chance: {without} of them");
-        assert_eq!(share_variance([0.0; GROUPS], 0.0, 64), 0.0, "in full shadow there is none");
-        assert_eq!(share_variance([1.0; GROUPS], 1.0, 64), 0.0, "nor in full light");
+        assert!(without > 100, "batches agree by chance: {without} of them");
+        assert_eq!(share_variance([0.0; BATCHES], 0.0, 64), 0.0, "in full shadow there is none");
+        assert_eq!(share_variance([1.0; BATCHES], 1.0, 64), 0.0, "nor in full light");
     }
 }

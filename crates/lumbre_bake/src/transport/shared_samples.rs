@@ -5,7 +5,7 @@
 use glam::Vec3;
 use lumbre_optics::BakeMode;
 
-use super::direct::{Direct, GROUPS, Receiver, Sources, group_of, sample_emitter, variance_of_mean};
+use super::direct::{BATCHES, Direct, Receiver, Sources, batch_of, sample_emitter, variance_of_mean};
 use super::emitter_walk::Chosen;
 use super::light_cut::{Branch, Rest};
 use super::punctual::{self, FIRST_ID};
@@ -84,7 +84,7 @@ impl Sources<'_> {
             return;
         }
         let per_sample = 1.0 / samples.max(1) as f32;
-        let mut groups = [0.0f32; GROUPS];
+        let mut batches = [0.0f32; BATCHES];
         let (mut visible, mut hidden) = (0, 0);
         for sample in 0..samples {
             let [x, y, ..] = sequence.point(sample, PLACE_SET);
@@ -93,7 +93,7 @@ impl Sources<'_> {
             let found = self.sample(rest, &receiver, [choice, u, v]);
             direct.baked += found.baked * per_sample;
             direct.mixed += found.mixed * per_sample;
-            groups[group_of(sample, samples)] += found.baked.element_sum() / 3.0;
+            batches[batch_of(sample, samples)] += found.baked.element_sum() / 3.0;
             visible += u32::from(found.asked && !found.hidden);
             hidden += u32::from(found.hidden);
         }
@@ -101,6 +101,6 @@ impl Sources<'_> {
         direct.sampled = true;
         // Which sources these are differs from receiver to receiver: only a part tells of a shadow.
         direct.seen.add(FIRST_ID - 1, visible, hidden);
-        direct.variance += variance_of_mean(groups.map(|sum| sum * per_sample * GROUPS as f32));
+        direct.variance += variance_of_mean(batches.map(|sum| sum * per_sample * BATCHES as f32));
     }
 }

@@ -1,26 +1,14 @@
-//! Solves the radiosity system B_i = E_i + ρ_i Σ_j F_ij B_j of one colour channel, by three methods that check each other.
-//! Not the form factors, and not the colours: channels do not mix.
+//! Solves the radiosity system B_i = E_i + ρ_i Σ_j F_ij B_j of one colour channel, by conjugate gradients. Not the form factors, not the
+//! colours (channels do not mix), and not the two iterative methods that check it: those are `stationary`.
 
 use rayon::prelude::*;
 
 use super::components::levels;
 use super::form_factors::FormFactors;
-use super::patch_index::PatchIndex;
+use super::solution::{MOST_ITERATIONS, Solution, exchanged, gather, norm};
+use super::stationary;
 use crate::conjugate_gradients::{self, System};
 use crate::options::Solver;
-
-/// A solution and how it was come by.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Solution {
-    /// B_i, in the units of E_i.
-    pub radiosity: Vec<f64>,
-    pub iterations: u32,
-    /// |E + ρ F B - B| / |E|, in the norm weighted by area.
-    pub residual: f64,
-}
-
-/// More iterations than any ρ <= 0.999 needs for a residual of 1e-12.
-const MOST_ITERATIONS: u32 = 30_000;
 
 impl Solver {
     /// Iterates until the relative residual is at most `tolerance`.
@@ -42,10 +30,8 @@ impl Solver {
         let size = norm(factors, emission);
         let tolerance = tolerance / parts;
         let mut solution = match self {
-            Self::Jacobi => stationary(factors, reflectance, emission, tolerance, size, jacobi_sweep),
-            Self::GaussSeidel => {
-                stationary(factors, reflectance, emission, tolerance, size, gauss_seidel_sweep)
-            }
+            Self::Jacobi => stationary::jacobi(factors, reflectance, emission, tolerance, size),
+            Self::GaussSeidel => stationary::gauss_seidel(factors, reflectance, emission, tolerance, size),
             Self::ConjugateGradients => {
                 by_conjugate_gradients(factors, reflectance, emission, tolerance, size)
             }
@@ -58,60 +44,6 @@ impl Solver {
         }
         solution
     }
-}
-
-/// Σ_j F_ij x_j of every patch.
-pub(crate) fn gather(factors: &FormFactors, x: &[f64]) -> Vec<f64> {
-    (0..factors.len())
-        .into_par_iter()
-        .map(|i| exchanged(factors, i, x) / f64::from(factors.areas[i]))
-        .collect()
-}
-
-/// Σ_j G_ij x_j of the patch at place i.
-fn exchanged(factors: &FormFactors, i: usize, x: &[f64]) -> f64 {
-    factors.row(PatchIndex::new(i)).map(|(j, g)| g * x[j.place()]).sum()
-}
-
-fn norm(factors: &FormFactors, x: &[f64]) -> f64 {
-    x.iter().zip(&factors.areas).map(|(x, &area)| x * x * f64::from(area)).sum::<f64>().sqrt()
-}
-
-fn jacobi_sweep(factors: &FormFactors, reflectance: &[f64], emission: &[f64], x: &mut [f64]) {
-    let gathered = gather(factors, x);
-    for (i, value) in x.iter_mut().enumerate() {
-        *value = emission[i] + reflectance[i] * gathered[i];
-    }
-}
-
-fn gauss_seidel_sweep(factors: &FormFactors, reflectance: &[f64], emission: &[f64], x: &mut [f64]) {
-    for i in 0..x.len() {
-        let gathered = exchanged(factors, i, x) / f64::from(factors.areas[i]);
-        x[i] = emission[i] + reflectance[i] * gathered;
-    }
-}
-
-fn stationary(
-    factors: &FormFactors,
-    reflectance: &[f64],
-    emission: &[f64],
-    tolerance: f64,
-    size: f64,
-    sweep: fn(&FormFactors, &[f64], &[f64], &mut [f64]),
-) -> Solution {
-    let mut solution = Solution { radiosity: emission.to_vec(), iterations: 0, residual: f64::INFINITY };
-    while solution.iterations < MOST_ITERATIONS && !factors.stop.is_cancelled() {
-        let before = solution.radiosity.clone();
-        sweep(factors, reflectance, emission, &mut solution.radiosity);
-        solution.iterations += 1;
-        // What Jacobi changes is the residual of what was before; Gauss-Seidel's change is a bound of its kind.
-        let change: Vec<f64> = solution.radiosity.iter().zip(&before).map(|(new, old)| new - old).collect();
-        solution.residual = norm(factors, &change) / size;
-        if solution.residual <= tolerance {
-            break;
-        }
-    }
-    solution
 }
 
 fn by_conjugate_gradients(
@@ -187,6 +119,7 @@ impl System for Radiosity<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::patch_index::PatchIndex;
     use super::*;
 
     const ALL: [Solver; 3] = [Solver::Jacobi, Solver::GaussSeidel, Solver::ConjugateGradients];

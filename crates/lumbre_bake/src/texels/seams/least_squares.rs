@@ -12,10 +12,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::samples::{Reading, Sample};
-use super::{Maps, NO_CHART};
+use super::{Maps, NO_CHART, Shown};
 use crate::cancel_token::CancelToken;
 use crate::conjugate_gradients::{self, System};
 use crate::report::SeamReport;
+use crate::texel_index::MapTexel;
 
 /// λ: a jump between two texels that are equally uncertain shrinks to a fiftieth or less.
 const STIFFNESS: f64 = 0.02;
@@ -48,8 +49,8 @@ impl Patience {
 
 /// The texels that may move.
 pub(crate) struct Unknowns {
-    /// In the row of all maps, ascending.
-    texels: Vec<u32>,
+    /// Ascending.
+    texels: Vec<MapTexel>,
     /// Per texel and channel: the stated error's and the map's own.
     variances: Vec<DVec3>,
 }
@@ -62,36 +63,38 @@ struct Equation {
 }
 
 impl Unknowns {
-    pub fn new(maps: &Maps<'_>, charts: &[u32], filled: &[Vec3], samples: &[Sample]) -> Self {
+    pub fn new(maps: &Maps<'_>, charts: &[u32], shown: &Shown<'_>, samples: &[Sample]) -> Self {
         let read = |side: &Reading| {
             let texels = side.texels.into_iter().zip(side.weights);
             texels.filter(|(_, weight)| *weight > 0.0).map(|(texel, _)| texel)
         };
-        let mut texels: Vec<u32> =
+        let mut texels: Vec<MapTexel> =
             samples.iter().flat_map(|sample| sample.sides.iter().flat_map(read)).collect();
         texels.sort_unstable();
         texels.dedup();
-        let variances = texels.iter().map(|&texel| variance(maps, charts, filled, texel)).collect();
+        let variances = texels.iter().map(|&texel| variance(maps, charts, shown, texel)).collect();
         Self { texels, variances }
     }
 
-    /// Moves the texels; edges are left for the caller to say.
+    /// Moves the texels, and adds the square of how far to their errors: on average that is the most that they can be farther off than before, as
+    /// what moves them is the light on the other side and not their own error. Edges are left for the caller to say.
     pub fn solve(
         &self,
         samples: &[Sample],
-        filled: &mut [Vec3],
+        shown: Shown<'_>,
         mean: f64,
         patience: Patience,
         stop: &CancelToken,
     ) -> SeamReport {
+        let Shown { light: filled, variances } = shown;
         let equations: Vec<Equation> = samples.iter().map(|sample| self.equation(sample)).collect();
         let channels: Vec<(Vec<f64>, [f64; 2])> = (0..3usize)
             .into_par_iter()
             .map(|channel| {
                 let values: Vec<f64> =
-                    self.texels.iter().map(|&texel| f64::from(filled[texel as usize][channel])).collect();
-                let variances: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
-                let changes = Channel::new(&equations, &values, &variances, mean, stop).solve(patience);
+                    self.texels.iter().map(|&texel| f64::from(filled[texel.place()][channel])).collect();
+                let limits: Vec<f64> = self.variances.iter().map(|variance| variance[channel]).collect();
+                let changes = Channel::new(&equations, &values, &limits, mean, stop).solve(patience);
                 let moved: Vec<f64> = values
                     .iter()
                     .zip(&changes)
@@ -106,13 +109,14 @@ impl Unknowns {
         let mut report = SeamReport::default();
         let mut sum = 0.0;
         for (place, &texel) in self.texels.iter().enumerate() {
-            let before = filled[texel as usize];
+            let before = filled[texel.place()];
             let after =
                 DVec3::from_array(std::array::from_fn(|channel| channels[channel].0[place])).as_vec3();
             let change = (after - before).abs().as_dvec3();
             sum += change.element_sum() / 3.0;
             report.largest_change = report.largest_change.max(change.max_element() / mean);
-            filled[texel as usize] = after;
+            filled[texel.place()] = after;
+            variances[texel.place()] += (change.length_squared() / 3.0) as f32;
         }
         report.mean_change = sum / self.texels.len().max(1) as f64 / mean;
         let jump =
@@ -163,13 +167,14 @@ fn squared_jump(equations: &[Equation], values: &[f64]) -> f64 {
 }
 
 /// How far each channel of a texel may be off, squared.
-fn variance(maps: &Maps<'_>, charts: &[u32], filled: &[Vec3], texel: u32) -> DVec3 {
-    let Some(map) = maps.layout.maps.iter().rev().find(|map| map.first <= texel as usize) else {
+fn variance(maps: &Maps<'_>, charts: &[u32], shown: &Shown<'_>, texel: MapTexel) -> DVec3 {
+    let Shown { light: filled, variances } = shown;
+    let Some(map) = maps.layout.maps.iter().rev().find(|map| map.first <= texel.place()) else {
         return DVec3::ZERO;
     };
-    let local = texel - map.first as u32;
+    let local = texel.0 - map.first as u32;
     let (x, y) = (local % map.width, local / map.width);
-    let own = charts[texel as usize];
+    let own = charts[texel.place()];
     let (mut low, mut high, mut stated) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
     for ny in y.saturating_sub(1)..=(y + 1).min(map.height - 1) {
         for nx in x.saturating_sub(1)..=(x + 1).min(map.width - 1) {
@@ -178,12 +183,12 @@ fn variance(maps: &Maps<'_>, charts: &[u32], filled: &[Vec3], texel: u32) -> DVe
             if same && filled[other].is_finite() {
                 (low, high) = (low.min(filled[other]), high.max(filled[other]));
                 // NaN, of a texel without a surface, is never the larger one.
-                stated = stated.max(maps.variances[other]);
+                stated = stated.max(variances[other]);
             }
         }
     }
     if own != NO_CHART {
-        stated = maps.variances[texel as usize].max(0.0);
+        stated = variances[texel.place()].max(0.0);
     }
     let range = if low.x <= high.x { (high - low).as_dvec3() } else { DVec3::ZERO };
     let slope = range * HALF_A_TEXEL;

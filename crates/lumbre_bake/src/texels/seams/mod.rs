@@ -30,10 +30,16 @@ pub(crate) struct Maps<'a> {
     pub layout: &'a LightmapLayout,
     pub texels: &'a [Texel],
     pub charts: &'a [u32],
-    /// Per texel of all maps; NaN where it shows no surface.
-    pub variances: &'a [f32],
     /// Mean irradiance of the open texels, mean of the channels.
     pub mean: f64,
+}
+
+/// What the maps show, per texel of all.
+pub(crate) struct Shown<'a> {
+    /// Irradiance, W/m²; NaN where nothing is known.
+    pub light: &'a mut [Vec3],
+    /// Squared errors, mean of the channels; NaN where no surface is shown.
+    pub variances: &'a mut [f32],
 }
 
 /// Chart of a texel that no surface covers in the open.
@@ -48,13 +54,13 @@ struct Closed {
     pub warning: Option<String>,
 }
 
-/// Closes the seams of `filled`, if that is asked for, and notes in the report what came of it.
+/// Closes the seams of what is shown, if that is asked for, and notes in the report what came of it. A texel that is moved states by how much, too.
 ///
 /// # Errors
 /// [`BakeError::Cancelled`].
 pub(crate) fn close_seams(
     maps: &Maps<'_>,
-    filled: &mut [Vec3],
+    shown: Shown<'_>,
     options: &BakeOptions,
     watch: &mut Watch<'_>,
     report: &mut BakeReport,
@@ -64,7 +70,7 @@ pub(crate) fn close_seams(
         return Ok(());
     }
     let patience = if watch.clock().late() { Patience::LATE } else { Patience::WHOLE };
-    let closed = watch.during(0.0, || close(maps, filled, patience))?;
+    let closed = watch.during(0.0, || close(maps, shown, patience))?;
     report.rays += closed.rays;
     report.warnings.extend(closed.warning);
     match closed.report {
@@ -74,8 +80,7 @@ pub(crate) fn close_seams(
     Ok(())
 }
 
-/// Closes the seams of `filled` (per texel of all maps, NaN where nothing is known).
-fn close(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
+fn close(maps: &Maps<'_>, shown: Shown<'_>, patience: Patience) -> Closed {
     if maps.mean.is_nan() || maps.mean <= 0.0 {
         return Closed { report: Err("the maps are black"), rays: 0, warning: None };
     }
@@ -84,7 +89,7 @@ fn close(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
     for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
         charts[texel.index.place()] = maps.charts[texel.triangle as usize];
     }
-    let found = samples::Sampling { maps, charts: &charts, filled, edges: &edges }.all();
+    let found = samples::Sampling { maps, charts: &charts, filled: shown.light, edges: &edges }.all();
     let (rays, crowded) = (found.rays, found.crowded);
     let warning = (crowded > 0).then(|| {
         format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
@@ -92,8 +97,8 @@ fn close(maps: &Maps<'_>, filled: &mut [Vec3], patience: Patience) -> Closed {
     if found.samples.is_empty() {
         return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
     }
-    let unknowns = Unknowns::new(maps, &charts, filled, &found.samples);
-    let mut report = unknowns.solve(&found.samples, filled, maps.mean, patience, &maps.scene.stop);
+    let unknowns = Unknowns::new(maps, &charts, &shown, &found.samples);
+    let mut report = unknowns.solve(&found.samples, shown, maps.mean, patience, &maps.scene.stop);
     report.edges = found.pairs;
     Closed { report: Ok(report), rays, warning }
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::edge_grid::EdgeGrid;
 use super::edges::Edge;
 use super::{Maps, NO_CHART};
+use crate::texel_index::MapTexel;
 
 /// Edges nearer than this are in one place, canonical units: 64 roundings of the largest coordinate, which is below 2.
 const SAME_PLACE: f64 = 64.0 / (1 << 23) as f64;
@@ -25,10 +26,9 @@ const SAME_READING: f32 = 1e-3;
 const NEGLIGIBLE: f32 = 1.0 / 1024.0;
 
 /// What filtering reads at a point.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
-    /// Indices in the row of all maps.
-    pub texels: [u32; 4],
+    pub texels: [MapTexel; 4],
     /// In [0, 1]; their sum is 1.
     pub weights: [f32; 4],
 }
@@ -146,7 +146,7 @@ impl Sampling<'_> {
         let at = uv - 0.5;
         let low = at.floor();
         let fraction = at - low;
-        let mut reading = Reading::default();
+        let mut reading = Reading { texels: [MapTexel::NONE; 4], weights: [0.0; 4] };
         let mut sum = 0.0;
         for corner in 0..4 {
             let step = Vec2::new((corner % 2) as f32, (corner / 2) as f32);
@@ -154,13 +154,13 @@ impl Sampling<'_> {
             let weight = share.x * share.y;
             // `as` saturates: clamped to the border, as a sampler does.
             let (x, y) = ((low.x + step.x) as u32, (low.y + step.y) as u32);
-            let texel = map.first as u32 + y.min(map.height - 1) * map.width + x.min(map.width - 1);
+            let texel = map.texel(x.min(map.width - 1), y.min(map.height - 1));
             reading.texels[corner] = texel;
             if weight < NEGLIGIBLE {
                 continue;
             }
-            let owner = self.charts[texel as usize];
-            if !self.filled[texel as usize].is_finite() || (owner != chart && owner != NO_CHART) {
+            let owner = self.charts[texel.place()];
+            if !self.filled[texel.place()].is_finite() || (owner != chart && owner != NO_CHART) {
                 return None;
             }
             reading.weights[corner] = weight;

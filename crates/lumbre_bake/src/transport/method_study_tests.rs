@@ -1,4 +1,5 @@
-//! What form factors cost and what is left of their error, by method and number of rays, against converged ones. Not a bake.
+//! Both ways to count form factors: what they cost and what is left of their error, by number of rays, against converged ones. The figures
+//! that docs/decisions.md compares, printed with `--nocapture`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -9,52 +10,46 @@ use glam::Vec3;
 use super::direct::Sources;
 use super::emitters::emitters;
 use super::exchange::patch_direct;
+use super::exchange_tests::{MODELS, model};
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
-use super::solver::gather;
-use crate::cancel_token::CancelToken;
+use super::solution::gather;
 use crate::options::{FormFactorMethod, Solver};
 use crate::progress::Watch;
 use crate::sampling::{Sequence, Stream};
-use crate::scene::{BakeScene, from_world, lay_out};
-use crate::{BakeError, BakeOptions};
+use crate::scene::from_world;
+use crate::scene::laid_out::laid_out;
+use crate::{BakeError, BakeOptions, Density, Quality};
 
 /// The two methods.
 const METHODS: [FormFactorMethod; 2] = [FormFactorMethod::CosineRays, FormFactorMethod::GlobalLines];
 
 /// How good the form factors of one method are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FormFactorErrors {
+#[derive(Clone, Copy, Debug)]
+struct FormFactorErrors {
     /// How they were counted.
-    pub method: FormFactorMethod,
+    method: FormFactorMethod,
     /// Rays or lines cast.
-    pub rays: u64,
+    rays: u64,
     /// Wall-clock seconds.
-    pub seconds: f64,
+    seconds: f64,
     /// Relative error of the matrix of exchange areas, in the Frobenius norm.
-    pub exchange: f64,
+    exchange: f64,
     /// RMSE of the patches' irradiance by bounces and by the sky, by area, relative to its mean.
-    pub irradiance: f64,
+    irradiance: f64,
 }
 
 /// The form factors of a world's static objects by both methods with so many rays each, against those of both with `converged` rays.
 /// Patches are as many as `options.quality` asks for.
-///
-/// # Errors
-/// [`BakeError`], as of a bake.
-pub fn form_factor_errors(
+fn form_factor_errors(
     world: &mut World,
     options: &BakeOptions,
     rays: &[usize],
     converged: usize,
 ) -> Result<Vec<FormFactorErrors>, BakeError> {
-    options.check()?;
     let input = from_world(world).0.checked()?;
-    let space = input.space();
-    let mut warnings = Vec::new();
-    let layout = lay_out(&input.objects, space, options, &mut warnings)?;
-    let scene = BakeScene::new(&input.objects, &layout, space, &CancelToken::default(), &mut warnings)?;
+    let (_, scene) = laid_out(&input.objects, input.space(), options);
     let sources = Sources::new(&scene, emitters(&scene), input.lights, input.sky);
     let area: f32 = scene.triangles.iter().map(|triangle| triangle.area).sum();
     let patches = Patches::new(&scene, (2.0 * area / options.effort().patches as f32).sqrt());
@@ -95,6 +90,24 @@ pub fn form_factor_errors(
         }
     }
     Ok(found)
+}
+
+#[test]
+fn cosine_rays_and_global_lines_converge_to_the_same() {
+    for name in MODELS {
+        let Some(mut world) = model(name) else { continue };
+        let options =
+            BakeOptions { density: Density::MapSize(16), quality: Quality::Draft, ..BakeOptions::default() };
+        let rows = form_factor_errors(&mut world, &options, &[150_000, 2_400_000], 4_000_000).unwrap();
+        for method in METHODS {
+            let own: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
+            own.iter().for_each(|row| println!("{name} {row:?}"));
+            // Against the mean of both: sixteen times the rays, a quarter of the noise, but for what the references have themselves.
+            let rays = own[1].rays as f64 / own[0].rays as f64;
+            let gain = own[0].irradiance / own[1].irradiance;
+            assert!(gain > 0.55 * rays.sqrt(), "{name} {method:?}: {gain} by {rays} times the rays: {own:?}");
+        }
+    }
 }
 
 /// Irradiance by bounces and by the sky of each patch, mean of the channels.

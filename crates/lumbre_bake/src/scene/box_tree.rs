@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
+use super::SceneTriangle;
 use crate::cancel_token::CancelToken;
-use crate::scene::SceneTriangle;
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
 
+#[derive(Debug)]
 struct Node {
     low: Vec3,
     high: Vec3,
@@ -18,6 +19,7 @@ struct Node {
 }
 
 /// A tree of boxes around triangles.
+#[derive(Debug)]
 pub(crate) struct BoxTree {
     nodes: Vec<Node>,
     items: Vec<u32>,
