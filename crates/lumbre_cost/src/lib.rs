@@ -37,6 +37,7 @@ mod folder;
 mod frames;
 mod fronts;
 mod lamps_in_pieces;
+mod live;
 mod machine;
 mod measured;
 mod page;
@@ -59,6 +60,7 @@ pub use error::CostError;
 pub use findings::cheapest_by_error;
 pub use folder::{PAGE, REPORT, TABLE, read_picture, read_report};
 pub use fronts::{Stretch, pareto_front, stretches};
+pub use live::{Beside, BesideReference, LightCost, LightCosts, Priced, SideView, ViewFront, ViewWalk};
 pub use page::{Images, page};
 pub use picture::{Compared, Picture, compared};
 pub use report::{
