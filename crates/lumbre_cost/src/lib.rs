@@ -27,6 +27,7 @@
 //! ```
 
 mod baked;
+mod clustered_mesh;
 mod comparison;
 mod conditions;
 mod converged;
@@ -44,6 +45,7 @@ mod page;
 mod picture;
 mod plot;
 mod report;
+mod rounded_lighting;
 mod rounds;
 mod run;
 mod scene_file;
