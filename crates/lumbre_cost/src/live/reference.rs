@@ -11,10 +11,10 @@ use lumbre_scene::{ActiveCamera, Camera};
 
 use super::side_view::SideView;
 use crate::picture::{Picture, compared_at};
-use crate::tune::Choices;
+use crate::tune::{Choices, DrawSettings};
 use crate::{ErrorOf, ErrorOver};
 
-/// Of the time, what drawing the two may take at most: one part in so many.
+/// Of the time, what drawing and comparing the two may take at most: one part in so many.
 const SHARE: u32 = 4;
 /// Between two of them, at least.
 const LEAST_PAUSE: Duration = Duration::from_millis(500);
@@ -28,21 +28,18 @@ pub struct Beside {
     pub rgba: Vec<u8>,
     /// How far the frame was from it.
     pub error: ErrorOf,
+    /// The settings of that frame.
+    pub settings: DrawSettings,
 }
 
 /// Draws references now and then.
 #[derive(Default)]
 pub struct BesideReference {
-    compared: Option<Receiver<Option<Beside>>>,
+    compared: Option<(Instant, Receiver<Option<Beside>>)>,
     due: Option<Instant>,
 }
 
 impl BesideReference {
-    /// Whether a comparison is under way.
-    pub fn is_running(&self) -> bool {
-        self.compared.is_some()
-    }
-
     /// Has the next one drawn at once.
     pub fn hurry(&mut self) {
         self.due = None;
@@ -68,33 +65,30 @@ impl BesideReference {
         let exposure = options.exposure.unwrap_or_else(|| exposure_of(world, options));
         let reference = best.drawn(world, options, |world, options| side.radiance(world, options))?;
         let frame = side.radiance(world, options)?;
-        let size = side.size();
+        let (size, settings) = (side.size(), DrawSettings::current(world, options));
         let (sender, receiver) = channel();
         let compare = move || {
+            let found = beside(size, settings, [&reference, &frame], f64::from(exposure));
             // Nobody waits for it any more if the window is gone.
-            let _ = sender.send(beside(size, &reference, &frame, f64::from(exposure)));
+            let _ = sender.send(found);
         };
         // Without a thread there is no comparison this time.
         if thread::Builder::new().name("compare".to_owned()).spawn(compare).is_ok() {
-            self.compared = Some(receiver);
+            self.compared = Some((begun, receiver));
         }
-        let took = begun.elapsed();
-        self.due = Some(Instant::now() + LEAST_PAUSE.max(took * (SHARE - 1)));
         Ok(found)
     }
 
     fn take(&mut self) -> Option<Beside> {
-        match self.compared.as_ref()?.try_recv() {
-            Err(TryRecvError::Empty) => None,
-            Ok(found) => {
-                self.compared = None;
-                found
-            }
-            Err(TryRecvError::Disconnected) => {
-                self.compared = None;
-                None
-            }
-        }
+        let (begun, receiver) = self.compared.as_ref()?;
+        let found = match receiver.try_recv() {
+            Err(TryRecvError::Empty) => return None,
+            Ok(found) => found,
+            Err(TryRecvError::Disconnected) => None,
+        };
+        self.due = Some(Instant::now() + LEAST_PAUSE.max(begun.elapsed() * (SHARE - 1)));
+        self.compared = None;
+        found
     }
 }
 
@@ -105,7 +99,12 @@ fn exposure_of(world: &mut World, options: &FrameOptions) -> f32 {
     asked.or_else(|| active.iter(world).next().copied()).map_or(1.0, |camera| camera.exposure)
 }
 
-fn beside(size: (u32, u32), reference: &[Vec4], frame: &[Vec4], exposure: f64) -> Option<Beside> {
+fn beside(
+    size: (u32, u32),
+    settings: DrawSettings,
+    [reference, frame]: [&[Vec4]; 2],
+    exposure: f64,
+) -> Option<Beside> {
     let picture = |pixels: &[Vec4]| Picture {
         width: size.0 as usize,
         radiance: pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect(),
@@ -117,5 +116,5 @@ fn beside(size: (u32, u32), reference: &[Vec4], frame: &[Vec4], exposure: f64) -
         [red, green, blue, u8::MAX]
     };
     let rgba = reference.shown(exposure).into_iter().flat_map(bytes).collect();
-    Some(Beside { size, rgba, error })
+    Some(Beside { size, rgba, error, settings })
 }

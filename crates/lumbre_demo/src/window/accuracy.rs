@@ -84,9 +84,15 @@ impl Accuracy {
         !matches!(self.work, Work::Nothing)
     }
 
-    /// Whether all that was asked for is there.
-    pub fn is_at_rest(&self) -> bool {
-        !self.is_measuring() && (!self.is_shown || self.beside.is_some() && !self.reference.is_running())
+    /// Whether all that was asked for is there, of a frame of these options.
+    pub fn is_at_rest(&self, game: &Game, options: &FrameOptions) -> bool {
+        let is_compared = || self.compared(&DrawSettings::current(&game.world, options)).is_some();
+        !self.is_measuring() && (!self.is_shown || is_compared())
+    }
+
+    /// The reference, if it was compared with a frame of these settings.
+    fn compared(&self, settings: &DrawSettings) -> Option<&Beside> {
+        self.beside.as_ref().filter(|beside| beside.settings == *settings)
     }
 
     /// Ends what is measured; whether there was anything.
@@ -146,8 +152,8 @@ impl Accuracy {
                 SideView::new(gpu, size)?
             }
         };
-        let side = self.side.insert(side);
-        if !matches!(self.work, Work::Nothing) {
+        if self.is_measuring() {
+            let side = self.side.insert(side);
             let begun = Instant::now();
             while begun.elapsed() < BETWEEN_FRAMES {
                 self.work = match std::mem::take(&mut self.work) {
@@ -172,6 +178,11 @@ impl Accuracy {
             }
             return Ok(None);
         }
+        // Settings are chosen by what they do: that is not waited for.
+        if self.beside.is_some() && self.compared(&DrawSettings::current(world, options)).is_none() {
+            self.reference.hurry();
+        }
+        let side = self.side.insert(side);
         let found = self.reference.update(side, world, options)?.filter(|found| found.size == size);
         let is_new = found.is_some();
         if is_new {
@@ -185,7 +196,7 @@ impl Accuracy {
         let settings = DrawSettings::current(&game.world, options);
         AccuracyFacts {
             is_shown: self.is_shown,
-            error: self.beside.as_ref().map(|beside| (beside.error.relative_rmse, beside.error.flip)),
+            error: self.compared(&settings).map(|beside| (beside.error.relative_rmse, beside.error.flip)),
             progress: match &self.work {
                 Work::Nothing => None,
                 Work::Asked => Some(("what lights cost", 0.0)),

@@ -305,7 +305,8 @@ impl App {
         let played = self.replay.as_ref().is_some_and(|replay| replay.len() == 0);
         let counted = self.options.quit_after.is_some_and(|after| self.frames >= u64::from(after));
         let is_over = counted || (played && self.options.quit_after.is_none());
-        let waits = self.options.wait_for_work && !(self.viewing.is_at_rest() && self.accuracy.is_at_rest());
+        let measured = self.accuracy.is_at_rest(&self.viewing.opened.game, options);
+        let waits = self.options.wait_for_work && !(self.viewing.is_at_rest() && measured);
         if !(is_over && !waits || self.viewing.opened.game.wants_to_quit()) {
             return Ok(());
         }

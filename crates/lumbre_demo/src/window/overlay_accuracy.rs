@@ -84,7 +84,7 @@ fn contents(ui: &mut Ui, facts: &AccuracyFacts, accounting: Option<&Accounting>)
             ui.label(RichText::new(format!("{} % off{flip}", percent(error))).strong());
         }
         None => {
-            ui.label("the reference is being drawn …");
+            ui.label("being compared with the reference …");
         }
     }
     ui.label(dim(
@@ -198,8 +198,8 @@ fn settings(ui: &mut Ui, front: &ViewFront, facts: &AccuracyFacts) -> Wishes {
     }
     let place = |place: Option<usize>| place.and_then(|place| front.ways.get(place));
     for (key, what, next) in [
-        (",", "next cheaper", place(front.next_cheaper(now))),
-        (".", "next better", place(front.next_better(now))),
+        ("[,]", "next cheaper", place(front.next_cheaper(now))),
+        ("[.]", "next better", place(front.next_better(now))),
     ] {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new(key).color(WARM).strong());
@@ -226,5 +226,201 @@ fn percent(share: f64) -> String {
         _ if percent < 0.01 => "under 0.01".to_owned(),
         _ if percent < 1.0 => format!("{percent:.2}"),
         _ => format!("{percent:.1}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Event, Modifiers, PointerButton, Pos2, RawInput};
+    use lumbre_cost::{DrawSettings, Spread};
+    use lumbre_optics::Shading;
+    use lumbre_scene::ShadowFilter;
+
+    use super::*;
+
+    const SCREEN: egui::Vec2 = vec2(1000.0, 700.0);
+
+    fn way(label: &str, shading: Shading, milliseconds: f64, error: f64) -> Priced {
+        let settings = DrawSettings {
+            shading,
+            shadows: true,
+            shadow_filter: ShadowFilter::Soft,
+            shadow_resolution: 1.0,
+            light_threshold: 0.0,
+            multisample: false,
+        };
+        let times = [0.98 * milliseconds, milliseconds, 1.02 * milliseconds];
+        let milliseconds = Spread::of(&times).expect("there are times");
+        Priced { label: label.to_owned(), settings, milliseconds, error }
+    }
+
+    /// Three ways, of which the middle one is in force.
+    fn facts() -> AccuracyFacts {
+        let ways = vec![
+            way("the cheapest", Shading::Flat, 10.0, 0.4),
+            way("the middle", Shading::Gouraud, 20.0, 0.05),
+            way("the best", Shading::Phong, 80.0, 0.0),
+        ];
+        let time = |lower, median, upper| Spread { lower, median, upper, rounds: 5 };
+        let light = |name: &str, lights, milliseconds, difference| LightCost {
+            name: name.to_owned(),
+            lights,
+            milliseconds,
+            difference,
+        };
+        AccuracyFacts {
+            is_shown: true,
+            error: Some((0.0512, Some(0.0321))),
+            lights: vec![
+                light("spot lights", 7, time(4.0, 5.0, 6.0), 0.25),
+                light("sun", 1, time(-0.2, 0.1, 0.3), 0.0),
+            ],
+            settings: Some(ways[1].settings),
+            front: Some(ViewFront { now: ways[1].clone(), ways }),
+            ..AccuracyFacts::default()
+        }
+    }
+
+    /// All that is written, with its place; and what was asked for.
+    fn laid_out(
+        context: &egui::Context,
+        facts: &AccuracyFacts,
+        events: Vec<Event>,
+    ) -> (Vec<(Pos2, String)>, Wishes) {
+        fn texts(shape: &egui::Shape, found: &mut Vec<(Pos2, String)>) {
+            match shape {
+                egui::Shape::Text(one) => found.push((one.pos, one.galley.text().to_owned())),
+                egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| texts(shape, found)),
+                _ => {}
+            }
+        }
+        let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, SCREEN));
+        let input = RawInput { screen_rect, events, ..RawInput::default() };
+        let mut wishes = Wishes::default();
+        let output = context.run_ui(input, |root| wishes = panel(root, facts, None));
+        let mut found = Vec::new();
+        output.shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut found));
+        output.drop_without_applying_deltas();
+        (found, wishes)
+    }
+
+    fn press(at: Pos2) -> Vec<Event> {
+        let (button, modifiers) = (PointerButton::Primary, Modifiers::default());
+        vec![Event::PointerMoved(at), Event::PointerButton { pos: at, button, pressed: true, modifiers }]
+    }
+
+    /// What is asked for where a slider is pressed so far from the left end of its rail, in points.
+    fn pressed(slider: &str, along: f32) -> Option<usize> {
+        let (context, facts) = (egui::Context::default(), facts());
+        laid_out(&context, &facts, Vec::new());
+        let (texts, _) = laid_out(&context, &facts, Vec::new());
+        let place =
+            |wanted: &str| texts.iter().find(|(_, text)| text.contains(wanted)).map(|(place, _)| *place);
+        let left = place("the middle: 20.0 ms").expect("it is said what is drawn").x;
+        let row = place(slider).expect("the slider has its name").y + 6.0;
+        let at = pos2(left + along, row);
+        // The pointer is over it in one frame and pressed in the next.
+        laid_out(&context, &facts, vec![Event::PointerMoved(at)]);
+        laid_out(&context, &facts, press(at)).1.settings
+    }
+
+    #[test]
+    fn each_slider_chooses_what_keeps_it_and_the_other_follows() {
+        // A rail is 100 points long: 10 to 80 ms, and no error to 40 %.
+        assert_eq!(pressed("ms a frame", 3.0), Some(0));
+        assert_eq!(pressed("ms a frame", 60.0), Some(1), "some 35 ms: the best takes 80");
+        assert_eq!(pressed("ms a frame", 95.0), Some(2));
+        assert_eq!(pressed("% of error", 4.0), Some(2));
+        assert_eq!(pressed("% of error", 95.0), Some(0));
+        // Whatever is chosen, both show its prices.
+        for (place, [ms, error]) in [["10", "40"], ["20", "5"], ["80", "0"]].into_iter().enumerate() {
+            let mut facts = facts();
+            let settings = |front: &ViewFront| front.ways[place].settings;
+            facts.settings = facts.front.as_ref().map(settings);
+            let context = egui::Context::default();
+            laid_out(&context, &facts, Vec::new());
+            let (texts, _) = laid_out(&context, &facts, Vec::new());
+            let values: Vec<f64> = texts.iter().filter_map(|(_, text)| text.trim().parse().ok()).collect();
+            let expected = [ms, error].map(|text| text.parse::<f64>().expect("a number"));
+            assert_eq!(values, expected, "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn it_says_what_was_measured_and_what_is_next() {
+        let context = egui::Context::default();
+        let said = |facts: &AccuracyFacts| {
+            laid_out(&context, facts, Vec::new());
+            let (texts, _) = laid_out(&context, facts, Vec::new());
+            texts.into_iter().map(|(_, text)| text).collect::<Vec<_>>().join("\n")
+        };
+        let text = said(&facts());
+        for wanted in [
+            "5.1 % off, FLIP 0.032",
+            "spot lights (7)",
+            "5.00 ms",
+            "25.0 %",
+            "the middle: 20.0 ms, 5.0 % off",
+            "next cheaper: the cheapest: 10.0 ms, 40.0 % off",
+            "next better: the best: 80.0 ms, 0 % off",
+        ] {
+            assert!(text.contains(wanted), "{wanted} is not in:\n{text}");
+        }
+        let elsewhere = said(&AccuracyFacts { is_elsewhere: true, ..facts() });
+        assert!(elsewhere.contains("measured from another place"), "{elsewhere}");
+        let unknown = way("", Shading::Phong, 1.0, 0.0).settings;
+        let unknown = DrawSettings { shadows: false, ..unknown };
+        let unknown = said(&AccuracyFacts { settings: Some(unknown), ..facts() });
+        assert!(unknown.contains("these settings were not measured"), "{unknown}");
+        let progress = Some(("what lights cost", 0.25));
+        let nothing = said(&AccuracyFacts { is_shown: true, progress, ..AccuracyFacts::default() });
+        assert!(nothing.contains("P measures") && nothing.contains("what lights cost"), "{nothing}");
+        assert!(nothing.contains("25%"), "{nothing}");
+    }
+
+    #[test]
+    fn passes_that_are_not_told_apart_have_one_bar() {
+        let pass = |name: &str, group, gpu_ms, shared| lumbre_render::PassAccount {
+            pass: name.to_owned(),
+            effect: name.to_owned(),
+            group,
+            cpu_ms: None,
+            gpu_ms: Some(gpu_ms),
+            shared,
+            invocations: None,
+            lights: None,
+        };
+        let accounting = Accounting {
+            frame: 1,
+            wall_ms: None,
+            cpu_ms: 1.0,
+            stages: Vec::new(),
+            between_ms: None,
+            waiting_ms: None,
+            overlapped_ms: None,
+            gpu_ms: Some(9.0),
+            passes_ms: None,
+            passes: vec![
+                pass("shadow", 0, 2.0, false),
+                pass("background", 1, 7.0, true),
+                pass("forward", 1, 7.0, true),
+            ],
+            effects: Vec::new(),
+            uploads: lumbre_render::Uploads::default(),
+            notes: Vec::new(),
+        };
+        let context = egui::Context::default();
+        let mut texts = String::new();
+        for _ in 0..2 {
+            texts.clear();
+            let output = context.run_ui(RawInput::default(), |ui| passes(ui, &accounting));
+            for clipped in &output.shapes {
+                if let egui::Shape::Text(text) = &clipped.shape {
+                    texts += &format!("{}\n", text.galley.text());
+                }
+            }
+            output.drop_without_applying_deltas();
+        }
+        assert!(texts.contains("background + forward\n7.00 ms\nshadow\n2.00 ms"), "{texts}");
     }
 }
