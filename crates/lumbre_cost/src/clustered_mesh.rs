@@ -1,50 +1,58 @@
 //! A mesh with fewer triangles: vertices that lie in one cell of a grid become one (Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993).
 //! Quick, whatever a scan is like, and not the least error for so many triangles. Not for meshes whose texture coordinates or colours tell: those are dropped.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 use lumbre_mesh::normals::{NormalWeight, compute_smooth_normals};
 use lumbre_mesh::{MeshError, TriangleMesh};
 
-/// The mesh by a grid of `cells` along the longest side of its bounding box, at least 1: each cell's vertices are one at their mean, triangles that have lost a side are gone,
-/// and normals are the means of the faces around, by area.
+/// The mesh by a grid of `cells` along the longest side of its bounding box, at least 1: each cell's vertices are one at their mean, with the
+/// mean of their normals, and triangles that have lost a side are gone. A mesh without normals has those of its faces, by area.
 ///
 /// # Errors
 /// [`MeshError`] where the mesh is not sound.
-pub fn clustered(mesh: &TriangleMesh, cells: u32) -> Result<TriangleMesh, MeshError> {
-    mesh.validate()?;
+pub fn clustered(scan: &TriangleMesh, cells: u32) -> Result<TriangleMesh, MeshError> {
+    scan.validate()?;
+    let mesh = match scan.normals.is_empty() {
+        true => Cow::Owned(compute_smooth_normals(scan, NormalWeight::Area)?.mesh),
+        false => Cow::Borrowed(scan),
+    };
     let finite = || mesh.positions.iter().filter(|point| point.is_finite());
     let least = finite().fold(Vec3::splat(f32::MAX), |least, point| least.min(*point));
     let most = finite().fold(Vec3::splat(f32::MIN), |most, point| most.max(*point));
     let side = f64::from((most - least).max_element().max(f32::MIN_POSITIVE)) / f64::from(cells.max(1));
     let mut places: HashMap<[i64; 3], u32> = HashMap::new();
-    let mut sums: Vec<(DVec3, f64)> = Vec::new();
+    // Of positions, of normals, and how many vertices they are.
+    let mut sums: Vec<(DVec3, DVec3, f64)> = Vec::new();
     let cluster_of: Vec<u32> = mesh
         .positions
         .iter()
-        .map(|point| {
+        .zip(&mesh.normals)
+        .map(|(point, normal)| {
             let from = (point.as_dvec3() - least.as_dvec3()) / side;
             let cell = from.floor().to_array().map(|place| place as i64);
             let next = sums.len() as u32;
             let cluster = *places.entry(cell).or_insert(next);
             if cluster == next {
-                sums.push((DVec3::ZERO, 0.0));
+                sums.push((DVec3::ZERO, DVec3::ZERO, 0.0));
             }
-            let (sum, count) = &mut sums[cluster as usize];
+            let (sum, normals, count) = &mut sums[cluster as usize];
             *sum += point.as_dvec3();
+            *normals += normal.as_dvec3();
             *count += 1.0;
             cluster
         })
         .collect();
     let whole = |[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
     let triangles = mesh.triangles().map(|triangle| triangle.map(|vertex| cluster_of[vertex as usize]));
-    let coarse = TriangleMesh {
-        positions: sums.iter().map(|(sum, count)| (*sum / *count).as_vec3()).collect(),
+    Ok(TriangleMesh {
+        positions: sums.iter().map(|(sum, _, count)| (*sum / *count).as_vec3()).collect(),
+        normals: sums.iter().map(|(_, normals, _)| normals.normalize_or_zero().as_vec3()).collect(),
         indices: triangles.filter(whole).flatten().collect(),
         ..TriangleMesh::default()
-    };
-    Ok(compute_smooth_normals(&coarse, NormalWeight::Area)?.mesh)
+    })
 }
 
 #[cfg(test)]
