@@ -45,6 +45,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "lumbre_graph",
             "lumbre_render",
             "lumbre_bake",
+            "lumbre_cost",
         ],
         &["clap"],
     ),

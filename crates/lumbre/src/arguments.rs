@@ -222,6 +222,9 @@ pub struct Bake {
     /// Lets small meshes share atlases of at most N x N texels, or not, with 0; 2048 without this, and 0 with --map-size.
     #[arg(long, value_name = "N", value_parser = atlas_size, allow_negative_numbers = true)]
     pub atlas_size: Option<u32>,
+    /// Texels along a side of a patch, from 1 to 64: smaller ones exchange light in more detail [default: the quality's]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub patch_texels: Option<f32>,
     /// Leaves the seams between charts as they are.
     #[arg(long)]
     pub no_seams: bool,

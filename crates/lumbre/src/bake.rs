@@ -92,6 +92,7 @@ fn options(asked: &Bake) -> BakeOptions {
             BakeProbes::Never => Probes::Never,
         },
         probe_spacing: asked.probe_spacing,
+        patch_texels: asked.patch_texels,
         gap: asked.gap,
         atlas_size: match (asked.atlas_size, asked.map_size) {
             (Some(0), _) | (None, Some(_)) => None,

@@ -284,6 +284,7 @@ impl Hasher {
             error,
             time: _,
             quality,
+            patch_texels,
             gap,
             seed,
             threads: _,
@@ -310,6 +311,7 @@ impl Hasher {
         }
         self.doubles(&[*error]);
         self.number(*quality as u64);
+        self.doubles(&[patch_texels.map_or(0.0, f64::from)]);
         self.number((*gap).into());
         self.number((*seed).into());
         self.number(*form_factors as u64);

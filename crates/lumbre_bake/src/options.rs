@@ -78,6 +78,9 @@ pub struct BakeOptions {
     pub time: Option<Duration>,
     /// How much work the sampling may take.
     pub quality: Quality,
+    /// Texels along a side of a patch, in [1, 64]: smaller patches exchange light in more detail, which only the bounces after the first see, and take more rays. The
+    /// quality's own if absent; patches are larger where the quality has no room for so many.
+    pub patch_texels: Option<f32>,
     /// Free texels between charts, and how far values are carried past a chart's border: 2 for bilinear filtering,
     /// 4 for bicubic.
     pub gap: u32,
@@ -115,6 +118,7 @@ impl Default for BakeOptions {
             error: 0.01,
             time: None,
             quality: Quality::Final,
+            patch_texels: None,
             gap: 2,
             atlas_size: None,
             seed: 0,
@@ -205,6 +209,7 @@ impl BakeOptions {
     /// asked.
     pub(crate) fn effort(&self) -> Effort {
         let mut effort = self.quality.effort();
+        effort.patch_texels = self.patch_texels.unwrap_or(effort.patch_texels);
         if self.quality == Quality::Reference {
             return effort;
         }
@@ -239,6 +244,9 @@ impl BakeOptions {
         }
         if let Some(spacing) = self.probe_spacing.filter(|spacing| !(spacing.is_finite() && *spacing > 0.0)) {
             return wrong("probe spacing", spacing.to_string(), "a positive finite number of metres");
+        }
+        if let Some(texels) = self.patch_texels.filter(|texels| !(1.0..=64.0).contains(texels)) {
+            return wrong("texels along a patch", texels.to_string(), "a number in [1, 64]");
         }
         if self.gap > 64 {
             return wrong("gap", self.gap.to_string(), "at most 64 texels");

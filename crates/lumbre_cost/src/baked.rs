@@ -45,7 +45,8 @@ pub fn bake_arguments(options: &BakeOptions) -> String {
         Density::MapSize(side) => format!(" --map-size {side}"),
         Density::Automatic => String::new(),
     };
-    format!("--error {}{density} --probes never --no-resolution-error --no-reuse", options.error)
+    let patches = options.patch_texels.map_or_else(String::new, |texels| format!(" --patch-texels {texels}"));
+    format!("--error {}{density}{patches} --probes never --no-resolution-error --no-reuse", options.error)
 }
 
 /// Square metres of what is baked.

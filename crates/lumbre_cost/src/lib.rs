@@ -27,6 +27,7 @@
 //! ```
 
 mod baked;
+mod clustered_mesh;
 mod comparison;
 mod conditions;
 mod converged;
@@ -37,12 +38,14 @@ mod folder;
 mod frames;
 mod fronts;
 mod lamps_in_pieces;
+mod live;
 mod machine;
 mod measured;
 mod page;
 mod picture;
 mod plot;
 mod report;
+mod rounded_lighting;
 mod rounds;
 mod run;
 mod scene_file;
@@ -59,6 +62,7 @@ pub use error::CostError;
 pub use findings::cheapest_by_error;
 pub use folder::{PAGE, REPORT, TABLE, read_picture, read_report};
 pub use fronts::{Stretch, pareto_front, stretches};
+pub use live::{Beside, BesideReference, LightCost, LightCosts, Priced, SideView, ViewFront, ViewWalk};
 pub use page::{Images, page};
 pub use picture::{Compared, Picture, compared};
 pub use report::{

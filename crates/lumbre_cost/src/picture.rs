@@ -46,6 +46,16 @@ impl Picture {
 
 /// How far a picture is from its reference, both shown with the reference's exposure. Nothing if the sizes differ.
 pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Option<Compared> {
+    compared_at(reference, picture, over, reference.exposure())
+}
+
+/// How far a picture is from its reference, both shown with this exposure. Nothing if the sizes differ.
+pub fn compared_at(
+    reference: &Picture,
+    picture: &Picture,
+    over: ErrorOver,
+    exposure: f64,
+) -> Option<Compared> {
     let same = reference.width == picture.width && reference.radiance.len() == picture.radiance.len();
     if !same || picture.radiance.is_empty() {
         return None;
@@ -55,7 +65,6 @@ pub fn compared(reference: &Picture, picture: &Picture, over: ErrorOver) -> Opti
         over != ErrorOver::WhereBothAreLit || (**a != DVec3::ZERO && **b != DVec3::ZERO)
     };
     let (wanted, found): (Vec<DVec3>, Vec<DVec3>) = pairs.filter(counts).map(|(a, b)| (*a, *b)).unzip();
-    let exposure = reference.exposure();
     let both_shown = [reference.shown(exposure), picture.shown(exposure)];
     let found = compare(reference.width, [&wanted, &found], both_shown);
     let error = ErrorOf {

@@ -117,6 +117,14 @@ pub enum Action {
     ToggleOverlay,
     /// Counts of lights in the overlay on or off.
     ToggleLightCounts,
+    /// The most accurate picture of the view beside the frame, or not.
+    ToggleReference,
+    /// Measure what lights and other settings would cost in this view.
+    MeasureSettings,
+    /// The settings that are the next cheaper ones, once they are measured.
+    CheaperSettings,
+    /// The settings that are the next better ones, once they are measured.
+    BetterSettings,
     /// The torch on or off.
     ToggleTorch,
     /// Walk, or fly through walls.

@@ -15,6 +15,8 @@ pub struct ViewSettings {
     pub reflection: Option<ReflectionModel>,
     /// Whether baked light is shown.
     pub lightmaps: bool,
+    /// Whether lights cast the shadows that they ask for.
+    pub shadows: bool,
     /// Four samples per pixel.
     pub multisample: bool,
     /// Whether the overlay is shown.
@@ -29,6 +31,7 @@ impl Default for ViewSettings {
             shading: None,
             reflection: None,
             lightmaps: true,
+            shadows: true,
             multisample: true,
             overlay: true,
             count_lights: false,
@@ -56,7 +59,11 @@ impl ViewSettings {
             Action::ToggleMultisample => self.multisample = !self.multisample,
             Action::ToggleOverlay => self.overlay = !self.overlay,
             Action::ToggleLightCounts => self.count_lights = !self.count_lights,
-            Action::ToggleTorch
+            Action::ToggleReference
+            | Action::MeasureSettings
+            | Action::CheaperSettings
+            | Action::BetterSettings
+            | Action::ToggleTorch
             | Action::ToggleFlight
             | Action::OrbitEverything
             | Action::NextCamera

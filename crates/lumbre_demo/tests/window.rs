@@ -15,8 +15,10 @@ use glam::{DVec3, Vec3};
 use lumbre_bake::{BakeOptions, Density};
 use lumbre_demo::{Action, PlayOptions, Trial};
 use lumbre_mesh::shapes::cuboid;
-use lumbre_optics::{Light, Material, Surface};
-use lumbre_scene::{Camera, DynamicObject, Mesh, Name, StaticObject, Transform, save};
+use lumbre_optics::{Light, Material, Shading, Surface};
+use lumbre_scene::{
+    Camera, DynamicObject, Mesh, Name, SceneSettings, StaticObject, Transform, save, update_transforms,
+};
 
 /// Says to a child process which scenario it is.
 const SCENARIO: &str = "LUMBRE_WINDOW_SCENARIO";
@@ -25,6 +27,8 @@ const PICTURE: &str = "LUMBRE_WINDOW_PICTURE";
 /// A folder to keep the pictures in, for looking at.
 const KEEP: &str = "LUMBRE_WINDOW_KEEP";
 const SIZE: (u32, u32) = (640, 400);
+/// Of a window with two pictures side by side, and a panel over a part of the right one.
+const SIZE_OF_TWO: (u32, u32) = (1000, 600);
 
 /// The scenario in which this program drops the file itself, on the window of the other process.
 const DROPPED_OVER_X11: &str = "dropped over X11";
@@ -34,7 +38,7 @@ const FRAMES_FOR_A_DROP: u32 = 200;
 /// Looks at a scenario's picture.
 type Judge = fn(&Path);
 /// Every scenario by name, and how its picture is judged.
-const SCENARIOS: [(&str, Judge); 17] = [
+const SCENARIOS: [(&str, Judge); 20] = [
     ("overlay", picture_with_overlay),
     ("no overlay", picture_without_overlay),
     ("resize", picture_of_other_size),
@@ -52,6 +56,9 @@ const SCENARIOS: [(&str, Judge); 17] = [
     ("bake cancelled", picture_without_baked_light),
     ("bake of nothing that shines", picture_under_a_sky),
     ("adapted", picture_with_an_exposure),
+    ("beside its reference", picture_of_the_dark_and_the_bright_wall),
+    ("reference on a new device", picture_of_the_dark_and_the_bright_wall),
+    ("better settings", picture_of_two_bright_walls),
 ];
 
 fn main() {
@@ -168,6 +175,22 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
             options.trials = vec![hide];
             file("bright.gltf", write_bright)
         }
+        "beside its reference" => {
+            options.size = SIZE_OF_TWO;
+            options.trials = vec![hide, (0, Trial::Act(Action::ToggleReference))];
+            file("wall.glb", write_coarse_wall)
+        }
+        "reference on a new device" => {
+            options.size = SIZE_OF_TWO;
+            options.trials = vec![hide, (0, Trial::Act(Action::ToggleReference)), (4, Trial::LoseDevice)];
+            file("wall.glb", write_coarse_wall)
+        }
+        "better settings" => {
+            options.size = SIZE_OF_TWO;
+            options.input = Some(here.join("tests/walks/better_settings.json"));
+            options.quit_after = None;
+            file("wall.glb", write_coarse_wall)
+        }
         _ => level,
     };
     match scenario {
@@ -240,6 +263,20 @@ fn write_bright(path: &Path) {
     json["extensions"]["KHR_lights_punctual"]["lights"][0] =
         serde_json::json!({"type": "directional", "intensity": 50_000.0});
     std::fs::write(path, json.to_string()).expect("the folder takes it");
+}
+
+/// A wall of two triangles under a lamp before its middle, shaded at its vertices: dark, where every fragment would have it bright.
+fn write_coarse_wall(path: &Path) {
+    let mut world = World::new();
+    world.insert_resource(SceneSettings { shading: Shading::Gouraud, ..SceneSettings::default() });
+    let wall = (Mesh(cuboid(Vec3::new(8.0, 5.0, 0.2), 1).into()), Material::matt(Vec3::splat(0.7)));
+    world.spawn((Name::new("wall"), wall, StaticObject));
+    let lamp = Light { bake: lumbre_optics::BakeMode::Dynamic, ..Light::point(Vec3::splat(1.2)) };
+    world.spawn((Name::new("lamp"), lamp, Transform::from_xyz(0.0, 0.0, 1.0)));
+    let eye = Transform::from_xyz(0.0, 0.0, 5.0).looking_at(DVec3::ZERO, DVec3::Y);
+    world.spawn((Name::new("start"), Camera::default(), eye));
+    update_transforms(&mut world);
+    save(&mut world, path).expect("the folder takes it");
 }
 
 fn open(path: &Path) -> image::RgbImage {
@@ -358,6 +395,34 @@ fn picture_under_a_sky(path: &Path) {
 fn picture_with_an_exposure(path: &Path) {
     let picture = middle(path);
     assert!(picture.iter().all(|&channel| (90.0..150.0).contains(&channel)), "{picture:?}");
+}
+
+/// Mean brightness left and right of the middle of a window with two pictures, 0 to 255, where no panel lies.
+fn left_and_right(path: &Path) -> [f64; 2] {
+    let picture = open(path);
+    assert_eq!(picture.dimensions(), SIZE_OF_TWO);
+    let (middle, height) = (SIZE_OF_TWO.0 / 2, SIZE_OF_TWO.1 / 2);
+    [middle - 70..middle - 10, middle + 10..middle + 70].map(|columns| {
+        let inside = |x: &u32, y: &u32| columns.contains(x) && y.abs_diff(height) < 30;
+        let pixels: Vec<f64> = picture
+            .enumerate_pixels()
+            .filter(|(x, y, _)| inside(x, y))
+            .map(|(_, _, pixel)| f64::from(pixel.0[1]))
+            .collect();
+        pixels.iter().sum::<f64>() / pixels.len() as f64
+    })
+}
+
+/// The frame on the left, and what it should be on the right.
+fn picture_of_the_dark_and_the_bright_wall(path: &Path) {
+    let [frame, reference] = left_and_right(path);
+    assert!(frame < 90.0 && reference > 140.0, "{frame} and {reference}");
+}
+
+/// The better settings, as they were measured, are those of the reference.
+fn picture_of_two_bright_walls(path: &Path) {
+    let [frame, reference] = left_and_right(path);
+    assert!(frame > 140.0 && (frame - reference).abs() < 4.0, "{frame} and {reference}");
 }
 
 /// A virtual X server that ends with this value.

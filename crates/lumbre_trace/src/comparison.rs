@@ -30,7 +30,7 @@ pub struct Comparison {
 /// Channels that are not finite in either picture count as infinitely far apart.
 pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> Comparison {
     let [reference, test] = linear;
-    let (mut squares, mut of_reference, mut sum, mut brightness) = (0.0, 0.0, 0.0, 0.0);
+    let (mut sum, mut brightness) = (0.0, 0.0);
     let (mut largest, mut at) = (0.0, 0);
     for (pixel, (wanted, found)) in reference.iter().zip(test).enumerate() {
         let apart = *found - *wanted;
@@ -38,18 +38,15 @@ pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> C
         if most > largest {
             (largest, at) = (most, pixel);
         }
-        squares += if most.is_finite() { apart.length_squared() } else { f64::INFINITY };
-        of_reference += wanted.length_squared();
         sum += apart.element_sum();
         brightness += wanted.element_sum();
     }
-    let over = |value: f64, size: f64| if value == 0.0 { 0.0 } else { value / size };
     let noise: f64 = shown[0].iter().zip(&shown[1]).map(|(a, b)| (*a - *b).length_squared()).sum();
     let mean = noise / (3 * shown[0].len().max(1)) as f64;
     let [reference, test] = shown.map(|pixels| flip::Picture { width, pixels });
     let map = flip::flip(&reference, &test, flip::PIXELS_PER_DEGREE);
     Comparison {
-        relative_error: over(squares, of_reference).sqrt(),
+        relative_error: relative_error(linear[0], linear[1]),
         relative_bias: over(sum, brightness),
         largest,
         largest_at: [at % width.max(1), at / width.max(1)],
@@ -57,6 +54,23 @@ pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> C
         flip: map.iter().sum::<f64>() / map.len().max(1) as f64,
         map,
     }
+}
+
+/// Root mean square difference of two pictures of one size over the reference's root mean square, all channels, linear: the
+/// [`relative_error`](Comparison::relative_error) of [`compare`] alone.
+pub fn relative_error(reference: &[DVec3], test: &[DVec3]) -> f64 {
+    let (mut squares, mut of_reference) = (0.0, 0.0);
+    for (wanted, found) in reference.iter().zip(test) {
+        let apart = *found - *wanted;
+        squares += if apart.is_finite() { apart.length_squared() } else { f64::INFINITY };
+        of_reference += wanted.length_squared();
+    }
+    over(squares, of_reference).sqrt()
+}
+
+/// A part of a size; nothing of nothing is nothing.
+fn over(value: f64, size: f64) -> f64 {
+    if value == 0.0 { 0.0 } else { value / size }
 }
 
 #[cfg(test)]

@@ -287,6 +287,7 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         form_factors: _,
         resolution_error: _,
         separate_light: _,
+        patch_texels: _,
     } = default;
     let options = [
         ("density", BakeOptions { density: Density::MapSize(64), ..default }),
@@ -306,6 +307,7 @@ fn everything_that_may_change_a_texel_changes_the_hash() {
         ("probes", BakeOptions { probes: Probes::Always, ..default }),
         ("no probes", BakeOptions { probes: Probes::Never, probe_spacing: Some(0.5), ..default }),
         ("probe spacing", BakeOptions { probe_spacing: Some(0.5), ..default }),
+        ("patches", BakeOptions { patch_texels: Some(8.0), ..default }),
         ("memory", BakeOptions { memory: Some(1 << 30), ..default }),
     ];
     for (what, options) in options {

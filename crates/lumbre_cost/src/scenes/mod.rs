@@ -5,6 +5,7 @@ mod balls_and_lamps;
 mod fence;
 mod mirror_and_glass;
 mod room;
+mod scan;
 mod sheet;
 
 pub use ball::{Ball, ball, exact_ball};
@@ -12,4 +13,5 @@ pub use balls_and_lamps::{BallsAndLamps, balls_and_lamps};
 pub use fence::fence;
 pub use mirror_and_glass::mirror_and_glass;
 pub use room::{Air, room};
+pub use scan::scan;
 pub use sheet::{Sheet, sheet};

@@ -1,4 +1,7 @@
-//! Bakes that are asked for less and less error: what they take, what they state, and what is true by a converged bake of the same texels.
+//! Bakes that are asked for less and less error, and bakes with larger and smaller patches: what they take, what they state, and what is true by a converged bake of the same
+//! texels.
+
+use std::collections::BTreeMap;
 
 use lumbre_bake::{BakeOptions, Quality};
 use lumbre_render::FrameOptions;
@@ -6,7 +9,7 @@ use lumbre_render::FrameOptions;
 use super::over_scenes;
 use crate::baked::{bake_arguments, bake_options, bake_scene, maps_of, texel_error};
 use crate::converged_bake::{converged, converged_bake};
-use crate::findings::{cheapest_by_error, error_of, percent, rounded, short};
+use crate::findings::{cheapest_by_error, counted, error_of, percent, rounded, short};
 use crate::frames::draw_picture;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
@@ -20,6 +23,10 @@ const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.015];
 const ROUNDS: usize = 2;
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
 pub(super) const REFERENCE_SECONDS: f64 = 2.5;
+/// Texels along a patch: the quality's own is 4.
+const PATCHES: &[f32] = &[16.0, 8.0, 4.0, 2.0];
+const FEW_PATCHES: &[f32] = &[16.0, 2.0];
+const PATCH: &str = "texels along a patch";
 const ASKED: &str = "error asked for, %";
 const STATED: &str = "error stated, % of the mean";
 const FOUND: &str = "error found, % of the mean";
@@ -83,6 +90,12 @@ fn asked(conditions: &Conditions<'_>, options: BakeOptions) -> Vec<Asked> {
     }
     let draft = BakeOptions { quality: Quality::Draft, error: errors[0], ..options };
     all.push(Asked { series: "draft", label: label(errors[0]), options: draft, more: " --quality draft" });
+    // With the least error, so that what is left of it is the patches'.
+    let least = errors.last().copied().unwrap_or(options.error);
+    for &texels in conditions.unless_quick(PATCHES, FEW_PATCHES) {
+        let options = BakeOptions { error: least, patch_texels: Some(texels), ..options };
+        all.push(Asked { series: "patches", label: format!("{texels} texels a side"), options, more: "" });
+    }
     // What bakes without smoothing cannot be asked for on the command line.
     for &error in errors.iter().take(conditions.unless_quick(3, 1)) {
         let options = BakeOptions { error, denoise: false, ..options };
@@ -141,7 +154,7 @@ fn of_scene(
         let point = Point {
             series: scene.series(conditions, asked.series),
             label: asked.label.clone(),
-            parameters: [(ASKED.to_owned(), 100.0 * asked.options.error)].into(),
+            parameters: parameters(asked),
             milliseconds: Spread::of(times),
             error,
             counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
@@ -155,6 +168,12 @@ fn of_scene(
     let findings = findings(scene, &points);
     measured.study.findings.extend(findings);
     Ok(())
+}
+
+fn parameters(asked: &Asked) -> BTreeMap<String, f64> {
+    let error = (ASKED.to_owned(), 100.0 * asked.options.error);
+    let patch = asked.options.patch_texels.map(|texels| (PATCH.to_owned(), f64::from(texels)));
+    [error].into_iter().chain(patch).collect()
 }
 
 fn command(scene: &SceneFile, asked: &Asked) -> String {
@@ -198,5 +217,24 @@ fn findings(scene: &SceneFile, points: &[&Point]) -> Vec<String> {
             rounded(long.median / short.median)
         ));
     }
+    findings.extend(of_patches(points));
     findings
+}
+
+/// The coarsest patches beside the finest: their number, and what they cost and leave.
+fn of_patches(points: &[&Point]) -> Option<String> {
+    let all: Vec<&&Point> = points.iter().filter(|point| point.parameters.contains_key(PATCH)).collect();
+    let (coarse, fine) = (all.first()?, all.last()?);
+    let count = |point: &Point| point.counts.get("patches").copied().map(counted);
+    let (long, short) = (fine.milliseconds?, coarse.milliseconds?);
+    Some(format!(
+        "{} patches of {} leave an error of {}, {} of {} one of {}, in {} times the time.",
+        count(coarse)?,
+        coarse.label,
+        error_of(&coarse.error?),
+        count(fine)?,
+        fine.label,
+        error_of(&fine.error?),
+        rounded(long.median / short.median)
+    ))
 }

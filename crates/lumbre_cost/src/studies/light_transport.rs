@@ -22,9 +22,14 @@ use crate::{Conditions, CostError, ErrorOf, ErrorOver, Plot, Point, Quantity, Sp
 /// Paths a pixel.
 const PATHS: &[u32] = &[4, 16, 32];
 const FEW_PATHS: &[u32] = &[2, 8];
+/// Reflections after which paths are cut short.
+const BOUNCES: &[u32] = &[0, 1, 2, 4, 8];
+const FEW_BOUNCES: &[u32] = &[0, 1, 3];
+const REFLECTIONS: &str = "reflections on the way";
 /// Pictures are this part as wide and high as elsewhere: paths take their time.
 const SMALLER: u32 = 3;
 const SECONDS: f64 = 4.0;
+const CUT: &str = "paths cut short";
 const BAKE: &str = "baked before, ms";
 
 /// Measures it.
@@ -136,7 +141,12 @@ fn of_scene(
     let trees = [1, 4].map(|samples| ("ray tree", tree(samples), samples, format!("--samples {samples}")));
     let numbers = conditions.unless_quick(PATHS, FEW_PATHS).iter();
     let all = numbers.map(|n| ("paths", paths(*n), *n, format!("--integrator path --samples {n}")));
-    let all: Vec<_> = trees.into_iter().chain(all).collect();
+    let samples = conditions.unless_quick(PATHS, FEW_PATHS).last().copied().unwrap_or(1);
+    let bounces = conditions.unless_quick(BOUNCES, FEW_BOUNCES).iter().map(|&depth| {
+        let asked = format!("--integrator path --samples {samples} --depth {depth}");
+        (CUT, TraceOptions { depth: Some(depth), ..paths(samples) }, samples, asked)
+    });
+    let all: Vec<_> = trees.into_iter().chain(all).chain(bounces).collect();
     for (place, (name, options, samples, asked)) in all.iter().enumerate() {
         conditions.tell(part(0.7 + 0.3 * place as f64 / all.len() as f64))?;
         let mut times = Vec::new();
@@ -150,7 +160,14 @@ fn of_scene(
         let Some((picture, report)) = found else { continue };
         let point = Point {
             series: series(name),
-            label: format!("{samples} a pixel"),
+            label: match options.depth.filter(|_| *name == CUT) {
+                Some(depth) => format!("{samples} a pixel, {depth} reflections"),
+                None => format!("{samples} a pixel"),
+            },
+            parameters: match options.depth.filter(|_| *name == CUT) {
+                Some(depth) => [(REFLECTIONS.to_owned(), f64::from(depth))].into(),
+                None => Default::default(),
+            },
             milliseconds: Spread::of(&times),
             error: uncertain,
             counts: [("rays".to_owned(), report.rays as f64)].into(),
@@ -200,7 +217,8 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
     let best =
         frames.iter().filter_map(|point| Some((point, point.error?.relative_rmse, point.milliseconds?)));
     if let Some((frame, error, time)) = best.min_by(|a, b| a.1.total_cmp(&b.1)) {
-        let paths = points.iter().filter(|point| point.series.starts_with("paths"));
+        let whole = |point: &&&Point| point.series.starts_with("paths") && !point.series.starts_with(CUT);
+        let paths = points.iter().filter(whole);
         let reached = paths
             .filter_map(|point| Some((point, point.error?.relative_rmse, point.milliseconds?)))
             .filter(|(_, found, _)| *found <= error)
@@ -226,6 +244,23 @@ fn findings(points: &[&Point], open: f64) -> Vec<String> {
             percent(open)
         ));
     }
+    findings.extend(of_bounces(points));
     findings.extend(cheapest_by_error(points, ""));
     findings
+}
+
+/// How much of the light comes after so many reflections: what paths that are cut there are off by.
+fn of_bounces(points: &[&Point]) -> Option<String> {
+    let cut = points.iter().filter(|point| point.series.starts_with(CUT));
+    let told: Vec<String> = cut
+        .filter_map(|point| {
+            let after = point.parameters.get(REFLECTIONS)?;
+            let (error, time) = (point.error?, point.milliseconds?);
+            Some(format!("{after}: {} in {}", percent(error.relative_rmse), milliseconds(&time)))
+        })
+        .collect();
+    let all = !told.is_empty();
+    all.then(|| {
+        format!("Paths that are cut short after so many reflections are off by: {}.", told.join("; "))
+    })
 }

@@ -8,6 +8,7 @@ mod lightmaps;
 mod precision;
 mod preprocessing;
 mod reflection;
+mod scan;
 mod shading;
 mod shading_by_need;
 mod shadows;
@@ -34,6 +35,7 @@ pub struct StudyKind {
 /// All studies, in the order of the page.
 pub const STUDIES: &[StudyKind] = &[
     StudyKind { name: "shading", about: "flat, Gouraud and Phong shading", run: shading::run },
+    StudyKind { name: "scan", about: "the same on a scan at several resolutions", run: scan::run },
     StudyKind { name: "need", about: "shading by need over the error allowed", run: shading_by_need::run },
     StudyKind { name: "lamps", about: "many lights, and how they are found", run: lamps::run },
     StudyKind { name: "shadows", about: "shadow maps by size and filter, against rays", run: shadows::run },

@@ -1,4 +1,5 @@
-//! Frames of f32 against rays of f64 over cases that are hard for arithmetic, and what is lost when the frame is kept in fewer bits.
+//! Frames of f32 against rays of f64 over cases that are hard for arithmetic: what the equations lose where every operation is rounded to f16 or f32, and what is lost when
+//! the frame is kept in fewer bits.
 
 use std::time::Instant;
 
@@ -11,6 +12,7 @@ use crate::findings::{listed, milliseconds, percent, rounded};
 use crate::frames::{Frame, draw_frames};
 use crate::measured::Measured;
 use crate::picture::Picture;
+use crate::rounded_lighting::{FORMATS, rounded_lighting};
 use crate::rounds::milliseconds_since;
 use crate::scene_file::SceneFile;
 use crate::scenes::{Sheet, sheet};
@@ -32,6 +34,7 @@ const F32: &str = "f32 frame";
 const F16: &str = "the frame kept in f16";
 const EIGHT: &str = "the frame kept in eight bits";
 const F64: &str = "f64 rays";
+const LOST: &str = "pixels without a number, %";
 
 /// Measures it.
 ///
@@ -88,6 +91,14 @@ pub fn run(conditions: &Conditions<'_>) -> Result<Measured, CostError> {
             point.counts = frame.counts();
             measured.add_picture(point, picture, &reference, ErrorOver::Picture)?;
         }
+        for format in FORMATS {
+            let mut world = scene.open(conditions.aspect())?;
+            let Some(rounded) = rounded_lighting(&mut world, conditions.size, format) else { continue };
+            // Rounded by a program after each operation: that has no time of a device.
+            let mut point = point(format.name, None, "lumbre cost -o again --study precision".into());
+            point.figures.insert(LOST.into(), 100.0 * rounded.lost);
+            measured.add_picture(point, rounded.picture, &reference, ErrorOver::Picture)?;
+        }
         measured.add_picture(point(F64, Spread::of(&times), trace), exact, &reference, ErrorOver::Picture)?;
     }
     measured.study.findings = findings(&measured.study);
@@ -98,7 +109,7 @@ fn study() -> Study {
     Study {
         name: "precision".into(),
         title: "f32 on the device against f64".into(),
-        question: "A sheet that fills the frame, under light that is hard for arithmetic: what do 32 bits lose, and what 16 and eight after them? And what would 64 bits cost, by rays?".into(),
+        question: "A sheet that fills the frame, under light that is hard for arithmetic: what do frames of 32 bits lose, and what do 16 and eight after them? What would plain equations lose in 16 bits and in 32, and what would 64 cost, by rays?".into(),
         reference: "the same lighting equation at the same pixels, traced in f64".into(),
         plots: vec![Plot {
             title: "Error against time".into(),
@@ -106,6 +117,10 @@ fn study() -> Study {
             up: Quantity::Error,
             ..Plot::default()
         }],
+        notes: vec![
+            "The equations of f16 and f32 are rounded after every operation, without what the renderer does about hard cases; the point that is lit and the camera are relative to the eye. Pixels for which the format has no number are black."
+                .into(),
+        ],
         ..Study::default()
     }
 }
@@ -124,6 +139,39 @@ fn in_bytes(picture: &Picture) -> Picture {
     each_channel(picture, |value| decode_srgb((255.0 * encode_srgb(value.clamp(0.0, 1.0))).round() / 255.0))
 }
 
+/// What plain equations lose, in the shorter format and beside the device's frames.
+fn of_equations(study: &Study) -> Vec<String> {
+    let error = |point: &Point| point.error.map_or(0.0, |error| error.relative_rmse);
+    let [short, long] = FORMATS.map(|format| study.of_series(format.name).collect::<Vec<_>>());
+    let mut findings = Vec::new();
+    if let Some(plain) = short.iter().find(|point| point.label == CASES[0].0) {
+        let is_lost = |point: &&&Point| point.figures.get(LOST).is_some_and(|lost| *lost > 0.0);
+        let lost: Vec<&str> = short.iter().filter(is_lost).map(|point| point.label.as_str()).collect();
+        let none = if lost.is_empty() { "none".into() } else { listed(&lost, "and") };
+        findings.push(format!(
+            "Equations in f16 are off by {} where nothing is hard; cases with pixels for which f16 has no number: {none}.",
+            percent(error(plain))
+        ));
+    }
+    // Where the device's f32 is most of all better than plain f32: what going round the hard places gains.
+    let gained = long.iter().filter_map(|point| {
+        let frame = study.of_series(F32).find(|frame| frame.label == point.label)?;
+        Some((point, frame, error(point) / error(frame).max(1e-12)))
+    });
+    if let Some((plain, frame, gain)) =
+        gained.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., gain)| *gain > 1.0)
+    {
+        findings.push(format!(
+            "Plain equations in f32 lose most beside the frame at \"{}\": {} where the frame is off by {}, {} times as much.",
+            plain.label,
+            percent(error(plain)),
+            percent(error(frame)),
+            rounded(gain)
+        ));
+    }
+    findings
+}
+
 fn findings(study: &Study) -> Vec<String> {
     let error = |point: &&Point| point.error.map_or(0.0, |error| error.relative_rmse);
     let mut findings = Vec::new();
@@ -138,6 +186,7 @@ fn findings(study: &Study) -> Vec<String> {
             percent(error(&plain))
         ));
     }
+    findings.extend(of_equations(study));
     let bytes: Vec<(&Point, f64)> = study.of_series(EIGHT).map(|point| (point, error(&point))).collect();
     let worse: Vec<&str> = study
         .of_series(F32)

@@ -126,6 +126,16 @@ fn study(whole: bool) -> Study {
     }
 }
 
+/// What a series of that shading is called.
+pub(super) fn series_of(shading: Shading) -> &'static str {
+    match shading {
+        Shading::Flat => "flat",
+        Shading::Gouraud => "Gouraud",
+        Shading::Phong => "Phong",
+        Shading::Auto { .. } => "by need",
+    }
+}
+
 fn point(conditions: &Conditions<'_>, subject: &Subject, shading: Shading, frame: &DrawnFrame) -> Point {
     let name = shading.name();
     let command = format!(
@@ -134,13 +144,7 @@ fn point(conditions: &Conditions<'_>, subject: &Subject, shading: Shading, frame
         conditions.size_text()
     );
     Point {
-        series: match shading {
-            Shading::Flat => "flat",
-            Shading::Gouraud => "Gouraud",
-            Shading::Phong => "Phong",
-            Shading::Auto { .. } => "by need",
-        }
-        .into(),
+        series: series_of(shading).into(),
         label: subject.label.clone(),
         parameters: subject.depth.map(|depth| (DEPTH.to_owned(), f64::from(depth))).into_iter().collect(),
         milliseconds: frame.spread(),
@@ -184,7 +188,7 @@ fn findings(study: &Study, drawn: &[DrawnFrame], whole: bool) -> Vec<String> {
 }
 
 /// Gouraud beside Phong on one mesh.
-fn of_one_mesh(three: &[Point], times: &[DrawnFrame]) -> Option<String> {
+pub(super) fn of_one_mesh(three: &[Point], times: &[DrawnFrame]) -> Option<String> {
     let ([_, gouraud, phong], [_, per_vertex, per_fragment]) = (three, times) else { return None };
     let ratio = ratio_of(&per_vertex.times, &per_fragment.times)?;
     let range = format!("{} to {}", rounded(ratio.lower), rounded(ratio.upper));

@@ -26,16 +26,16 @@ pub struct DrawSettings {
 
 /// What there is in a level to choose about.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Choices {
+pub(crate) struct Choices {
     /// A light asks for a shadow.
     shadows: bool,
-    /// There are lamps that may end, and this is the radiance that the level's camera shows as white.
+    /// There are lamps that may end, and this is the radiance that is shown as white.
     white: Option<f32>,
 }
 
 /// What is chosen at once, one after another: what they cost has little to do with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stage {
+pub(crate) enum Stage {
     /// How often light is evaluated, and how often a pixel is.
     Evaluations,
     Shadows,
@@ -67,8 +67,44 @@ impl DrawSettings {
         multisample: true,
     };
 
+    /// How a World is drawn with these options, where no object chooses for itself.
+    pub fn current(world: &World, options: &FrameOptions) -> Self {
+        let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
+        Self {
+            shading: options.shading.unwrap_or(settings.shading),
+            shadows: options.shadows,
+            shadow_filter: settings.frame.shadow_filter,
+            shadow_resolution: settings.frame.shadow_resolution,
+            light_threshold: settings.frame.light_threshold,
+            multisample: options.multisample.or(settings.frame.multisample).unwrap_or(false),
+        }
+    }
+
+    /// Draws with a World and options that are so, objects that choose their shading themselves among them, and gives the World its own settings back.
+    pub(crate) fn drawn<T>(
+        &self,
+        world: &mut World,
+        options: &FrameOptions,
+        draw: impl FnOnce(&mut World, &FrameOptions) -> T,
+    ) -> T {
+        let own = world.get_resource::<SceneSettings>().copied();
+        world.insert_resource(SceneSettings { frame: self.frame(), ..own.unwrap_or_default() });
+        let options = FrameOptions {
+            shading: Some(self.shading),
+            shadows: self.shadows,
+            multisample: Some(self.multisample),
+            ..options.clone()
+        };
+        let drawn = draw(world, &options);
+        match own {
+            Some(own) => world.insert_resource(own),
+            None => drop(world.remove_resource::<SceneSettings>()),
+        }
+        drawn
+    }
+
     /// What it is called beside the most accurate of its level.
-    pub(super) fn label(&self, reference: &Self) -> String {
+    pub(crate) fn label(&self, reference: &Self) -> String {
         let of_maps = (self.shadow_filter, self.shadow_resolution);
         let shadows = match self.shadows {
             false => ", no shadows".to_owned(),
@@ -132,14 +168,15 @@ impl Choices {
         DrawSettings { shadow_resolution, ..most }
     }
 
-    /// Of a level.
-    pub fn of(world: &mut World) -> Self {
+    /// Of a level, shown with this exposure, or with that of its cameras.
+    pub fn of(world: &mut World, exposure: Option<f32>) -> Self {
         let mut lights = world.query::<&Light>();
         let shining: Vec<&Light> = lights.iter(world).filter(|light| light.enabled).collect();
         let shadows = shining.iter().any(|light| light.shadow);
         let lamps = shining.iter().any(|light| light.kind == LightKind::Point);
         let exposures: Vec<f32> =
             world.query::<&Camera>().iter(world).map(|camera| camera.exposure).collect();
+        let exposures = exposure.map_or(exposures, |exposure| vec![exposure]);
         let brightest = exposures.into_iter().filter(|exposure| *exposure > 0.0).fold(0.0, f32::max);
         Self { shadows, white: (lamps && brightest > 0.0).then(|| brightest.recip()) }
     }

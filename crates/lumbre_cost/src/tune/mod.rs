@@ -1,7 +1,9 @@
 //! Which settings to draw a level with: one choice after another is measured side by side at every camera, what another way beats is dropped, and of what is left the one is
 //! taken that keeps a goal. Not the studies, which explain; this decides.
 
+mod candidates;
 mod draw_settings;
+mod goal;
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -13,8 +15,11 @@ use lumbre_optics::Shading;
 use lumbre_render::{FrameOptions, Gpu, Renderer};
 use lumbre_scene::{ActiveCamera, Camera, Name};
 
+pub(crate) use self::candidates::Candidates;
 pub use self::draw_settings::DrawSettings;
-use self::draw_settings::{Choices, Stage};
+pub(crate) use self::draw_settings::{Choices, Stage};
+pub use self::goal::Goal;
+pub(crate) use self::goal::choose;
 use crate::converged::ConvergedBakes;
 use crate::findings::{cost_of, percent, short};
 use crate::folder::Folder;
@@ -26,15 +31,6 @@ use crate::{
     Conditions, CostError, CostReport, ErrorOver, Listener, Plot, Point, Quantity, Settings, Spread, Study,
     pareto_front,
 };
-
-/// What settings have to keep.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Goal {
-    /// Milliseconds that a frame may take, at the camera that takes the longest.
-    pub milliseconds: Option<f64>,
-    /// Relative RMSE against the most accurate settings, at the camera that is the farthest off.
-    pub error: Option<f64>,
-}
 
 /// What was found.
 #[derive(Clone, Debug, Default)]
@@ -111,7 +107,7 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     let Some(scene) = scenes.first() else { return Ok(Tuned::default()) };
     let mut world = scene.open(conditions.aspect())?;
     let cameras = cameras(&mut world);
-    let choices = Choices::of(&mut world);
+    let choices = Choices::of(&mut world, None);
     let mut own = world.query::<&Shading>();
     let choosers = own.iter(&world).count();
 
@@ -124,7 +120,17 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
         if ways.len() > 1 {
             let told = [share(place), share(place + 1)];
             let drawn = draw_at_cameras(conditions, scene, &cameras, &ways, SECONDS[0] / stages, told)?;
-            found.take(conditions, scene, &cameras, ways, drawn, &mut measured)?;
+            if found.settings.is_empty() {
+                for (number, ((_, name), exact)) in cameras.iter().zip(drawn.iter().flatten()).enumerate() {
+                    measured.keep_reference(&reference_name(number, name), exact.picture.clone());
+                }
+            }
+            found.begin();
+            for (way, drawn) in ways.into_iter().zip(&drawn) {
+                found.take(way, longest(drawn), |label| {
+                    point(conditions, scene, &cameras, (&way, label), drawn, &mut measured)
+                })?;
+            }
         }
     }
     // Only what may be the best is worth more rounds.
@@ -150,126 +156,9 @@ fn tuned(conditions: &Conditions<'_>, goal: Goal) -> Result<Tuned, CostError> {
     Ok(Tuned { study, settings, front, chosen, pictures: measured })
 }
 
-/// What is known of the ways to draw a level so far.
-#[derive(Default)]
-struct Candidates {
-    settings: Vec<DrawSettings>,
-    /// A point for each of them.
-    points: Vec<Point>,
-    /// Those that were measured last, side by side: only their times can be compared.
-    latest: Vec<usize>,
-}
-
-/// Ways from which a stage goes on, at most: those that no other one beats, spread evenly over them if there are more.
-const CARRIED_ON: usize = 5;
-
-impl Candidates {
-    /// What a stage has to measure: those that are still in the running, and what differs from the best of them in what the stage chooses.
-    fn next(&self, stage: Stage, choices: &Choices) -> Vec<DrawSettings> {
-        if self.latest.is_empty() {
-            let reference = choices.reference();
-            let others = stage.others(reference, choices);
-            return [reference].into_iter().chain(others).collect();
-        }
-        let running: Vec<DrawSettings> = self.contenders().iter().map(|&one| self.settings[one]).collect();
-        let points: Vec<Point> = self.contenders().iter().map(|&one| self.points[one].clone()).collect();
-        let place = |point: &Point| points.iter().position(|other| std::ptr::eq(other, point));
-        let front: Vec<usize> = pareto_front(&points).into_iter().filter_map(place).collect();
-        let mut ways = running.clone();
-        for from in evenly(&front, CARRIED_ON) {
-            for other in stage.others(running[from], choices) {
-                if !ways.contains(&other) {
-                    ways.push(other);
-                }
-            }
-        }
-        // Nothing to choose: what is known is known.
-        if ways.len() == running.len() { Vec::new() } else { ways }
-    }
-
-    /// Takes what was measured of some ways, with their pictures if they are new.
-    fn take(
-        &mut self,
-        conditions: &Conditions<'_>,
-        scene: &SceneFile,
-        cameras: &[(Entity, String)],
-        ways: Vec<DrawSettings>,
-        drawn: Vec<Vec<DrawnFrame>>,
-        measured: &mut Measured,
-    ) -> Result<(), CostError> {
-        if self.settings.is_empty() {
-            for (number, ((_, name), exact)) in cameras.iter().zip(drawn.iter().flatten()).enumerate() {
-                measured.keep_reference(&reference_name(number, name), exact.picture.clone());
-            }
-        }
-        self.latest.clear();
-        for (way, drawn) in ways.into_iter().zip(&drawn) {
-            let place = match self.settings.iter().position(|known| *known == way) {
-                Some(place) => place,
-                None => {
-                    let label = way.label(self.settings.first().unwrap_or(&way));
-                    let Some(point) = point(conditions, scene, cameras, (&way, label), drawn, measured)?
-                    else {
-                        continue;
-                    };
-                    self.settings.push(way);
-                    self.points.push(point);
-                    self.points.len() - 1
-                }
-            };
-            self.points[place].milliseconds = longest(drawn);
-            self.latest.push(place);
-        }
-        Ok(())
-    }
-
-    /// Those of the last that no other one of them beats.
-    fn contenders(&self) -> Vec<usize> {
-        let latest: Vec<&Point> = self.latest.iter().map(|&one| &self.points[one]).collect();
-        let kept = (0..latest.len()).filter(|&one| !is_beaten(one, &latest));
-        kept.map(|one| self.latest[one]).collect()
-    }
-}
-
-/// At most so many of them, the first and the last among them.
-fn evenly(all: &[usize], most: usize) -> Vec<usize> {
-    let last = all.len().saturating_sub(1);
-    match all.len() <= most {
-        true => all.to_vec(),
-        false => (0..most).map(|place| all[place * last / (most - 1)]).collect(),
-    }
-}
-
 /// What the picture of a camera under the most accurate settings is called.
 fn reference_name(number: usize, camera: &str) -> String {
     format!("reference {number} {camera}")
-}
-
-/// Errors that are no farther apart look alike: a quarter of a step of eight bits, in a picture of half grey.
-const ALIKE: f64 = 0.002;
-
-/// The setting that keeps the goal best: the least error where a time is given, and of those that look alike the cheapest; else the least time.
-fn choose(points: &[Point], goal: Goal) -> Option<usize> {
-    let known = points
-        .iter()
-        .enumerate()
-        .filter_map(|(place, point)| Some((place, point.milliseconds?.median, point.error?.relative_rmse)));
-    let keeps = |(_, time, error): &(usize, f64, f64)| {
-        goal.milliseconds.is_none_or(|most| *time <= most) && goal.error.is_none_or(|most| *error <= most)
-    };
-    let kept: Vec<(usize, f64, f64)> = known.filter(keeps).collect();
-    let least = kept.iter().map(|(.., error)| *error).fold(f64::INFINITY, f64::min);
-    let most = if goal.milliseconds.is_some() { least + ALIKE } else { f64::INFINITY };
-    let alike = kept.into_iter().filter(|(.., error)| *error <= most);
-    alike.min_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2))).map(|(place, ..)| place)
-}
-
-/// Whether another one is as accurate and takes less time, quartiles and all.
-fn is_beaten(one: usize, points: &[&Point]) -> bool {
-    let known = |point: &Point| Some((point.milliseconds?, point.error?.relative_rmse));
-    let Some((time, error)) = known(points[one]) else { return true };
-    let others = points.iter().enumerate().filter(|(place, _)| *place != one);
-    others.filter_map(|(_, other)| known(other)).any(|(other, its)| its <= error && other.is_below(&time))
 }
 
 /// The camera that takes the longest, by its median.
@@ -405,52 +294,4 @@ fn findings(
         front.len()
     );
     choice.into_iter().chain([ways]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ErrorOf;
-
-    fn point(time: f64, error: f64) -> Point {
-        let milliseconds = Spread::of(&[0.98 * time, time, 1.02 * time]);
-        Point {
-            milliseconds,
-            error: Some(ErrorOf { relative_rmse: error, ..ErrorOf::default() }),
-            ..Point::default()
-        }
-    }
-
-    #[test]
-    fn a_planted_optimum_is_chosen() {
-        let points =
-            [point(40.0, 0.0), point(20.0, 0.01), point(19.0, 0.2), point(5.0, 0.4), point(20.2, 0.01)];
-        let within = |milliseconds, error| choose(&points, Goal { milliseconds, error });
-        assert_eq!(within(Some(100.0), None), Some(0));
-        assert_eq!(within(Some(30.0), None), Some(1), "of two with the same error the cheaper");
-        assert_eq!(within(Some(19.5), None), Some(2));
-        assert_eq!(within(None, Some(0.05)), Some(1));
-        assert_eq!(within(None, Some(0.5)), Some(3));
-        assert_eq!(within(Some(30.0), Some(0.05)), Some(1));
-        let alike = [point(40.0, 0.0), point(30.0, 0.001), point(20.0, 0.003)];
-        assert_eq!(
-            choose(&alike, Goal { milliseconds: Some(50.0), error: None }),
-            Some(1),
-            "what looks alike is cheaper"
-        );
-        assert_eq!(within(Some(4.0), None), None);
-        assert_eq!(within(Some(30.0), Some(0.001)), None);
-        // A clear winner beats; one that lies within the quartiles does not.
-        let slower =
-            [point(40.0, 0.0), point(20.0, 0.01), point(9.0, 0.5), point(9.0, 0.5), point(30.0, 0.01)];
-        let beaten = |points: &[Point]| is_beaten(4, &points.iter().collect::<Vec<_>>());
-        assert!(beaten(&slower) && !beaten(&points));
-    }
-
-    #[test]
-    fn a_few_of_many_are_spread_over_them() {
-        assert_eq!(evenly(&[3, 1, 2], 5), [3, 1, 2]);
-        assert_eq!(evenly(&[0, 1, 2, 3, 4, 5, 6, 7, 8], 5), [0, 2, 4, 6, 8]);
-        assert_eq!(evenly(&[0, 1, 2, 3, 4, 5], 5), [0, 1, 2, 3, 5]);
-    }
 }

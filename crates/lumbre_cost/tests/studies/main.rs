@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
 mod counts;
+mod live;
 mod planted;
 mod shadows;
 mod tour;

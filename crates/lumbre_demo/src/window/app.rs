@@ -14,9 +14,10 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
 
+use super::accuracy::{Accuracy, choose};
 use super::keys;
 use super::mouse::{Drag, Grab};
-use super::overlay::{Facts, FileFacts, Overlay};
+use super::overlay::{Facts, FileFacts, LaidOut, Overlay};
 use super::stage::{OverlayFrame, Shown, Stage};
 use super::viewing::Viewing;
 use super::{PlayOptions, Trial};
@@ -39,6 +40,7 @@ pub struct App {
     window: Option<Arc<Window>>,
     stage: Option<Stage>,
     overlay: Overlay,
+    accuracy: Accuracy,
     egui: Option<egui_winit::State>,
     report: Option<Box<FrameReport>>,
     input: Input,
@@ -67,6 +69,7 @@ impl App {
             window: None,
             stage: None,
             overlay: Overlay::default(),
+            accuracy: Accuracy::default(),
             egui: None,
             report: None,
             input: Input::default(),
@@ -129,6 +132,7 @@ impl App {
         self.stage = None;
         let stage = Stage::new(event_loop, window.clone(), self.options.screenshot.is_some())?;
         self.overlay.forget_device();
+        self.accuracy.forget_device();
         let side = stage.gpu().device.limits().max_texture_dimension_2d as usize;
         let (context, scale) = (self.overlay.context.clone(), window.scale_factor() as f32);
         let viewport = egui::ViewportId::ROOT;
@@ -154,16 +158,44 @@ impl App {
         if self.viewing.update(passed) {
             self.show_new_file();
         }
-        let Some(replay) = &mut self.replay else {
+        if self.replay.is_none() && !self.accuracy.is_measuring() {
             self.viewing.opened.game.step(passed, &self.input);
             self.input = self.input.held();
-            return;
-        };
+        }
         for _ in 0..STEPS_PER_FRAME {
-            let Some((input, actions)) = replay.next() else { break };
-            actions.into_iter().for_each(|action| self.viewing.apply(action));
+            // What is measured side by side has to show the same.
+            if self.accuracy.is_measuring() {
+                break;
+            }
+            let Some((input, actions)) = self.replay.as_mut().and_then(Iterator::next) else { break };
+            actions.into_iter().for_each(|action| self.act(action));
             self.viewing.opened.game.step_once(&input);
         }
+    }
+
+    /// Carries out a command.
+    fn act(&mut self, action: Action) {
+        match action {
+            Action::ToggleReference => {
+                self.accuracy.toggle();
+                self.overlay.forget_reference();
+            }
+            Action::MeasureSettings if self.accuracy.cancel() => {}
+            Action::MeasureSettings if self.viewing.is_at_rest() => self.accuracy.measure(),
+            Action::MeasureSettings => self.viewing.say_that_it_works(),
+            Action::CheaperSettings | Action::BetterSettings => {
+                let options = self.frame_options();
+                let game = &mut self.viewing.opened.game;
+                let next = self.accuracy.next(game, &options, action == Action::BetterSettings);
+                if let Some(settings) = next {
+                    choose(game, &settings);
+                }
+            }
+            Action::ToggleOverlay | Action::Quit => {}
+            // What changes the picture ends the measuring of it.
+            _ => drop(self.accuracy.cancel()),
+        }
+        self.viewing.apply(action);
     }
 
     /// Another file has taken the place of the old one.
@@ -171,6 +203,8 @@ impl App {
         self.release();
         self.input = Input::default();
         self.report = None;
+        self.accuracy.forget_file();
+        self.overlay.forget_reference();
         self.follow_size();
         if !self.viewing.opened.game.has_a_start() {
             self.viewing.opened.game.orbit_everything();
@@ -188,9 +222,11 @@ impl App {
             lightmaps: view.lightmaps,
             // What moves is lit as what stands still is: by the bake, or without it.
             irradiance_volumes: view.lightmaps,
+            shadows: view.shadows,
             multisample: Some(view.multisample),
             missing_pipelines: MissingPipelines::Background,
             measure: match (view.overlay, view.count_lights) {
+                (false, _) if self.accuracy.is_shown() => Measure::Time,
                 (false, _) => Measure::Nothing,
                 (true, false) => Measure::TimeAndInvocations,
                 (true, true) => Measure::Lights,
@@ -206,12 +242,13 @@ impl App {
             self.viewing.measure(stage, &options)?;
         }
         options.exposure = self.viewing.exposure();
-        let facts = self.facts();
+        self.measure_accuracy(&options)?;
+        let facts = self.facts(&options);
         let (Some(window), Some(egui), Some(stage)) = (&self.window, &mut self.egui, &mut self.stage) else {
             return Ok(());
         };
         let input = egui.take_egui_input(window);
-        let mut output = self.overlay.lay_out(input, &facts, self.report.as_deref());
+        let LaidOut { mut output, wishes } = self.overlay.lay_out(input, &facts, self.report.as_deref());
         if !self.grab.is_held() {
             // It sets the pointer's shape, and with that shows it: not while it is hidden.
             egui.handle_platform_output(window, std::mem::take(&mut output.platform_output));
@@ -219,6 +256,11 @@ impl App {
         let scale = output.pixels_per_point;
         let triangles = self.overlay.context.tessellate(output.shapes, scale);
         let frame = OverlayFrame { triangles, textures: output.textures_delta, scale };
+        let front = facts.accuracy.front.as_ref();
+        let wished = front.zip(wishes.settings).and_then(|(front, place)| front.ways.get(place));
+        if let Some(way) = wished {
+            choose(&mut self.viewing.opened.game, &way.settings);
+        }
         match stage.show(&mut self.viewing.opened.game.world, &options, frame)? {
             Shown::Frame(report) => {
                 self.report = Some(report);
@@ -230,6 +272,20 @@ impl App {
         }
         self.grab.recentre(window_of(&self.window)?);
         self.after_frame(event_loop, &options)
+    }
+
+    /// Draws what is measured beside the frames.
+    fn measure_accuracy(&mut self, options: &FrameOptions) -> Result<()> {
+        let Some(stage) = &self.stage else { return Ok(()) };
+        let world = &mut self.viewing.opened.game.world;
+        match self.accuracy.update(stage.gpu(), stage.size(), world, options) {
+            Ok(Some(beside)) => self.overlay.show_reference(beside.size, &beside.rgba),
+            Ok(None) => {}
+            // The next frame makes another device.
+            Err(_) if stage.gpu().is_lost() => {}
+            Err(error) => return Err(error.into()),
+        }
+        Ok(())
     }
 
     /// Makes a new device in place of one that is gone.
@@ -249,7 +305,8 @@ impl App {
         let played = self.replay.as_ref().is_some_and(|replay| replay.len() == 0);
         let counted = self.options.quit_after.is_some_and(|after| self.frames >= u64::from(after));
         let is_over = counted || (played && self.options.quit_after.is_none());
-        let waits = self.options.wait_for_work && !self.viewing.is_at_rest();
+        let measured = self.accuracy.is_at_rest(&self.viewing.opened.game, options);
+        let waits = self.options.wait_for_work && !(self.viewing.is_at_rest() && measured);
         if !(is_over && !waits || self.viewing.opened.game.wants_to_quit()) {
             return Ok(());
         }
@@ -279,14 +336,15 @@ impl App {
                     }
                 }
                 (Trial::Drop(path), _, _) => self.viewing.open(&path),
-                (Trial::Act(action), _, _) => self.viewing.apply(action),
+                (Trial::Act(action), _, _) => self.act(action),
                 (Trial::Escape, _, _) => self.escape(),
                 _ => {}
             }
         }
     }
 
-    fn facts(&self) -> Facts {
+    fn facts(&mut self, options: &FrameOptions) -> Facts {
+        let accuracy = self.accuracy.facts(&mut self.viewing.opened.game, options);
         let game = &self.viewing.opened.game;
         let lit = game.world.get::<Light>(game.torch()).is_some_and(|light| light.enabled);
         let opened = &self.viewing.opened;
@@ -302,6 +360,7 @@ impl App {
             is_level: game.has_a_start(),
             exposure: self.viewing.exposure(),
             adapts: self.viewing.adapts(),
+            accuracy,
             file: FileFacts {
                 name: opened.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
                 notes: opened.notes.clone(),
@@ -324,17 +383,17 @@ impl App {
             return;
         }
         match keys::action(key) {
-            Some(action) => self.viewing.apply(action),
+            Some(action) => self.act(action),
             None if key == KeyCode::Escape => self.escape(),
             None => {}
         }
     }
 
-    /// Frees the mouse, or ends the bake that runs.
+    /// Frees the mouse, or ends what is measured, or the bake that runs.
     fn escape(&mut self) {
         if self.grab.is_held() {
             self.release();
-        } else {
+        } else if !self.accuracy.cancel() {
             self.viewing.cancel();
         }
     }

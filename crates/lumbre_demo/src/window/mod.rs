@@ -1,10 +1,12 @@
 //! A level or any other glTF file in a window: events in, frames out. Not the rules of the game: those know no window.
 
+mod accuracy;
 mod app;
 mod keys;
 mod mouse;
 mod overlay;
 mod overlay_accounting;
+mod overlay_accuracy;
 mod overlay_file;
 mod overlay_painter;
 mod stage;

@@ -7,9 +7,11 @@ use egui::{Color32, RichText, Sense, Stroke, Ui, pos2, vec2};
 use lumbre_graph::{GpuTime, PassExplanation, PassReport};
 use lumbre_render::FrameReport;
 
+use super::accuracy::AccuracyFacts;
+use super::overlay_accuracy::Wishes;
 pub use super::overlay_file::FileFacts;
 use super::overlay_file::{DIM, GOOD, WARM};
-use super::{overlay_accounting, overlay_file};
+use super::{overlay_accounting, overlay_accuracy, overlay_file};
 use crate::ViewSettings;
 
 /// Frames in the graph: two seconds at 60 per second.
@@ -44,14 +46,33 @@ pub struct Facts {
     pub adapts: bool,
     /// The file.
     pub file: FileFacts,
+    /// What is known of accuracy and its price.
+    pub accuracy: AccuracyFacts,
 }
 
 /// The overlay and what it remembers.
-#[derive(Default)]
 pub struct Overlay {
     /// Its own state; made anew with every device, as the fonts live there.
     pub context: egui::Context,
     frame_ms: VecDeque<f32>,
+    /// The most accurate picture of the view.
+    reference: Option<egui::TextureHandle>,
+    /// Where the frame ends and the reference begins, 0 to 1 from the left.
+    split: f32,
+}
+
+impl Default for Overlay {
+    fn default() -> Self {
+        Self { context: egui::Context::default(), frame_ms: VecDeque::default(), reference: None, split: 0.5 }
+    }
+}
+
+/// A frame of the overlay, and what was asked for in it.
+pub struct LaidOut {
+    /// What is to be painted. Whoever takes it applies its textures.
+    pub output: egui::FullOutput,
+    /// What was asked for.
+    pub wishes: Wishes,
 }
 
 impl Overlay {
@@ -65,19 +86,41 @@ impl Overlay {
 
     /// Forgets the fonts that were uploaded to a device that is gone.
     pub fn forget_device(&mut self) {
+        // The texture lives in the context.
+        self.reference = None;
         self.context = egui::Context::default();
     }
 
-    /// Lays out one frame. Whoever takes the output applies its textures.
+    /// Shows this reference from now on, of `size` pixels, each red, green, blue and alpha.
+    pub fn show_reference(&mut self, size: (u32, u32), rgba: &[u8]) {
+        let image = egui::ColorImage::from_rgba_unmultiplied([size.0 as usize, size.1 as usize], rgba);
+        let options = egui::TextureOptions::NEAREST;
+        match &mut self.reference {
+            Some(texture) => texture.set(image, options),
+            None => self.reference = Some(self.context.load_texture("reference", image, options)),
+        }
+    }
+
+    /// Shows none any more.
+    pub fn forget_reference(&mut self) {
+        self.reference = None;
+    }
+
+    /// Lays out one frame.
     #[must_use]
-    pub fn lay_out(
-        &self,
-        input: egui::RawInput,
-        facts: &Facts,
-        report: Option<&FrameReport>,
-    ) -> egui::FullOutput {
-        self.context.run_ui(input, |root| {
+    pub fn lay_out(&mut self, input: egui::RawInput, facts: &Facts, report: Option<&FrameReport>) -> LaidOut {
+        let (context, mut split, mut wishes) = (self.context.clone(), self.split, Wishes::default());
+        let output = context.run_ui(input, |root| {
+            if let (true, Some(reference)) = (facts.accuracy.is_shown, &self.reference) {
+                overlay_accuracy::reference_beside(root, reference, &mut split);
+            }
             overlay_file::status(root, &facts.file);
+            if facts.accuracy.is_shown {
+                let accounting = report.and_then(|report| report.accounting.as_deref());
+                // A frame may be laid out twice; what was asked for first stands.
+                let asked = overlay_accuracy::panel(root, &facts.accuracy, accounting);
+                wishes = Wishes { settings: wishes.settings.or(asked.settings) };
+            }
             if !facts.view.overlay {
                 return;
             }
@@ -88,7 +131,9 @@ impl Overlay {
                 .resizable(false)
                 .default_width(GRAPH_SIZE.x)
                 .show(root.ctx(), |ui| self.contents(ui, facts, report));
-        })
+        });
+        self.split = split;
+        LaidOut { output, wishes }
     }
 
     fn contents(&self, ui: &mut Ui, facts: &Facts, report: Option<&FrameReport>) {
@@ -234,6 +279,9 @@ fn choices(ui: &mut Ui, facts: &Facts) {
             ("R", "reflection", reflection),
             ("L", "baked light", switch(view.lightmaps)),
             ("M", "multisampling", switch(view.multisample)),
+            ("X", "reference beside it", switch(facts.accuracy.is_shown)),
+            ("P", "price of lights, settings", if facts.accuracy.front.is_some() { "measured" } else { "" }),
+            (", .", "cheaper, better", if facts.accuracy.front.is_some() { "" } else { "once measured" }),
             ("T", "torch", switch(facts.torch)),
             ("F", "flight", if facts.is_player { switch(facts.flying) } else { "" }),
             ("N", "counts of lights", switch(view.count_lights)),
@@ -269,7 +317,7 @@ fn exposure_value(factor: f32) -> f64 {
 mod tests {
     use super::*;
 
-    fn texts(overlay: &Overlay, facts: &Facts) -> String {
+    fn texts(overlay: &mut Overlay, facts: &Facts) -> String {
         fn collect(shape: &egui::Shape, text: &mut String) {
             match shape {
                 egui::Shape::Text(one) => {
@@ -285,9 +333,9 @@ mod tests {
             ..egui::RawInput::default()
         };
         // A window is laid out on its first frame and shown on its second.
-        overlay.lay_out(input(), facts, None).drop_without_applying_deltas();
+        overlay.lay_out(input(), facts, None).output.drop_without_applying_deltas();
         let mut text = String::new();
-        let output = overlay.lay_out(input(), facts, None);
+        let output = overlay.lay_out(input(), facts, None).output;
         for clipped in &output.shapes {
             collect(&clipped.shape, &mut text);
         }
@@ -305,7 +353,7 @@ mod tests {
         let mut facts = Facts { device: "a test device".into(), size: (640, 480), ..Facts::default() };
         facts.view.shading = Some(lumbre_optics::Shading::Gouraud);
         facts.torch = true;
-        let text = texts(&overlay, &facts);
+        let text = texts(&mut overlay, &facts);
         for wanted in
             ["20.00 ms  (50 per second", "a test device, 640 x 480", "gouraud", "torch", "as the file asks"]
         {
@@ -330,7 +378,7 @@ mod tests {
             }),
             ..FileFacts::default()
         };
-        let text = texts(&Overlay::default(), &facts);
+        let text = texts(&mut Overlay::default(), &facts);
         for wanted in [
             "room.glb",
             "node 0: left out",
@@ -355,13 +403,13 @@ mod tests {
             Facts { view: ViewSettings { overlay: false, ..ViewSettings::default() }, ..Facts::default() };
         let text = "broken.glb: is no glTF file".to_owned();
         facts.file.message = Some(super::super::viewing::Message { text: text.clone(), is_error: true });
-        assert_eq!(texts(&Overlay::default(), &facts).trim(), text);
+        assert_eq!(texts(&mut Overlay::default(), &facts).trim(), text);
     }
 
     #[test]
     fn says_nothing_when_it_is_off() {
         let facts =
             Facts { view: ViewSettings { overlay: false, ..ViewSettings::default() }, ..Facts::default() };
-        assert_eq!(texts(&Overlay::default(), &facts), "");
+        assert_eq!(texts(&mut Overlay::default(), &facts), "");
     }
 }

@@ -227,6 +227,11 @@ impl Viewing {
         self.message.as_ref()
     }
 
+    /// Says why nothing can be measured now.
+    pub fn say_that_it_works(&mut self) {
+        self.say("what settings cost can be measured when the bake has ended".to_owned());
+    }
+
     fn say(&mut self, text: String) {
         self.message = Some(Message { text, is_error: false });
     }

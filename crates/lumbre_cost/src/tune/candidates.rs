@@ -1,0 +1,128 @@
+//! The ways to draw a level that are still in the running: what a stage has to measure, and what another way beats. Not the measuring.
+
+use super::draw_settings::{Choices, DrawSettings, Stage};
+use crate::{Point, Spread, pareto_front};
+
+/// What is known of the ways to draw a level so far.
+#[derive(Default)]
+pub(crate) struct Candidates {
+    /// The ways.
+    pub settings: Vec<DrawSettings>,
+    /// A point for each of them.
+    pub points: Vec<Point>,
+    /// Those that were measured last, side by side: only their times can be compared.
+    latest: Vec<usize>,
+}
+
+/// Ways from which a stage goes on, at most: those that no other one beats, spread evenly over them if there are more.
+const CARRIED_ON: usize = 5;
+
+impl Candidates {
+    /// What a stage has to measure: those that are still in the running, and what differs from the best of them in what the stage chooses.
+    pub fn next(&self, stage: Stage, choices: &Choices) -> Vec<DrawSettings> {
+        if self.latest.is_empty() {
+            let reference = choices.reference();
+            let others = stage.others(reference, choices);
+            return [reference].into_iter().chain(others).collect();
+        }
+        let running: Vec<DrawSettings> = self.contenders().iter().map(|&one| self.settings[one]).collect();
+        let points: Vec<Point> = self.contenders().iter().map(|&one| self.points[one].clone()).collect();
+        let place = |point: &Point| points.iter().position(|other| std::ptr::eq(other, point));
+        let front: Vec<usize> = pareto_front(&points).into_iter().filter_map(place).collect();
+        let mut ways = running.clone();
+        for from in evenly(&front, CARRIED_ON) {
+            for other in stage.others(running[from], choices) {
+                if !ways.contains(&other) {
+                    ways.push(other);
+                }
+            }
+        }
+        // Nothing to choose: what is known is known.
+        if ways.len() == running.len() { Vec::new() } else { ways }
+    }
+
+    /// Begins to take what was measured side by side: what was measured before cannot be compared with it.
+    pub fn begin(&mut self) {
+        self.latest.clear();
+    }
+
+    /// Takes a way's time, and its point if nothing was known of it.
+    ///
+    /// # Errors
+    /// Those of `point`, which is asked for a new way with what it is called; nothing comes of a way without a point.
+    pub fn take<E>(
+        &mut self,
+        way: DrawSettings,
+        milliseconds: Option<Spread>,
+        point: impl FnOnce(String) -> Result<Option<Point>, E>,
+    ) -> Result<(), E> {
+        let place = match self.settings.iter().position(|known| *known == way) {
+            Some(place) => place,
+            None => {
+                let label = way.label(self.settings.first().unwrap_or(&way));
+                let Some(point) = point(label)? else { return Ok(()) };
+                self.settings.push(way);
+                self.points.push(point);
+                self.points.len() - 1
+            }
+        };
+        self.points[place].milliseconds = milliseconds;
+        self.latest.push(place);
+        Ok(())
+    }
+
+    /// Those of the last that no other one of them beats.
+    pub fn contenders(&self) -> Vec<usize> {
+        let latest: Vec<&Point> = self.latest.iter().map(|&one| &self.points[one]).collect();
+        let kept = (0..latest.len()).filter(|&one| !is_beaten(one, &latest));
+        kept.map(|one| self.latest[one]).collect()
+    }
+}
+
+/// At most so many of them, the first and the last among them.
+fn evenly(all: &[usize], most: usize) -> Vec<usize> {
+    let last = all.len().saturating_sub(1);
+    match all.len() <= most {
+        true => all.to_vec(),
+        false => (0..most).map(|place| all[place * last / (most - 1)]).collect(),
+    }
+}
+
+/// Whether another one is as accurate and takes less time, quartiles and all.
+fn is_beaten(one: usize, points: &[&Point]) -> bool {
+    let known = |point: &Point| Some((point.milliseconds?, point.error?.relative_rmse));
+    let Some((time, error)) = known(points[one]) else { return true };
+    let others = points.iter().enumerate().filter(|(place, _)| *place != one);
+    others.filter_map(|(_, other)| known(other)).any(|(other, its)| its <= error && other.is_below(&time))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ErrorOf, Spread};
+
+    fn point(time: f64, error: f64) -> Point {
+        let milliseconds = Spread::of(&[0.98 * time, time, 1.02 * time]);
+        Point {
+            milliseconds,
+            error: Some(ErrorOf { relative_rmse: error, ..ErrorOf::default() }),
+            ..Point::default()
+        }
+    }
+
+    #[test]
+    fn a_clear_winner_beats_and_one_within_the_quartiles_does_not() {
+        let beaten = |points: &[Point]| is_beaten(4, &points.iter().collect::<Vec<_>>());
+        let ways = |fifth: f64| {
+            [point(40.0, 0.0), point(20.0, 0.01), point(9.0, 0.5), point(9.0, 0.5), point(fifth, 0.01)]
+        };
+        assert!(beaten(&ways(30.0)) && !beaten(&ways(20.2)));
+    }
+
+    #[test]
+    fn a_few_of_many_are_spread_over_them() {
+        assert_eq!(evenly(&[3, 1, 2], 5), [3, 1, 2]);
+        assert_eq!(evenly(&[0, 1, 2, 3, 4, 5, 6, 7, 8], 5), [0, 2, 4, 6, 8]);
+        assert_eq!(evenly(&[0, 1, 2, 3, 4, 5], 5), [0, 1, 2, 3, 5]);
+    }
+}

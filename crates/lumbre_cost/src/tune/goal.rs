@@ -1,0 +1,67 @@
+//! What settings have to keep, and which of several keeps it best. Not how they are measured.
+
+use crate::Point;
+
+/// What settings have to keep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Goal {
+    /// Milliseconds that a frame may take, at the camera that takes the longest.
+    pub milliseconds: Option<f64>,
+    /// Relative RMSE against the most accurate settings, at the camera that is the farthest off.
+    pub error: Option<f64>,
+}
+
+/// Errors that are no farther apart look alike: a quarter of a step of eight bits, in a picture of half grey.
+const ALIKE: f64 = 0.002;
+
+/// The setting that keeps the goal best: the least error where a time is given, and of those that look alike the cheapest; else the least time.
+pub(crate) fn choose(points: &[Point], goal: Goal) -> Option<usize> {
+    let known = points
+        .iter()
+        .enumerate()
+        .filter_map(|(place, point)| Some((place, point.milliseconds?.median, point.error?.relative_rmse)));
+    let keeps = |(_, time, error): &(usize, f64, f64)| {
+        goal.milliseconds.is_none_or(|most| *time <= most) && goal.error.is_none_or(|most| *error <= most)
+    };
+    let kept: Vec<(usize, f64, f64)> = known.filter(keeps).collect();
+    let least = kept.iter().map(|(.., error)| *error).fold(f64::INFINITY, f64::min);
+    let most = if goal.milliseconds.is_some() { least + ALIKE } else { f64::INFINITY };
+    let alike = kept.into_iter().filter(|(.., error)| *error <= most);
+    alike.min_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2))).map(|(place, ..)| place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ErrorOf, Spread};
+
+    fn point(time: f64, error: f64) -> Point {
+        let milliseconds = Spread::of(&[0.98 * time, time, 1.02 * time]);
+        Point {
+            milliseconds,
+            error: Some(ErrorOf { relative_rmse: error, ..ErrorOf::default() }),
+            ..Point::default()
+        }
+    }
+
+    #[test]
+    fn a_planted_optimum_is_chosen() {
+        let points =
+            [point(40.0, 0.0), point(20.0, 0.01), point(19.0, 0.2), point(5.0, 0.4), point(20.2, 0.01)];
+        let within = |milliseconds, error| choose(&points, Goal { milliseconds, error });
+        assert_eq!(within(Some(100.0), None), Some(0));
+        assert_eq!(within(Some(30.0), None), Some(1), "of two with the same error the cheaper");
+        assert_eq!(within(Some(19.5), None), Some(2));
+        assert_eq!(within(None, Some(0.05)), Some(1));
+        assert_eq!(within(None, Some(0.5)), Some(3));
+        assert_eq!(within(Some(30.0), Some(0.05)), Some(1));
+        let alike = [point(40.0, 0.0), point(30.0, 0.001), point(20.0, 0.003)];
+        assert_eq!(
+            choose(&alike, Goal { milliseconds: Some(50.0), error: None }),
+            Some(1),
+            "what looks alike is cheaper"
+        );
+        assert_eq!(within(Some(4.0), None), None);
+        assert_eq!(within(Some(30.0), Some(0.001)), None);
+    }
+}
