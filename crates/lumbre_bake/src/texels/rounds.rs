@@ -30,6 +30,12 @@ const PASS: f32 = 0.7;
 /// Of the squared error asked for, what a round aims at: a good deal less than what ends the rounds. Its estimates are rough, and another round would
 /// smooth everything once more.
 const AIM: f64 = 0.55;
+/// The same where all that is left to do is a small step: a round's estimates are the better the less it lowers.
+const NEAR_AIM: f64 = 0.9;
+/// What was asked, over the squared error that is left, from which on the rest is a small step; and by how much its rays may be more than the
+/// quality's most: a map that ends a hair beyond what was asked helps nobody.
+const NEAR: f64 = 0.8;
+const NEAR_RAYS: f64 = 1.25;
 /// Order of the variance's fall with the samples: between random ones (1) and Sobol's of something smooth (3).
 const ORDER: f64 = 1.25;
 /// The most by which a round lowers the part that rays leave: the first estimates are rough.
@@ -248,15 +254,19 @@ impl<'a> Judge<'a> {
         // What they may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
         let rest = found.sum - helped;
         let asked = self.count() * self.options.error.powi(2);
-        let goal = (AIM * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
+        let reached = asked / found.sum.max(f64::MIN_POSITIVE);
+        let is_near = reached > NEAR;
+        let aim = AIM.max(NEAR_AIM * reached);
+        let goal = (aim * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
         // Rays are given out by the cautious figures; the goal is one of expected ones.
         let goal = goal * open_sum(self.texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
         let most_of_all = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
+        let most_of_all = if is_near { (most_of_all as f64 * NEAR_RAYS) as u64 } else { most_of_all };
         let budget = most_of_all.saturating_sub(cast);
         // What little is left of it is not worth another smoothing.
-        let spent = (budget as f64) < LEAST_ROUND * cast as f64;
+        let spent = !is_near && (budget as f64) < LEAST_ROUND * cast as f64;
         let open = self.open.iter().copied();
         let wanted = allot_within(budget, open, &by_rays.cautious, &samples, most, ORDER, goal);
         Next { helped, is_last: spent || wanted.is_empty(), wanted }
