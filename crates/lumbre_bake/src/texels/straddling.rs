@@ -1,5 +1,5 @@
 //! Texels that a wall thinner than themselves crosses, with surface in the open on both sides of it: one value for both. They show that
-//! value, but do not hand it on: see `divided_light`. Not texels that are hidden in part: those hold the light of the part in the open.
+//! value, but do not hand it on: rays read the patches there, which end at the wall. Not texels that are hidden in part: those hold the light of the part in the open.
 
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -14,12 +14,6 @@ use crate::transport::contacts::{PlaneFrame, contacts};
 const SHORTEST: f64 = 0.25;
 /// Texels beside a line that do not count as beyond it.
 const MARGIN: f64 = 0.05;
-
-/// A texel that contact lines divide: its place among those covered, and the lines' parts in its unit square.
-pub(crate) struct Straddling {
-    pub texel: CoveredTexel,
-    pub lines: Vec<[DVec2; 2]>,
-}
 
 /// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
 pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
@@ -40,19 +34,16 @@ pub(crate) fn straddling(
     layout: &LightmapLayout,
     texels: &[Texel],
     crossed: &[(MapTexel, [DVec2; 2])],
-) -> Vec<Straddling> {
+) -> Vec<CoveredTexel> {
     let mut covered = vec![None; layout.texels];
     for (place, texel) in texels.iter().enumerate() {
         covered[texel.index.place()] = Some(CoveredTexel::new(place));
     }
-    let mut found: Vec<Straddling> = Vec::new();
+    let mut found: Vec<CoveredTexel> = Vec::new();
     for &(index, line) in crossed {
         let Some(texel) = covered[index.place()] else { continue };
-        if is_divided(&texels[texel.place()], line) {
-            match found.last_mut() {
-                Some(last) if last.texel == texel => last.lines.push(line),
-                _ => found.push(Straddling { texel, lines: vec![line] }),
-            }
+        if found.last() != Some(&texel) && is_divided(&texels[texel.place()], line) {
+            found.push(texel);
         }
     }
     found
@@ -185,23 +176,5 @@ mod tests {
         let block = shapes::cuboid(Vec3::ONE, 1);
         let standing = crossed_texels(vec![(room, DVec3::ZERO), (block, DVec3::new(0.3, -1.0, 0.4))]);
         assert!((56..90).contains(&standing), "{standing}");
-    }
-
-    #[test]
-    fn a_line_ends_where_its_triangle_does() {
-        let corners = [DVec2::ZERO, DVec2::new(4.0, 0.0), DVec2::new(0.0, 4.0)];
-        let backwards = [corners[0], corners[2], corners[1]];
-        let line = |a: [f64; 2], b: [f64; 2]| [DVec2::from(a), DVec2::from(b)];
-        for corners in [corners, backwards] {
-            let crossing = inside(corners, line([-1.0, 1.0], [9.0, 1.0])).expect("it crosses");
-            assert!(crossing[0].distance(DVec2::new(0.0, 1.0)) < 1e-12, "{crossing:?}");
-            assert!(crossing[1].distance(DVec2::new(3.0, 1.0)) < 1e-12, "{crossing:?}");
-            let within = line([0.5, 0.5], [1.0, 2.0]);
-            assert_eq!(inside(corners, within), Some(within));
-            // Beside an edge, past a corner, and along the prolonged edge.
-            assert_eq!(inside(corners, line([1.0, -0.1], [2.0, -0.1])), None);
-            assert_eq!(inside(corners, line([3.9, 2.0], [2.0, 3.9])), None);
-            assert_eq!(inside(corners, line([5.0, 0.0], [6.0, 0.0])), None);
-        }
     }
 }

@@ -53,3 +53,38 @@ pub(crate) fn clip_segment(polygon: &[DVec2], [p, q]: [DVec2; 2]) -> Option<[DVe
     }
     (from < to).then(|| [p.lerp(q, from), p.lerp(q, to)])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: [DVec2; 3] = [DVec2::ZERO, DVec2::new(4.0, 0.0), DVec2::new(0.0, 4.0)];
+
+    #[test]
+    fn a_segment_ends_where_the_polygon_does() {
+        let part = |a: [f64; 2], b: [f64; 2]| clip_segment(&TRIANGLE, [a.into(), b.into()]);
+        let crossing = part([-1.0, 1.0], [9.0, 1.0]).expect("it crosses");
+        assert!(crossing[0].distance(DVec2::new(0.0, 1.0)) < 1e-12, "{crossing:?}");
+        assert!(crossing[1].distance(DVec2::new(3.0, 1.0)) < 1e-12, "{crossing:?}");
+        assert_eq!(part([0.5, 0.5], [1.0, 2.0]), Some([DVec2::new(0.5, 0.5), DVec2::new(1.0, 2.0)]));
+        // Beside an edge, past a corner, and along the prolonged edge.
+        assert_eq!(part([1.0, -0.1], [2.0, -0.1]), None);
+        assert_eq!(part([3.9, 2.0], [2.0, 3.9]), None);
+        assert_eq!(part([5.0, 0.0], [6.0, 0.0]), None);
+    }
+
+    #[test]
+    fn corners_on_the_plane_stay_once() {
+        let part = |height: &dyn Fn(DVec2) -> f64| {
+            let mut corners = Vec::new();
+            clip(&TRIANGLE, height, |corner| corners.push(corner));
+            corners
+        };
+        assert_eq!(part(&|p| p.x + 1.0), TRIANGLE);
+        assert_eq!(part(&|p| p.x), TRIANGLE);
+        assert!(part(&|p| -p.x - 1.0).is_empty());
+        assert_eq!(part(&|p| p.x - 1.0), [[1.0, 0.0], [4.0, 0.0], [1.0, 3.0]].map(DVec2::from));
+        // Through a corner and the middle of the edge before it.
+        assert_eq!(part(&|p| p.y - p.x), [[0.0, 0.0], [2.0, 2.0], [0.0, 4.0]].map(DVec2::from));
+    }
+}
