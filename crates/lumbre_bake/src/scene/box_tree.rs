@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 
-use super::SceneTriangle;
 use crate::cancel_token::CancelToken;
 
 /// Triangles of a leaf.
@@ -26,10 +25,10 @@ pub(crate) struct BoxTree {
 }
 
 impl BoxTree {
-    /// Of the triangles that light meets.
-    pub fn new(triangles: &[SceneTriangle], stop: &CancelToken) -> Self {
+    /// Of triangles by their corners; those whose corners are NaN are left out, and the others keep their numbers.
+    pub fn new(triangles: &[[Vec3; 3]], stop: &CancelToken) -> Self {
         let mut items: Vec<u32> =
-            (0..triangles.len() as u32).filter(|&index| !triangles[index as usize].superseded).collect();
+            (0..triangles.len() as u32).filter(|&index| !triangles[index as usize][0].is_nan()).collect();
         let mut nodes = Vec::with_capacity(2 * items.len() / LEAF + 1);
         if !items.is_empty() {
             let end = items.len();
@@ -72,14 +71,14 @@ impl BoxTree {
 
 /// Halves by the median along the longest axis.
 fn build(
-    (triangles, stop): (&[SceneTriangle], &CancelToken),
+    (triangles, stop): (&[[Vec3; 3]], &CancelToken),
     items: &mut [u32],
     first: usize,
     end: usize,
     nodes: &mut Vec<Node>,
 ) {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for corner in items[first..end].iter().flat_map(|&index| triangles[index as usize].corners) {
+    for corner in items[first..end].iter().flat_map(|&index| triangles[index as usize]) {
         (low, high) = (low.min(corner), high.max(corner));
     }
     let (index, count) = (nodes.len(), end - first);
@@ -89,8 +88,7 @@ fn build(
         return;
     }
     let axis = (high - low).max_position();
-    let middle =
-        |&index: &u32| triangles[index as usize].corners.iter().map(|corner| corner[axis]).sum::<f32>();
+    let middle = |&index: &u32| triangles[index as usize].iter().map(|corner| corner[axis]).sum::<f32>();
     items[first..end].sort_by(|a, b| middle(a).total_cmp(&middle(b)).then(a.cmp(b)));
     let half = first + count / 2;
     build((triangles, stop), items, first, half, nodes);

@@ -173,7 +173,7 @@ impl BakeScene {
         mark_superseded(&mut triangles, &surfaces, warnings);
         let solid: Vec<[Vec3; 3]> = triangles
             .iter()
-            // The hierarchy leaves out what is not finite, and keeps the indices.
+            // Both trees leave out what is not a number, and keep the indices.
             .map(|t| if t.superseded { [Vec3::NAN; 3] } else { t.corners })
             .collect();
         let masked = surfaces.iter().any(SurfaceMaterial::is_masked);
@@ -182,7 +182,7 @@ impl BakeScene {
         Ok(Self {
             space,
             bvh: Bvh::build(&solid),
-            boxes: BoxTree::new(&triangles, stop),
+            boxes: BoxTree::new(&solid, stop),
             triangles,
             names: objects.iter().map(|object| object.name.clone()).collect(),
             surfaces,

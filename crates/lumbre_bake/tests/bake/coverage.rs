@@ -145,6 +145,7 @@ fn judged(name: &str, texels_per_meter: f64) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "slow: scripts/test --all runs it"]
 fn of_scenes_that_no_constant_was_chosen_on() {
     let scenes = [("rooms_41", 6.0), ("rooms_57", 6.0), ("hall_41", 4.0), ("hall_57", 4.0)];
     let mut sums = [0.0; 3];
