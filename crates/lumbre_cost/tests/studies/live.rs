@@ -57,9 +57,9 @@ fn costs(side: &mut SideView, world: &mut World) -> Vec<LightCost> {
     }
 }
 
-/// Light that hardly bends between vertices is Gouraud's; what is exact is at the end of the front.
+/// Light that hardly bends between vertices wants no more than Gouraud shading, and flat shading is too far off; what is exact is at the end of the front.
 #[test]
-fn a_views_front_finds_a_planted_optimum() {
+fn a_views_front_leads_from_what_is_cheap_to_what_is_exact() {
     let mut world = floor(16);
     for number in 0..24 {
         let (x, z) = (f64::from(number % 6) - 2.5, f64::from(number / 6) - 1.5);
@@ -69,10 +69,15 @@ fn a_views_front_finds_a_planted_optimum() {
     update_transforms(&mut world);
     let options = FrameOptions { multisample: Some(true), ..FrameOptions::default() };
     let found = front(&mut side(), &mut world, &options);
+    // Which of the ways is the cheapest the hour may decide; how far off they are it does not.
     let cheap = &found.ways[found.within_error(0.01)];
-    assert_eq!((cheap.settings.shading, cheap.settings.multisample), (Shading::Gouraud, false), "{found:?}");
+    assert!(cheap.error <= 0.01 && cheap.settings.shading != Shading::Flat, "{found:?}");
     let best = found.ways.last().expect("there is a front");
     assert!(best.error < 1e-4, "{best:?}");
+    for pair in found.ways.windows(2) {
+        let dearer = pair[0].milliseconds.median <= pair[1].milliseconds.median;
+        assert!(dearer && pair[0].error > pair[1].error, "{pair:?} are no front");
+    }
     // As it was drawn: flat, with four samples.
     assert_eq!((found.now.settings.shading, found.now.settings.multisample), (Shading::Flat, true));
     assert!(found.now.error > 0.01, "{:?}", found.now);

@@ -248,5 +248,5 @@ fn an_interruption_keeps_the_studies_that_are_finished() {
 #[test]
 fn a_study_that_there_is_none_of_is_refused_by_name() {
     let error = studies_named(&["shading".into(), "shadnig".into()]).unwrap_err().to_string();
-    assert!(error.contains("`shadnig`") && error.contains("shading, need, lamps"), "{error}");
+    assert!(error.contains("`shadnig`") && error.contains("shading, scan, need, lamps"), "{error}");
 }
