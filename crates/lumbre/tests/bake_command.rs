@@ -138,7 +138,7 @@ fn killed_again_and_again_it_ends_with_the_same_bytes() {
                 break Some(status);
             }
             // The first time at the very beginning.
-            if (kills == 0 && place.checkpoint().exists()) || length() > before + 60_000 {
+            if (kills == 0 && place.checkpoint().exists()) || length() > before + 30_000 {
                 break None;
             }
             std::thread::sleep(Duration::from_millis(1));

@@ -104,7 +104,7 @@ fn bad_arguments_are_refused_with_what_to_do() {
         (
             &["cost", "-o", &out, "--study", "shadnig"],
             1,
-            "there is no study `shadnig`; there are: shading, need, lamps",
+            "there is no study `shadnig`; there are: shading, scan, need, lamps",
         ),
         (&["cost", "-o", &out, "--size", "4x4"], 2, "each from 8 to 4096"),
         (&["cost", "-o", &out, "--size", "9000x10"], 2, "each from 8 to 4096"),
