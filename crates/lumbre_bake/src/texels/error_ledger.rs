@@ -21,8 +21,7 @@
 //! what the sum above leaves at a texel's centre, where its neighbours' slope brings it, and `seams` adds by how much a texel was moved.
 //!
 //! Of a single texel a cautious figure is stated, of the whole map the expected one: cautious figures of many texels add up to far more than the map's
-//! error. The tests `honest_error` hold both against converged bakes, and `coverage` holds the former against the tests' path
-//! tracer, in scenes that no constant was chosen on.
+//! error. The tests `honest_error` hold both against converged bakes.
 //!
 //! Not in it: the map's own resolution, and what a penumbra hides that all samples of a texel and of its neighbours missed.
 
