@@ -44,6 +44,8 @@ const MOST_OF_A_ROUND: f64 = 8.0;
 const LEAST_ROUND: f64 = 0.15;
 /// A round that leaves more than this of the squared error that it was to lower was the last.
 const STALLED: f64 = 0.95;
+/// The same of a round that was a small step.
+const SMALL_STEPS_END: f64 = 0.995;
 
 /// What the rounds have found, for every covered texel.
 #[derive(Default)]
@@ -91,7 +93,7 @@ pub(crate) fn gather(
     let mut wanted = judge.first_samples(&gathered);
     // With everything kept there is nothing that the former bake did not know when it ended.
     let settled = kept.is_some() && wanted.is_empty();
-    let (mut helped_before, mut is_first) = (f64::INFINITY, true);
+    let (mut helped_before, mut was_near, mut is_first) = (f64::INFINITY, false, true);
     let found = loop {
         watch.pass(PASS);
         if is_first && options.time.is_some() {
@@ -105,8 +107,10 @@ pub(crate) fn gather(
         let found = judge.found(&gathered, cache.patches.mean_reflectance(), watch, report)?;
         let late = !in_time || watch.clock().late();
         let next = judge.next(&gathered, &found);
-        let helpless = next.helped <= WORTH_RAYS * found.sum || next.helped > STALLED * helped_before;
-        helped_before = next.helped;
+        // A small step lowers little, and tells nothing of what a larger one would.
+        let stalled = next.helped > if was_near { SMALL_STEPS_END } else { STALLED } * helped_before;
+        let helpless = next.helped <= WORTH_RAYS * found.sum || stalled;
+        (helped_before, was_near) = (next.helped, next.is_near);
         report.ended = Ended::after(report.error_reached, late || watch.is_late(), next.is_last);
         if report.error_reached || late || helpless || settled || next.is_last {
             break found;
@@ -162,6 +166,8 @@ struct Next {
     helped: f64,
     /// What is left of the quality's rays, or of the error, is not worth another round.
     is_last: bool,
+    /// It is but a small step to what was asked.
+    is_near: bool,
 }
 
 impl<'a> Judge<'a> {
@@ -269,7 +275,7 @@ impl<'a> Judge<'a> {
         let spent = !is_near && (budget as f64) < LEAST_ROUND * cast as f64;
         let open = self.open.iter().copied();
         let wanted = allot_within(budget, open, &by_rays.cautious, &samples, most, ORDER, goal);
-        Next { helped, is_last: spent || wanted.is_empty(), wanted }
+        Next { helped, is_last: spent || wanted.is_empty(), is_near, wanted }
     }
 }
 

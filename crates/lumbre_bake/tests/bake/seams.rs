@@ -132,7 +132,10 @@ fn a_sphere_of_many_charts_has_no_seams() {
         let squared = f64::from((after - *before).length_squared()) / 3.0;
         let expected = (f64::from(*stated).powi(2) + squared).sqrt();
         assert_eq!(stated.is_nan(), now.is_nan());
-        assert!(stated.is_nan() || (f64::from(*now) - expected).abs() < 1e-5 * expected, "{now} {expected}");
+        // A move is the difference of two numbers that are rounded themselves.
+        let rounding = f64::from(before.max_element().max(after.max_element())) * 0.5f64.powi(23);
+        let within = 1e-6 * expected + 2.0 * rounding;
+        assert!(stated.is_nan() || (f64::from(*now) - expected).abs() < within, "{now} {expected}");
         moved += usize::from(squared > 0.0 && !stated.is_nan());
     }
     assert!(moved > 100, "{moved}");
