@@ -30,7 +30,8 @@ const PASS: f32 = 0.7;
 /// Of the squared error asked for, what a round aims at: a good deal less than what ends the rounds. Its estimates are rough, and another round would
 /// smooth everything once more.
 const AIM: f64 = 0.55;
-/// The same where all that is left to do is a small step: a round's estimates are the better the less it lowers.
+/// The same, of what was reached, where the quality's rays are spent and a small step is missing: a round's estimates are the better the less it
+/// lowers.
 const NEAR_AIM: f64 = 0.9;
 /// What was asked, over the squared error that is left, from which on the rest is a small step; and by how much its rays may be more than the
 /// quality's most: a map that ends a hair beyond what was asked helps nobody.
@@ -93,7 +94,7 @@ pub(crate) fn gather(
     let mut wanted = judge.first_samples(&gathered);
     // With everything kept there is nothing that the former bake did not know when it ended.
     let settled = kept.is_some() && wanted.is_empty();
-    let (mut helped_before, mut was_near, mut is_first) = (f64::INFINITY, false, true);
+    let (mut helped_before, mut was_small, mut is_first) = (f64::INFINITY, false, true);
     let found = loop {
         watch.pass(PASS);
         if is_first && options.time.is_some() {
@@ -108,9 +109,9 @@ pub(crate) fn gather(
         let late = !in_time || watch.clock().late();
         let next = judge.next(&gathered, &found);
         // A small step lowers little, and tells nothing of what a larger one would.
-        let stalled = next.helped > if was_near { SMALL_STEPS_END } else { STALLED } * helped_before;
+        let stalled = next.helped > if was_small { SMALL_STEPS_END } else { STALLED } * helped_before;
         let helpless = next.helped <= WORTH_RAYS * found.sum || stalled;
-        (helped_before, was_near) = (next.helped, next.is_near);
+        (helped_before, was_small) = (next.helped, next.is_small_step);
         report.ended = Ended::after(report.error_reached, late || watch.is_late(), next.is_last);
         if report.error_reached || late || helpless || settled || next.is_last {
             break found;
@@ -166,8 +167,8 @@ struct Next {
     helped: f64,
     /// What is left of the quality's rays, or of the error, is not worth another round.
     is_last: bool,
-    /// It is but a small step to what was asked.
-    is_near: bool,
+    /// The quality's rays are spent, and it is but a small step to what was asked.
+    is_small_step: bool,
 }
 
 impl<'a> Judge<'a> {
@@ -260,22 +261,24 @@ impl<'a> Judge<'a> {
         // What they may leave: what the rest leaves of the error asked for, or what would not be seen beside it.
         let rest = found.sum - helped;
         let asked = self.count() * self.options.error.powi(2);
-        let reached = asked / found.sum.max(f64::MIN_POSITIVE);
-        let is_near = reached > NEAR;
-        let aim = AIM.max(NEAR_AIM * reached);
-        let goal = (aim * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
-        // Rays are given out by the cautious figures; the goal is one of expected ones.
-        let goal = goal * open_sum(self.texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
         let samples: Vec<u32> = gathered.iter().map(|own| own.samples).collect();
         let cast: u64 = samples.iter().map(|&samples| u64::from(samples)).sum();
         let most_of_all = self.options.effort().budget(self.count() as u64) / REPLICATES as u64;
-        let most_of_all = if is_near { (most_of_all as f64 * NEAR_RAYS) as u64 } else { most_of_all };
         let budget = most_of_all.saturating_sub(cast);
-        // What little is left of it is not worth another smoothing.
-        let spent = !is_near && (budget as f64) < LEAST_ROUND * cast as f64;
+        // What little is left of it is not worth another smoothing, unless that is all that is missing.
+        let spent = (budget as f64) < LEAST_ROUND * cast as f64;
+        let reached = asked / found.sum.max(f64::MIN_POSITIVE);
+        let is_small_step = spent && reached > NEAR;
+        let (aim, budget) = match is_small_step {
+            true => (NEAR_AIM * reached, ((most_of_all as f64 * NEAR_RAYS) as u64).saturating_sub(cast)),
+            false => (AIM, budget),
+        };
+        let goal = (aim * asked - rest).max(WORTH_RAYS * rest).max(helped / MOST_OF_A_ROUND);
+        // Rays are given out by the cautious figures; the goal is one of expected ones.
+        let goal = goal * open_sum(self.texels, &by_rays.cautious) / helped.max(f64::MIN_POSITIVE);
         let open = self.open.iter().copied();
         let wanted = allot_within(budget, open, &by_rays.cautious, &samples, most, ORDER, goal);
-        Next { helped, is_last: spent || wanted.is_empty(), is_near, wanted }
+        Next { helped, is_last: (spent && !is_small_step) || wanted.is_empty(), is_small_step, wanted }
     }
 }
 

@@ -119,8 +119,10 @@ fn changed(before: World, after: impl Fn() -> World) -> BakeReport {
     assert_eq!(rebake.whole, "");
     assert!(
         report.error_reached && of_whole.error_reached,
-        "the error asked for holds with what is neglected: {}",
-        report.estimated_error
+        "the error asked for holds with what is neglected: {}, {:?}, {:?}",
+        report.estimated_error,
+        report.ended,
+        report.error_parts
     );
     assert!(difference <= report.estimated_error.hypot(of_whole.estimated_error), "{difference}");
     assert!(within >= 0.95, "{within}");
