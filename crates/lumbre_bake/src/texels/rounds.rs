@@ -109,8 +109,8 @@ pub(crate) fn gather(
         let late = !in_time || watch.clock().late();
         let next = judge.next(&gathered, &found);
         // A small step lowers little, and tells nothing of what a larger one would.
-        let stalled = next.helped > if was_small { SMALL_STEPS_END } else { STALLED } * helped_before;
-        let helpless = next.helped <= WORTH_RAYS * found.sum || stalled;
+        let stalled = if was_small { SMALL_STEPS_END } else { STALLED };
+        let helpless = next.helped <= WORTH_RAYS * found.sum || next.helped > stalled * helped_before;
         (helped_before, was_small) = (next.helped, next.is_small_step);
         report.ended = Ended::after(report.error_reached, late || watch.is_late(), next.is_last);
         if report.error_reached || late || helpless || settled || next.is_last {
