@@ -1,4 +1,4 @@
-//! Rooms to trace: the Cornell box, two furnished rooms, the Stanford bunny in a room. Not their rays.
+//! Rooms to trace: the Cornell box, two furnished rooms, walls in small triangles, the Stanford bunny in a room. Not their rays.
 
 use glam::{Mat4, Quat, Vec3};
 
@@ -25,7 +25,7 @@ pub fn all() -> Vec<Scene> {
 
 /// Those that need no file.
 pub fn rooms() -> Vec<Scene> {
-    vec![cornell(), study(), bedroom()]
+    vec![cornell(), study(), bedroom(), empty_room()]
 }
 
 /// A room of `size` over the origin's corner, a lamp of a fifth of that, and furniture.
@@ -85,6 +85,25 @@ fn bedroom() -> Scene {
         furniture.extend(block(centre, size, 0.0));
     }
     room("two rooms", Vec3::new(7.0, 2.6, 4.0), furniture)
+}
+
+/// Nothing but walls, in small triangles: the highest planes of the scene are full of them.
+fn empty_room() -> Scene {
+    const ALONG: usize = 100;
+    let mut scene = room("walls in small triangles", Vec3::new(4.0, 3.0, 4.0), Vec::new());
+    let at = |[a, b, c]: [Vec3; 3], i: usize, j: usize| {
+        a + (b - a) * (i as f32 / ALONG as f32) + (c - a) * (j as f32 / ALONG as f32)
+    };
+    let pieces = |triangle: [Vec3; 3]| {
+        let row = move |i: usize| (0..ALONG - i).map(move |j| (i, j));
+        (0..ALONG).flat_map(row).flat_map(move |(i, j)| {
+            let [near, right, up] = [at(triangle, i, j), at(triangle, i + 1, j), at(triangle, i, j + 1)];
+            let turned = (i + j + 1 < ALONG).then(|| [right, at(triangle, i + 1, j + 1), up]);
+            [Some([near, right, up]), turned].into_iter().flatten()
+        })
+    };
+    scene.triangles = scene.triangles.into_iter().flat_map(pieces).collect();
+    scene
 }
 
 fn bunny_room(mut bunny: Vec<[Vec3; 3]>) -> Scene {
