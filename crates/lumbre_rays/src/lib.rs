@@ -24,17 +24,18 @@
 //! - Free of scale: no absolute epsilon. Multiplying a scene by 2^k changes no hit.
 //! - Deterministic: the same triangles give the same tree; ties go to the lower index. AVX2 is used where the machine
 //!   has it, the target's baseline elsewhere, and no product is fused with a sum: both compute the same bits.
-//! - Fast: in no scene measured does another crate answer a question faster. Millions of rays per second on one thread of
-//!   a Xeon (Sapphire Rapids, 2 shared cores), and our rate over that of obvhs 0.4's `CwBvh` (slow build), the fastest
-//!   other hierarchy, which is not watertight. `cargo bench -p lumbre_rays --bench ratios` prints them with quartiles
-//!   and the other crates; `--bench throughput` prints divan's table.
+//! - Fast: for rays as a bake casts them no other crate answers faster in any scene measured; for camera rays the fastest is level or ahead in
+//!   three of the five. Millions of rays per second on one thread of an EPYC (2 shared cores), and our rate over that of obvhs 0.4's `CwBvh` (slow build),
+//!   which is not watertight. `cargo bench -p lumbre_rays --bench ratios` prints them with quartiles and the other crates; `--bench throughput`
+//!   prints divan's table.
 //!
 //! | scene, triangles | camera, closest | cosine, closest | cosine, any | to the lamp, any |
 //! |---|---|---|---|---|
-//! | Cornell box, 38 | 15.1, 1.16 times | 9.7, 1.53 times | 18.2, 1.55 times | 13.0, 1.52 times |
-//! | study, 230 | 18.0, 1.14 times | 11.2, 1.58 times | 19.2, 1.48 times | 12.4, 1.43 times |
-//! | two rooms, 194 | 10.7, 1.28 times | 7.7, 1.64 times | 18.8, 1.56 times | 9.5, 1.49 times |
-//! | bunny in a room, 69,467 | 20.3, 1.08 times | 11.5, 1.35 times | 18.5, 1.38 times | 15.8, 1.27 times |
+//! | Cornell box, 38 | 17.2, 1.02 times | 11.1, 1.39 times | 21.0, 1.54 times | 18.6, 1.76 times |
+//! | study, 230 | 19.7, 0.95 times | 13.6, 1.49 times | 23.3, 1.56 times | 15.9, 1.46 times |
+//! | two rooms, 194 | 17.1, 1.50 times | 9.7, 1.51 times | 22.5, 1.54 times | 13.2, 1.60 times |
+//! | walls in small triangles, 140,000 | 6.2, 18 times | 1.3, 5.2 times | 1.5, 4.4 times | 1.8, 6.2 times |
+//! | bunny in a room, 69,467 | 20.9, 0.80 times | 13.8, 1.34 times | 22.7, 1.50 times | 18.6, 1.28 times |
 //!
 //! ```
 //! use glam::Vec3;
