@@ -29,6 +29,8 @@ use crate::{Action, Input, Opened, Recording, Viewpoint};
 const MOST_LOSSES: u32 = 3;
 /// How long to wait before the next look at a window that shows nothing.
 const IDLE: Duration = Duration::from_millis(50);
+/// Frames after the end of what is waited for: the overlay lays a new text out in the first and shows it in the second.
+const FRAMES_AT_REST: u32 = 2;
 /// Steps of a recording that are played per frame: 60 frames per second of game time.
 const STEPS_PER_FRAME: u32 = STEPS_PER_SECOND / 60;
 
@@ -50,6 +52,8 @@ pub struct App {
     hovered: bool,
     last: Option<Instant>,
     frames: u64,
+    /// Frames since the end of what was being opened, baked, written or measured.
+    frames_at_rest: u32,
     losses: u32,
     /// Why the event loop ends, if not because the player wants it.
     pub outcome: Result<()>,
@@ -58,6 +62,11 @@ pub struct App {
 impl App {
     /// A file that will have a window once the event loop runs.
     pub fn new(opened: Opened, options: PlayOptions, replay: Option<&Recording>) -> Self {
+        let overlay = Overlay::default();
+        if options.screenshot.is_some() {
+            // A text that fades in over a twelfth of a second may be missing in the last frame.
+            overlay.context.all_styles_mut(|style| style.animation_time = 0.0);
+        }
         let replay = replay.map(|recording| recording.player().collect::<Vec<_>>().into_iter());
         Self {
             viewing: match options.bake {
@@ -68,7 +77,7 @@ impl App {
             replay,
             window: None,
             stage: None,
-            overlay: Overlay::default(),
+            overlay,
             accuracy: Accuracy::default(),
             egui: None,
             report: None,
@@ -78,6 +87,7 @@ impl App {
             hovered: false,
             last: None,
             frames: 0,
+            frames_at_rest: 0,
             losses: 0,
             outcome: Ok(()),
         }
@@ -271,6 +281,9 @@ impl App {
             Shown::DeviceLost => self.recover(event_loop)?,
         }
         self.grab.recentre(window_of(&self.window)?);
+        let measured = self.accuracy.is_at_rest(&self.viewing.opened.game, &options);
+        let is_at_rest = self.viewing.is_at_rest() && measured;
+        self.frames_at_rest = if is_at_rest { self.frames_at_rest + 1 } else { 0 };
         self.after_frame(event_loop, &options)
     }
 
@@ -305,8 +318,7 @@ impl App {
         let played = self.replay.as_ref().is_some_and(|replay| replay.len() == 0);
         let counted = self.options.quit_after.is_some_and(|after| self.frames >= u64::from(after));
         let is_over = counted || (played && self.options.quit_after.is_none());
-        let measured = self.accuracy.is_at_rest(&self.viewing.opened.game, options);
-        let waits = self.options.wait_for_work && !(self.viewing.is_at_rest() && measured);
+        let waits = self.options.wait_for_work && self.frames_at_rest < FRAMES_AT_REST;
         if !(is_over && !waits || self.viewing.opened.game.wants_to_quit()) {
             return Ok(());
         }

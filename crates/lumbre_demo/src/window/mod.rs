@@ -36,7 +36,7 @@ pub struct PlayOptions {
     pub screenshot: Option<PathBuf>,
     /// Closes the window after so many frames.
     pub quit_after: Option<u32>,
-    /// Closes it only when nothing is being opened, baked or written any more.
+    /// Closes it only when nothing is being opened, baked or written any more, and what there is to say of it is shown.
     pub wait_for_work: bool,
     /// What befalls the window after so many frames, to see whether the game survives it.
     pub trials: Vec<(u64, Trial)>,

@@ -181,7 +181,10 @@ fn settings(ui: &mut Ui, front: &ViewFront, facts: &AccuracyFacts) -> Wishes {
         // What a slider shows is the way's own price: it follows the other one.
         let mut ms = now.milliseconds.median;
         let range = first.milliseconds.median.min(ms)..=last.milliseconds.median.max(ms);
-        let slider = Slider::new(&mut ms, range).logarithmic(true).text("ms a frame").max_decimals(2);
+        let slider = Slider::new(&mut ms, range)
+            .logarithmic(true)
+            .text("ms a frame")
+            .custom_formatter(|ms, _| decimals(ms, 2));
         if ui.add(slider).changed() {
             wishes.settings = Some(front.within_milliseconds(ms));
         }
@@ -191,7 +194,7 @@ fn settings(ui: &mut Ui, front: &ViewFront, facts: &AccuracyFacts) -> Wishes {
             .logarithmic(true)
             .smallest_positive(SMALLEST_PERCENT)
             .text("% of error")
-            .max_decimals(3);
+            .custom_formatter(|error, _| decimals(error, 3));
         if ui.add(slider).changed() {
             wishes.settings = Some(front.within_error(error / 100.0));
         }
@@ -216,6 +219,12 @@ fn settings(ui: &mut Ui, front: &ViewFront, facts: &AccuracyFacts) -> Wishes {
 
 fn prices(way: &Priced) -> String {
     format!("{:.1} ms, {} % off", way.milliseconds.median, percent(way.error))
+}
+
+/// A number with so many decimals at most. `Slider::max_decimals` would round the value too, which reads as a change that nobody made.
+fn decimals(value: f64, most: i32) -> String {
+    let scale = 10f64.powi(most);
+    ((value * scale).round() / scale).to_string()
 }
 
 /// A share as per cent, with some three figures.
@@ -343,6 +352,25 @@ mod tests {
             let values: Vec<f64> = texts.iter().filter_map(|(_, text)| text.trim().parse().ok()).collect();
             let expected = [ms, error].map(|text| text.parse::<f64>().expect("a number"));
             assert_eq!(values, expected, "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_chosen_that_nobody_chose() {
+        for place in 0..3 {
+            let mut facts = facts();
+            let front = facts.front.as_mut().expect("it was measured");
+            // No price is a round number.
+            for way in &mut front.ways {
+                way.milliseconds.median *= 1.000_123_4;
+                way.error *= 0.999_123_4;
+            }
+            front.now = front.ways[place].clone();
+            facts.settings = Some(front.ways[place].settings);
+            let context = egui::Context::default();
+            for _ in 0..4 {
+                assert_eq!(laid_out(&context, &facts, Vec::new()).1.settings, None, "at {place}");
+            }
         }
     }
 
