@@ -1,4 +1,4 @@
-//! How far baked levels are off where one looks: `level_errors [NAME …] [--error X] [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N]
+//! How far baked levels are off where one looks: `level_errors [NAME|FILE.glb …] [--error X] [--time SECONDS] [--seed N] [--texels-per-meter N] [--points N]
 //! [--cache FOLDER] [--reference] [--anew|--paths] [--flip] [--pictures FOLDER] [--stages]` bakes each (all levels without a name) and prints one row: errors relative to the light
 //! around a point, away from shadow edges, at reference points of the cache or the tests' folder (not with `--anew`), which are computed where there
 //! are none; with `--paths` by paths to their very end, unbiased and noisy.
@@ -21,6 +21,7 @@ mod common;
 #[path = "../tests/held_out/mod.rs"]
 mod held_out;
 
+use held_out::input::world_of;
 use held_out::judgement::{Judgement, judge};
 use held_out::path_tracer::{Effort, Irradiance, PathTracer};
 use held_out::view::{View, write_png};
@@ -100,13 +101,15 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn row(name: &str, request: &Request) -> Result<(), Box<dyn Error>> {
-    let (build, layout) = scenes::find(name).ok_or_else(|| format!("{name} is no scene"))?;
-    let points = points(name, &mut build(layout, 1.0), request)?;
-    let mut world = build(layout, 1.0);
+    let build = || world_of(Path::new(name));
+    let name = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
+    let name = name.as_ref();
+    let points = points(name, &mut build()?, request)?;
+    let mut world = build()?;
     let report = baked(&mut world, &request.options)?;
     let found = judge(&mut world, &points);
     let flip = match request.flip || request.pictures.is_some() {
-        true => compared_views(name, &mut world, || build(layout, 1.0), request)?,
+        true => compared_views(name, &mut world, build, request)?,
         false => "-".to_owned(),
     };
     let away = found.local.away;
@@ -204,7 +207,7 @@ fn points(name: &str, world: &mut World, request: &Request) -> Result<Vec<Irradi
 fn compared_views(
     name: &str,
     world: &mut World,
-    scene: impl Fn() -> World,
+    scene: impl Fn() -> Result<World, lumbre_scene::LoadError>,
     request: &Request,
 ) -> Result<String, Box<dyn Error>> {
     let own = View::of(world, WIDTH, HEIGHT).ok_or("a level without a camera")?;
@@ -220,7 +223,7 @@ fn compared_views(
     let converged = match &file {
         Some(file) if file.exists() => read_view(file)?,
         _ => {
-            let mut world = scene();
+            let mut world = scene()?;
             let options = BakeOptions {
                 quality: Quality::Reference,
                 error: 2e-3,

@@ -2,7 +2,7 @@
 
 use crate::progress::Watch;
 use crate::texels::direct_light::DirectLight;
-use crate::texels::error_ledger::{ErrorLedger, open_sum, relative_to};
+use crate::texels::error_ledger::{ErrorLedger, open_sum, relative_to, root};
 use crate::texels::footprint::Texel;
 use crate::{BakeOptions, BakeReport, ErrorAtTime};
 use glam::Vec3;
@@ -52,7 +52,7 @@ pub(crate) fn note_direct_error(
 ) {
     let open = texels.iter().filter(|texel| !texel.is_hidden()).count().max(1) as f64;
     let mean = report.mean_irradiance.iter().sum::<f64>() / 3.0;
-    report.estimated_error = (open_sum(texels, &direct.local.relative(variances)) / open).sqrt();
+    report.estimated_error = root(open_sum(texels, &direct.local.relative(variances)) / open);
     report.error_of_mean = relative_to(mean, open_sum(texels, variances) / open);
     report.error_reached = report.estimated_error <= options.error;
     report.error_parts = ErrorLedger::of_direct_light(direct).parts(texels, &direct.local);

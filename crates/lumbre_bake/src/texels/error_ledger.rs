@@ -218,7 +218,24 @@ pub(crate) fn open_sum(texels: &[Texel], numbers: &[f32]) -> f64 {
     open.map(|(_, number)| f64::from(*number)).sum()
 }
 
+/// The root of a squared error. Of what is no number nothing is known: that is no error of 0.
+pub(crate) fn root(squared: f64) -> f64 {
+    if squared.is_nan() { f64::INFINITY } else { squared.max(0.0).sqrt() }
+}
+
 /// The root of a squared error, relative to a mean; 0 where there is no light.
 pub(crate) fn relative_to(mean: f64, squared: f64) -> f64 {
-    if mean > 0.0 { squared.max(0.0).sqrt() / mean } else { 0.0 }
+    if mean > 0.0 { root(squared) / mean } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_number_is_no_error_of_zero() {
+        assert_eq!((root(f64::NAN), root(-1e-30), root(4.0)), (f64::INFINITY, 0.0, 2.0));
+        assert_eq!((relative_to(2.0, f64::NAN), relative_to(2.0, 16.0)), (f64::INFINITY, 2.0));
+        assert_eq!(relative_to(0.0, 16.0), 0.0);
+    }
 }

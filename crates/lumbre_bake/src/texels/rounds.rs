@@ -8,7 +8,7 @@ use super::allocation::{Allotment, allot_within};
 use super::covered_texels::CoveredTexels;
 use super::direct_light::DirectLight;
 use super::error_estimate::{PatchBias, patch_bias, spread};
-use super::error_ledger::{ErrorLedger, GatherErrors, SquaredErrors, open_sum, relative_to};
+use super::error_ledger::{ErrorLedger, GatherErrors, SquaredErrors, open_sum, relative_to, root};
 use super::footprint::Texel;
 use super::gather::{Gathered, REPLICATES, RadianceCache};
 use super::kept::Kept;
@@ -240,7 +240,7 @@ impl<'a> Judge<'a> {
         let ledger = ErrorLedger { direct: self.direct, gather: Some(gather), light: total as f32 };
         let variances = ledger.total();
         let sum = open_sum(texels, &local.relative(&variances.expected)) - ledger.by_chance(texels, local);
-        report.estimated_error = (sum / self.count()).max(0.0).sqrt();
+        report.estimated_error = root(sum / self.count());
         report.error_of_mean = relative_to(total, open_sum(texels, &variances.expected) / self.count());
         report.error_reached = report.estimated_error <= self.options.error;
         report.error_parts = watch.during(1.0, || ledger.parts(texels, local))?;

@@ -52,8 +52,8 @@ const LENGTH: f64 = 0.1;
 /// What lies so near to a line, as a share of a piece's size, lies on it.
 const ON_LINE: f64 = 0.02;
 
-/// A corner that takes less than this share of a piece is none.
-const SLIVER: f64 = 1e-6;
+/// A corner that takes less than this share of a piece is none: contacts are told to some 1e-7 of a triangle, and so are the pieces' corners.
+const SLIVER: f64 = 1e-4;
 
 /// A cell while it is being cut.
 struct Cell<'a> {
@@ -143,12 +143,7 @@ impl Cell<'_> {
 
     /// A convex polygon as a fan of triangles, about the corner that makes the smallest of them largest.
     fn triangles(&mut self, polygon: &[DVec2]) -> Side {
-        let least = SLIVER * area(polygon);
-        let around = |i: usize| {
-            [polygon[(i + polygon.len() - 1) % polygon.len()], polygon[i], polygon[(i + 1) % polygon.len()]]
-        };
-        let polygon: Vec<DVec2> =
-            (0..polygon.len()).filter(|&i| area(&around(i)) > least).map(|i| polygon[i]).collect();
+        let polygon = without_slivers(polygon);
         let count = polygon.len();
         let corner = |i: usize| polygon[i % count];
         let fan =
@@ -235,6 +230,23 @@ fn area(polygon: &[DVec2]) -> f64 {
     polygon.windows(2).map(|pair| 0.5 * (pair[0] - origin).perp_dot(pair[1] - origin)).sum()
 }
 
+/// Without the corners that take next to nothing of a polygon. One after the other: of two in one place, one stays.
+fn without_slivers(polygon: &[DVec2]) -> Vec<DVec2> {
+    let least = SLIVER * area(polygon);
+    let mut polygon = polygon.to_vec();
+    while polygon.len() > 3 {
+        let count = polygon.len();
+        let taken =
+            |i: usize| area(&[polygon[(i + count - 1) % count], polygon[i], polygon[(i + 1) % count]]);
+        let Some(corner) = (0..count).min_by(|&a, &b| taken(a).total_cmp(&taken(b))) else { break };
+        if taken(corner) > least {
+            break;
+        }
+        polygon.remove(corner);
+    }
+    polygon
+}
+
 /// The part of a convex polygon on a line's first side.
 fn clipped(polygon: &[DVec2], line: Line) -> Vec<DVec2> {
     let mut part = Vec::with_capacity(polygon.len() + 1);
@@ -306,6 +318,29 @@ mod tests {
                     assert!(!crossed, "{piece:?} across {p} {q}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_line_that_ends_on_the_border_leaves_no_piece_without_area() {
+        // The lowest facets of a ball that stands on a floor, as its tile lies in the frame; found in a file.
+        let corners = [
+            DVec2::new(0.013020833721384406, 0.013020833721384406),
+            DVec2::new(0.026041667442768812, 0.013020833721384406),
+            DVec2::new(0.013020833721384406, 0.026041667442768812),
+        ];
+        let foot = segment([0.015625, 0.0234375], [0.005634784698486328, 0.014785677194595337]);
+        let other = segment([0.005634784698486328, 0.03208932280540466], [0.015625, 0.0234375]);
+        let weights = DMat2::from_diagonal(DVec2::splat(25.6));
+        for segments in [vec![foot, other], vec![other, foot], vec![foot], vec![other]] {
+            let mut cuts = Cuts::default();
+            if cuts.cut(corners, &segments, weights, (0, 1)).is_none() {
+                continue;
+            }
+            let shares: Vec<f64> = cuts.pieces.iter().map(|&piece| share(piece)).collect();
+            let sum: f64 = shares.iter().sum();
+            assert!(shares.iter().all(|&share| share > 1e-4 * sum), "{shares:?}");
+            assert!((9.0 * sum - 1.0).abs() < 1e-4, "{sum}");
         }
     }
 

@@ -44,6 +44,8 @@ struct Cut {
     roots: u32,
 }
 
+/// Share of a cell that a piece of it has at least.
+const LEAST_PIECE: f32 = 1e-6;
 /// Of a cell, or of all of a triangle's: no line goes through.
 const UNCUT: u32 = u32::MAX;
 /// Marks a piece of a cell.
@@ -164,7 +166,8 @@ impl Patches {
                     let corners = corners_of(&lines, divisions, cell);
                     let area = match cell & PIECE {
                         0 => triangle.area / cells as f32,
-                        _ => triangle.area * share(&corners),
+                        // Of a very fine cell's piece the corners may fall together: no patch is without area.
+                        _ => triangle.area * share(&corners).max(LEAST_PIECE / cells as f32),
                     };
                     let (cell, reflectance) = (packed(divisions, cell), Vec3::ZERO);
                     Patch { triangle: index as u32, side, cell, area, reflectance }

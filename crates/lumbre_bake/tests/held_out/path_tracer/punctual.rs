@@ -12,7 +12,8 @@ use super::choice::{Choice, ChoiceGrid};
 use super::hierarchy::Hierarchy;
 
 enum Place {
-    At(DVec3),
+    /// And the distance where its light has faded to nothing, m.
+    At(DVec3, f64),
     /// To the light, and half the angle that it has.
     Towards(DVec3, f64),
 }
@@ -48,14 +49,14 @@ impl PunctualLights {
                 );
                 let place = match light.kind {
                     LightKind::Directional => Place::Towards(-place.forward(), 0.5 * f64::from(light.angle)),
-                    _ => Place::At(place.translation()),
+                    _ => Place::At(place.translation(), f64::from(light.attenuation.range)),
                 };
                 Punctual { place, strength: light.diffuse.as_dvec3() * PI }
             })
             .collect();
         let near = (lights.len() > FEW).then(|| {
             let things = lights.iter().map(|light| match light.place {
-                Place::At(place) => (place, 0.0, light.strength.element_sum()),
+                Place::At(place, _) => (place, 0.0, light.strength.element_sum()),
                 Place::Towards(..) => panic!("a sun among many lights is not known to the path tracer"),
             });
             ChoiceGrid::new(scene.bounds(), &things.collect::<Vec<_>>())
@@ -120,10 +121,12 @@ impl PunctualLights {
 impl Punctual {
     fn unshadowed(&self, [origin, normal]: [DVec3; 2]) -> DVec3 {
         match self.place {
-            Place::At(place) => {
+            Place::At(place, range) => {
                 let towards = place - origin;
                 let squared = towards.length_squared();
-                self.strength * (normal.dot(towards).max(0.0) / (squared * squared.sqrt()))
+                // The window of KHR_lights_punctual.
+                let window = (1.0 - (squared / (range * range)).powi(2)).clamp(0.0, 1.0);
+                self.strength * (window * normal.dot(towards).max(0.0) / (squared * squared.sqrt()))
             }
             Place::Towards(direction, _) => self.strength * normal.dot(direction).max(0.0),
         }
@@ -135,7 +138,7 @@ impl Punctual {
             return light;
         }
         let hidden = match self.place {
-            Place::At(place) => scene.hidden(at[0], place),
+            Place::At(place, _) => scene.hidden(at[0], place),
             Place::Towards(mut direction, angle) => {
                 if angle > 0.0 {
                     let (right, up) = direction.any_orthonormal_pair();
