@@ -270,7 +270,7 @@ fn run(
         None => (Bounced::none(&direct), None),
         Some(exchange) => {
             watch.stage(Stage::FinalGather, report)?;
-            let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, watch, report)?;
+            let mut cache = RadianceCache::new(&sources, &texels, &direct, exchange, options, watch)?;
             let bounced =
                 rounds::gather(&mut cache, &texels, &direct, kept.as_ref(), options, watch, report)?;
             (bounced, Some(cache))

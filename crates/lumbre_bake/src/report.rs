@@ -201,8 +201,6 @@ pub struct BakeReport {
     pub patches: usize,
     /// Pairs of patches that see each other.
     pub form_factors: usize,
-    /// Those of them that are contour integrals, of near pairs that nothing stands between.
-    pub exact_form_factors: usize,
     /// Iterations of the solver, for red, green and blue.
     pub iterations: [u32; 3],
     /// Largest relative residual of the three channels.
@@ -316,14 +314,8 @@ impl std::fmt::Display for BakeReport {
         )?;
         writeln!(
             f,
-            "{} triangles, {} patches, {} form factors ({} exact); {:?} iterations, residual {:.1e}, energy lost {:.1e}",
-            self.triangles,
-            self.patches,
-            self.form_factors,
-            self.exact_form_factors,
-            self.iterations,
-            self.residual,
-            self.energy_lost
+            "{} triangles, {} patches, {} form factors; {:?} iterations, residual {:.1e}, energy lost {:.1e}",
+            self.triangles, self.patches, self.form_factors, self.iterations, self.residual, self.energy_lost
         )?;
         if self.seams.edges > 0 {
             writeln!(

@@ -22,8 +22,6 @@ pub(crate) enum Stream {
     PatchLight(u32),
     /// Lines through the whole scene, in two halves.
     GlobalLines(u32),
-    /// Lines between two patches that are near each other.
-    NearPairs,
     /// Rays of the final gather, by replicate.
     Gather(u32),
     /// Where the map's resolution is judged, and the light there.
@@ -35,8 +33,6 @@ pub(crate) enum Stream {
     /// What may have changed since a former bake, of patches and of blocks of texels.
     ChangedPatches,
     ChangedTexels,
-    /// Shadow rays of the parts of a divided texel.
-    DividedTexel,
     /// Walks that find the light around.
     LocalLight,
     /// Shadow rays to sources that share samples, by replicate.
@@ -55,7 +51,6 @@ impl Stream {
             Self::DirectLight => 4,
             Self::PatchLight(half) => 5 + half,
             Self::GlobalLines(half) => 12 + half,
-            Self::NearPairs => 14,
             Self::Gather(replicate) => 16 + replicate,
             Self::ResolutionPoints => 40,
             Self::ResolutionLight => 41,
@@ -63,7 +58,6 @@ impl Stream {
             Self::ProbeSide(side) => 52 + side,
             Self::ChangedPatches => 60,
             Self::ChangedTexels => 61,
-            Self::DividedTexel => 64,
             Self::LocalLight => 80,
             Self::SharedLight(replicate) => 96 + replicate,
             #[cfg(test)]
@@ -248,12 +242,10 @@ mod tests {
             Stream::HiddenTexel,
             Stream::HiddenView,
             Stream::DirectLight,
-            Stream::NearPairs,
             Stream::ResolutionPoints,
             Stream::ResolutionLight,
             Stream::ChangedPatches,
             Stream::ChangedTexels,
-            Stream::DividedTexel,
             Stream::LocalLight,
         ];
         // Two halves, four replicates, six sides of a probe.

@@ -3,10 +3,10 @@
 use super::charts::charts;
 use super::footprint::{Texel, footprints};
 use super::hidden::remove_hidden;
-use super::straddling::{Straddling, crossed, straddling};
+use super::straddling::{crossed, straddling};
 use crate::progress::Watch;
 use crate::scene::{BakeScene, LightmapLayout};
-use crate::texel_index::MapTexel;
+use crate::texel_index::{CoveredTexel, MapTexel};
 use crate::{BakeError, BakeReport};
 
 /// The texels that show a surface, map by map, row by row; lists "of the covered texels" are in this order.
@@ -16,7 +16,7 @@ pub(crate) struct CoveredTexels<'a> {
     /// The chart of every triangle of the scene.
     pub charts: Vec<u32>,
     /// Those that a wall divides.
-    pub straddling: Vec<Straddling>,
+    pub straddling: Vec<CoveredTexel>,
     /// Length of a texel's side on the surface, canonical units, by the mean of all.
     pub side: f32,
 }
@@ -37,7 +37,7 @@ impl<'a> CoveredTexels<'a> {
         // Which texels a wall divides is asked twice: of all that they cover, to know where to look closely, and of what is then found in the open.
         let touched: Vec<MapTexel> = watch.during(0.0, || {
             let divided = straddling(layout, &list, &crossed);
-            divided.iter().map(|straddling| list[straddling.texel.place()].index).collect()
+            divided.iter().map(|texel| list[texel.place()].index).collect()
         })?;
         let crossed_texels = crossed.iter().map(|(texel, _)| *texel);
         (report.hidden_texels, report.rays) =

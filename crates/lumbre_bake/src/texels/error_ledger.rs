@@ -7,7 +7,7 @@
 //!   direct light   spread of batches of shadow samples                      transport::direct, shared_light without its caution
 //!   noise          spread of four replicates, after smoothing               error_estimate::spread         the neighbours' mean
 //!   smoothing      half of the replicates smoothed against the other raw    smoothing_bias                 as it is
-//!   form factors   half the difference of two half solutions, and to one    transport::exchange, coarser,  as it is
+//!   form factors   half the difference of two half solutions, and to one    exchange and size_error        as it is
 //!                  with patches twice as large, read by the texel's rays    Gathered::patch_error
 //!   texels read    what noise leaves in the texels that later rounds read,  gather                         as it is
 //!                  as far as it is correlated

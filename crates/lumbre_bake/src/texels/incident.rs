@@ -216,11 +216,8 @@ impl RadianceCache<'_> {
         }
         for ((path, request), found) in paths.iter().zip(requests).zip(found) {
             let Some(hit) = &mut found.hit else { continue };
-            hit.direct = if path.direct.x.is_nan() {
-                self.direct_of_part(hit.triangle, hit.side, hit.at, hit.patch)
-            } else {
-                path.direct
-            };
+            hit.direct =
+                if path.direct.x.is_nan() { self.patch_direct[hit.patch.place()] } else { path.direct };
             if let Some(share) = path.share {
                 match self.weight(request, path, share, hit) {
                     Some(weight) => found.weight = weight,

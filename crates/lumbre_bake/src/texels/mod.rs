@@ -6,7 +6,6 @@ pub(crate) mod blocks;
 pub(crate) mod charts;
 pub(crate) mod covered_texels;
 pub(crate) mod direct_light;
-pub(crate) mod divided_light;
 pub(crate) mod error_estimate;
 pub(crate) mod error_ledger;
 pub(crate) mod fill;

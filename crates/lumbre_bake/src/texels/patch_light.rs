@@ -22,7 +22,7 @@ pub(crate) fn patch_light(
     patches: &Patches,
 ) -> Vec<Option<[Vec3; 2]>> {
     let mut divided = vec![false; texels.list.len()];
-    texels.straddling.iter().for_each(|straddling| divided[straddling.texel.place()] = true);
+    texels.straddling.iter().for_each(|texel| divided[texel.place()] = true);
     let mut sums = vec![[(DVec3::ZERO, 0.0f64); 2]; patches.list.len()];
     let told = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
     for ((texel, direct), _) in told {

@@ -4,7 +4,6 @@ use glam::{Vec2, Vec3};
 
 use super::covered_texels::CoveredTexels;
 use super::direct_light::DirectLight;
-use super::divided_light::DividedLight;
 use super::gather::REPLICATES;
 use super::texel_radiance::{GatheredLight, mean_reflectances};
 use crate::progress::Watch;
@@ -13,23 +12,20 @@ use crate::scene::{BakeScene, LightmapLayout};
 use crate::texel_index::MapTexel;
 use crate::transport::direct::Sources;
 use crate::transport::exchange::Exchange;
-use crate::transport::patch_index::PatchIndex;
 use crate::transport::patches::Patches;
 use crate::transport::sampling_guide::SamplingGuide;
-use crate::{BakeError, BakeOptions, BakeReport};
+use crate::{BakeError, BakeOptions};
 
 /// The light that leaves surfaces, as the gather reads it.
 pub(crate) struct RadianceCache<'a> {
     pub scene: &'a BakeScene,
     pub layout: &'a LightmapLayout,
     pub patches: &'a Patches,
-    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, or more than one.
+    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, and where a wall divides the texel.
     pub direct: Vec<Vec3>,
-    /// Of the texels that have more than one.
-    pub divided: DividedLight,
     /// Irradiance that a surface gets of an unhidden sky.
     pub sky: Vec3,
-    /// Per patch, direct irradiance.
+    /// Per patch, direct irradiance: where a texel has none.
     pub patch_direct: &'a [Vec3],
     /// Per patch, irradiance by bounces and by the sky.
     pub patch_indirect: &'a [Vec3],
@@ -52,8 +48,6 @@ pub(crate) struct RadianceCache<'a> {
 /// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round of the demo level, 5.4 after the
 /// second.
 const CORRELATED_TEXELS: f32 = 4.5;
-/// Where more than this share of the final gather's time is gone before its first ray, what walls divide gets fewer samples.
-const SHORT: f64 = 0.4;
 
 impl<'a> RadianceCache<'a> {
     /// As it is before the first round: direct light of texels, bounces of patches.
@@ -67,18 +61,13 @@ impl<'a> RadianceCache<'a> {
         exchange: &'a Exchange,
         options: &BakeOptions,
         watch: &mut Watch<'_>,
-        report: &mut BakeReport,
     ) -> Result<Self, BakeError> {
         let (scene, effort) = (sources.scene, options.effort());
-        // What one part sends out is read by many rays of many texels: its noise falls out of their means.
-        let samples = if watch.clock().is_past(SHORT) { 1 } else { 2 } * effort.direct[0];
-        let (divided, rays) = watch.during(0.0, || {
-            DividedLight::new(sources, &texels.list, &texels.straddling, (samples, options.seed))
-        })?;
-        report.rays += rays;
-        report.warnings.extend(divided.warning());
         let mut direct = direct.by_place(texels);
-        divided.texels().for_each(|texel| direct[texel.place()] = Vec3::NAN);
+        // One value of both sides would be read on the wrong one.
+        for texel in &texels.straddling {
+            direct[texels.list[texel.place()].index.place()] = Vec3::NAN;
+        }
         let reflectance =
             watch.during(0.0, || mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list))?;
         Ok(Self {
@@ -89,7 +78,6 @@ impl<'a> RadianceCache<'a> {
             layout: texels.layout,
             patches: &exchange.patches,
             direct,
-            divided,
             sky: sources.sky,
             patch_direct: &exchange.direct,
             patch_indirect: &exchange.indirect,
@@ -109,7 +97,7 @@ impl RadianceCache<'_> {
         let gathered = self.gathered.at(texel).map(|texel| texel.irradiance);
         let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch.place()]);
         let direct = self.direct_of(texel);
-        let direct = direct.unwrap_or_else(|| self.direct_of_part(triangle, side, at, patch));
+        let direct = direct.unwrap_or_else(|| self.patch_direct[patch.place()]);
         let irradiance = direct + indirect;
         self.reflectance_at(triangle, side, at) * irradiance
     }
@@ -124,33 +112,12 @@ impl RadianceCache<'_> {
 
     /// The texel that shows a point; [`MapTexel::NONE`] where none does.
     pub(super) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
-        let (texel, _) = self.place_at(triangle, at);
+        let texel = self.layout.texel_at(&self.scene.triangles[triangle as usize], at);
         texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
     }
 
     /// Of a texel, if it has one for all of it.
     pub(super) fn direct_of(&self, texel: MapTexel) -> Option<Vec3> {
         self.direct.get(texel.place()).copied().filter(|direct| !direct.x.is_nan())
-    }
-
-    /// Where the texel has none: of its part or of the patch.
-    #[cold]
-    pub(super) fn direct_of_part(
-        &self,
-        triangle: u32,
-        side: Side,
-        at: (f32, f32),
-        patch: PatchIndex,
-    ) -> Vec3 {
-        let (texel, uv) = self.place_at(triangle, at);
-        let texel = texel.filter(|_| side == Side::Front);
-        let divided = texel.and_then(|texel| self.divided.at(texel, uv.fract()));
-        divided.unwrap_or_else(|| self.patch_direct[patch.place()])
-    }
-
-    /// The texel at a point, if it is on the map, and the point on the map.
-    fn place_at(&self, triangle: u32, (u, v): (f32, f32)) -> (Option<MapTexel>, Vec2) {
-        let triangle = &self.scene.triangles[triangle as usize];
-        (self.layout.texel_at(triangle, (u, v)), triangle.place_on_map((u, v)))
     }
 }

@@ -1,5 +1,5 @@
 //! Texels that a wall thinner than themselves crosses, with surface in the open on both sides of it: one value for both. They show that
-//! value, but do not hand it on: see `divided_light`. Not texels that are hidden in part: those hold the light of the part in the open.
+//! value, but do not hand it on: rays read the patches there, which end at the wall. Not texels that are hidden in part: those hold the light of the part in the open.
 
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -14,12 +14,6 @@ use crate::transport::contacts::{PlaneFrame, contacts};
 const SHORTEST: f64 = 0.25;
 /// Texels beside a line that do not count as beyond it.
 const MARGIN: f64 = 0.05;
-
-/// A texel that contact lines divide: its place among those covered, and the lines' parts in its unit square.
-pub(crate) struct Straddling {
-    pub texel: CoveredTexel,
-    pub lines: Vec<[DVec2; 2]>,
-}
 
 /// Texels that contact lines cross, by their place in the row of all maps, with the line's part in the texel's unit square; ascending.
 pub(crate) fn crossed(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(MapTexel, [DVec2; 2])> {
@@ -40,19 +34,16 @@ pub(crate) fn straddling(
     layout: &LightmapLayout,
     texels: &[Texel],
     crossed: &[(MapTexel, [DVec2; 2])],
-) -> Vec<Straddling> {
+) -> Vec<CoveredTexel> {
     let mut covered = vec![None; layout.texels];
     for (place, texel) in texels.iter().enumerate() {
         covered[texel.index.place()] = Some(CoveredTexel::new(place));
     }
-    let mut found: Vec<Straddling> = Vec::new();
+    let mut found: Vec<CoveredTexel> = Vec::new();
     for &(index, line) in crossed {
         let Some(texel) = covered[index.place()] else { continue };
-        if is_divided(&texels[texel.place()], line) {
-            match found.last_mut() {
-                Some(last) if last.texel == texel => last.lines.push(line),
-                _ => found.push(Straddling { texel, lines: vec![line] }),
-            }
+        if found.last() != Some(&texel) && is_divided(&texels[texel.place()], line) {
+            found.push(texel);
         }
     }
     found

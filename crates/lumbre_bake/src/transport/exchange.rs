@@ -4,12 +4,12 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::coarser::size_error;
 use super::direct::{Receiver, Sources};
 use super::form_factors::FormFactors;
 use super::patch_index::PatchIndex;
 use super::patches::{Patch, Patches};
 use super::sampling_guide::SamplingGuide;
+use super::size_error::size_error;
 use super::solution::gather;
 use crate::chunks::in_chunks;
 use crate::options::Solver;
@@ -87,7 +87,6 @@ impl Exchange {
         let (factors, halves) = FormFactors::sample(scene, &patches, method, rays, options.seed, watch)?;
         report.rays += factors.rays;
         report.form_factors = factors.columns.len();
-        report.exact_form_factors = 2 * factors.exact;
         report.energy_lost = factors.energy_lost;
 
         watch.stage(Stage::Radiosity, report)?;

@@ -1,6 +1,5 @@
 //! Form factors by Monte Carlo, visibility included: what rays or lines have counted between patches becomes one exchange area
-//! G_ij = A_i F_ij = A_j F_ji per pair, so reciprocity is exact; near pairs that nothing stands between have their exact ones. Then rows
-//! are scaled to the share of rays that met a surface, which is the exact row sum's own estimate (1 in a closed scene).
+//! G_ij = A_i F_ij = A_j F_ji per pair, so reciprocity is exact. Then rows are scaled to the share of rays that met a surface, which is the exact row sum's own estimate (1 in a closed scene).
 //! Not the counting (`cosine_rays`, `global_lines`), nor the solution of the system they make.
 
 use std::ops::Range;
@@ -8,7 +7,6 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::near_pairs::{NearPairs, near_pairs};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use super::{cosine_rays, global_lines};
@@ -34,8 +32,6 @@ pub(crate) struct FormFactors {
     pub sky: Vec<f32>,
     /// Rays and lines cast.
     pub rays: u64,
-    /// Pairs, each counted once, whose exchange is exact.
-    pub exact: usize,
     /// Share of all exchange that was cut so that no row exceeds 1.
     pub energy_lost: f64,
     /// Whether nobody waits for what is solved with it any more.
@@ -60,28 +56,19 @@ impl FormFactors {
             FormFactorMethod::CosineRays => cosine_rays::cast(scene, patches, rays, seed, watch)?,
             FormFactorMethod::GlobalLines => global_lines::cast(scene, patches, rays, seed, watch)?,
         };
-        watch.during(1.0, || Self::of_counts(scene, patches, &cast, rays, seed))
+        watch.during(1.0, || Self::of_counts(scene, patches, &cast, rays))
     }
 
-    fn of_counts(
-        scene: &BakeScene,
-        patches: &Patches,
-        cast: &[Cast],
-        rays: u64,
-        seed: u32,
-    ) -> (Self, [Self; 2]) {
+    fn of_counts(scene: &BakeScene, patches: &Patches, cast: &[Cast], rays: u64) -> (Self, [Self; 2]) {
         let [whole, even, odd] =
             [|cast: &Cast| cast.whole(), |cast: &Cast| cast.half(0), |cast: &Cast| cast.half(1)]
                 .map(|of| cast.par_iter().map(of).collect::<Vec<Counts>>());
         let areas = || patches.list.iter().map(|patch| patch.area).collect();
-        let (counted, _) = pool(&whole, &NearPairs::default(), areas(), &scene.stop);
-        let near = near_pairs(scene, patches, &counted, cast, seed);
-        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &near, &scene.stop);
+        let pooled = |counts: &[Counts]| Self::pooled(counts, areas(), &scene.stop);
         let ((even, odd), mut whole) =
             rayon::join(|| rayon::join(|| pooled(&even), || pooled(&odd)), || pooled(&whole));
-        let halves = [even, odd];
-        (whole.rays, whole.exact) = (rays, near.count());
-        (whole, halves)
+        whole.rays = rays;
+        (whole, [even, odd])
     }
 
     /// Of patches that exchange nothing.
@@ -93,8 +80,8 @@ impl FormFactors {
     }
 
     /// The matrix of some of the rays.
-    fn pooled(counts: &[Counts], areas: Vec<f32>, near: &NearPairs, stop: &CancelToken) -> Self {
-        let (mut factors, exact) = pool(counts, near, areas, stop);
+    fn pooled(counts: &[Counts], areas: Vec<f32>, stop: &CancelToken) -> Self {
+        let mut factors = pool(counts, areas, stop);
         factors.open = counts.iter().map(Counts::open).collect();
         let sky = |own: &Counts| own.missed as f32 / (own.count - own.inside).max(1) as f32;
         factors.sky = counts.iter().map(sky).collect();
@@ -109,7 +96,7 @@ impl FormFactors {
                 met / f64::from((own.count - own.inside).max(1))
             })
             .collect();
-        factors.scale_rows(&row_sums, &exact);
+        factors.scale_rows(&row_sums);
         factors
     }
 
@@ -135,13 +122,11 @@ impl FormFactors {
         self.row(i).map(|(_, g)| g).sum::<f64>() / f64::from(self.areas[i.place()])
     }
 
-    /// Symmetric scaling d_i G_ij d_j towards the given row sums (Sinkhorn and Knopp), but of what is `exact`; then what still exceeds
-    /// 1 is cut.
-    fn scale_rows(&mut self, targets: &[f64], exact: &[bool]) {
+    /// Symmetric scaling d_i G_ij d_j towards the given row sums (Sinkhorn and Knopp); then what still exceeds 1 is cut.
+    fn scale_rows(&mut self, targets: &[f64]) {
         // The square root of the correction keeps the alternation from overshooting; pooling leaves some per cent,
         // and each round halves what is left.
         const ROUNDS: usize = 12;
-        let exact_sums = self.sums(|k| exact[k]);
         let mut scale = vec![1.0f64; self.len()];
         for _ in 0..ROUNDS {
             if self.stop.is_cancelled() {
@@ -150,13 +135,12 @@ impl FormFactors {
             let next: Vec<f64> = (0..self.len())
                 .into_par_iter()
                 .map(|i| {
-                    let entries = self.row(PatchIndex::new(i)).zip(&exact[self.starts[i]..]);
-                    let counted = entries.filter(|(_, exact)| !**exact);
-                    let sum: f64 = counted.map(|((j, g), _)| g * scale[j.place()]).sum::<f64>() * scale[i];
-                    let target = targets[i] * f64::from(self.areas[i]) - exact_sums[i];
+                    let entries = self.row(PatchIndex::new(i));
+                    let sum = entries.map(|(j, g)| g * scale[j.place()]).sum::<f64>() * scale[i];
+                    let target = targets[i] * f64::from(self.areas[i]);
                     // A patch that sees what does not see it keeps its own estimate within a factor.
                     if sum > 0.0 && targets[i] > 0.0 {
-                        scale[i] * (target.max(0.0) / sum).sqrt().clamp(0.5, 2.0)
+                        scale[i] * (target / sum).sqrt().clamp(0.5, 2.0)
                     } else {
                         scale[i]
                     }
@@ -165,19 +149,10 @@ impl FormFactors {
             scale = next;
         }
         let scale: Vec<f64> = scale.iter().map(|s| s.clamp(0.25, 4.0)).collect();
-        self.multiply(|k, i, j| if exact[k] { 1.0 } else { scale[i.place()] * scale[j.place()] });
+        self.multiply(|i, j| scale[i.place()] * scale[j.place()]);
         let before = self.total();
-        let counted_sums = self.sums(|k| !exact[k]);
-        let over: Vec<f64> = (0..self.len())
-            .map(|i| {
-                let room = (f64::from(self.areas[i]) - exact_sums[i]).max(0.0);
-                if counted_sums[i] > room { room / counted_sums[i] } else { 1.0 }
-            })
-            .collect();
-        self.multiply(|k, i, j| if exact[k] { 1.0 } else { over[i.place()].min(over[j.place()]) });
-        // Only what rounding leaves.
         let over: Vec<f64> = PatchIndex::all(self.len()).map(|i| 1.0 / self.row_sum(i).max(1.0)).collect();
-        self.multiply(|_, i, j| over[i.place()].min(over[j.place()]));
+        self.multiply(|i, j| over[i.place()].min(over[j.place()]));
         self.energy_lost = if before > 0.0 { 1.0 - self.total() / before } else { 0.0 };
     }
 
@@ -185,20 +160,14 @@ impl FormFactors {
         self.exchange.iter().map(|&g| f64::from(g)).sum()
     }
 
-    /// Of each row the sum of the entries that `of` picks by their place.
-    fn sums(&self, of: impl Fn(usize) -> bool) -> Vec<f64> {
-        let entries = |i: PatchIndex| self.places(i).filter(|&k| of(k));
-        PatchIndex::all(self.len()).map(|i| entries(i).map(|k| f64::from(self.exchange[k])).sum()).collect()
-    }
-
-    /// By a factor of an entry's place, row and column.
-    fn multiply(&mut self, factor: impl Fn(usize, PatchIndex, PatchIndex) -> f64) {
+    /// By a factor of an entry's row and column.
+    fn multiply(&mut self, factor: impl Fn(PatchIndex, PatchIndex) -> f64) {
         for i in PatchIndex::all(self.len()) {
             if self.stop.is_cancelled() {
                 break;
             }
             for k in self.places(i) {
-                self.exchange[k] = (f64::from(self.exchange[k]) * factor(k, i, self.columns[k])) as f32;
+                self.exchange[k] = (f64::from(self.exchange[k]) * factor(i, self.columns[k])) as f32;
             }
         }
     }
@@ -291,62 +260,31 @@ pub(super) fn counted(mut met: Vec<PatchIndex>) -> Vec<(PatchIndex, u32)> {
 }
 
 /// Both directions of a pair count the same flux: N_ij has mean R_i G/A_i, N_ji has mean R_j G/A_j. The best estimate of
-/// G from two Poisson counts is their sum over the sum of their rates. (A line counts in both directions, which weighs the same.) Pairs whose
-/// exchange is known have that instead; with the entries comes which of them do.
-fn pool(
-    counts: &[Counts],
-    near: &NearPairs,
-    areas: Vec<f32>,
-    stop: &CancelToken,
-) -> (FormFactors, Vec<bool>) {
+/// G from two Poisson counts is their sum over the sum of their rates. (A line counts in both directions, which weighs the same.)
+fn pool(counts: &[Counts], areas: Vec<f32>, stop: &CancelToken) -> FormFactors {
     let incoming = Incoming::new(counts, stop);
     let rates: Vec<f64> =
         counts.iter().zip(&areas).map(|(own, &area)| f64::from(own.count) / f64::from(area)).collect();
-    let row = |i: PatchIndex| -> Vec<(PatchIndex, f32, bool)> {
+    let row = |i: PatchIndex| -> Vec<(PatchIndex, f32)> {
         if stop.is_cancelled() {
             return Vec::new();
         }
-        let (out, into, known) = (&counts[i.place()].met[..], incoming.row(i), near.row(i));
-        let (mut x, mut y, mut z) = (0, 0, 0);
-        let mut row = Vec::with_capacity(out.len() + into.len() + known.len());
-        let next = |list: &[(PatchIndex, u32)], at: usize| list.get(at).map(|entry| entry.0);
-        loop {
-            let [a, b, c] = [next(out, x), next(into, y), known.get(z).map(|entry| entry.0)];
-            let j = [a, b, c].into_iter().flatten().min();
-            let Some(column) = j else { return row };
-            let mut n = 0;
-            if a == j {
-                (n, x) = (n + out[x].1, x + 1);
-            }
-            if b == j {
-                (n, y) = (n + into[y].1, y + 1);
-            }
-            if c == j {
-                row.push((column, known[z].1, true));
-                z += 1;
-            } else {
-                let rate = rates[i.place()] + rates[column.place()];
-                row.push((column, (f64::from(n) / rate) as f32, false));
-            }
-        }
+        let entry =
+            |(j, n): (PatchIndex, u32)| (j, (f64::from(n) / (rates[i.place()] + rates[j.place()])) as f32);
+        merged(&counts[i.place()].met, incoming.row(i)).into_iter().map(entry).collect()
     };
-    let mut factors = FormFactors { starts: vec![0], stop: stop.clone(), ..FormFactors::default() };
-    let mut exact = Vec::new();
+    let mut factors = FormFactors { starts: vec![0], stop: stop.clone(), areas, ..FormFactors::default() };
     // Some rows at a time, so that they are not all there twice.
     for first in (0..counts.len()).step_by(ROWS) {
-        let rows: Vec<_> = (first..(first + ROWS).min(counts.len()))
-            .into_par_iter()
-            .map(|i| row(PatchIndex::new(i)))
-            .collect();
+        let places = first..(first + ROWS).min(counts.len());
+        let rows: Vec<_> = places.into_par_iter().map(|i| row(PatchIndex::new(i))).collect();
         for row in rows {
             factors.columns.extend(row.iter().map(|entry| entry.0));
             factors.exchange.extend(row.iter().map(|entry| entry.1));
-            exact.extend(row.iter().map(|entry| entry.2));
             factors.starts.push(factors.columns.len());
         }
     }
-    factors.areas = areas;
-    (factors, exact)
+    factors
 }
 
 /// Rows that are made side by side.

@@ -1,5 +1,5 @@
 //! Patches put together in larger ones, cut as patches are: which are in which, and what the larger ones exchange. Not what is read of it: that
-//! is `coarser` and `sampling_guide`.
+//! is `size_error` and `sampling_guide`.
 
 use rayon::prelude::*;
 

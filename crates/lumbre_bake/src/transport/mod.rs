@@ -2,10 +2,8 @@
 //! Not the texels that show it.
 
 pub(crate) mod clipping;
-mod coarser;
 mod components;
 pub(crate) mod contacts;
-mod contour;
 mod cosine_rays;
 pub(crate) mod cut_out;
 pub(crate) mod cuts;
@@ -29,7 +27,6 @@ mod light_tree;
 mod mean_of_points;
 #[cfg(test)]
 mod method_study_tests;
-mod near_pairs;
 pub(crate) mod patch_index;
 #[cfg(test)]
 mod patch_tests;
@@ -43,6 +40,7 @@ pub(crate) mod shadow_clipping;
 pub(crate) mod shaft;
 mod share_variance;
 pub(crate) mod shared_samples;
+mod size_error;
 pub(crate) mod solution;
 mod solver;
 mod stationary;

@@ -16,7 +16,7 @@ pub const ROWS: [(&str, &str); 13] = [
     ),
     (
         "patches sharing an edge: the gap to 0",
-        "Direct light is Lambert's polygon formula, which has no singularity. Between patches the closed form decides, by rays and by contours, down to a shared edge: [form factors](../crates/lumbre_bake/src/transport/form_factor_tests.rs) `perpendicular_squares_down_to_a_shared_edge`, `parallel_squares`.",
+        "Direct light is Lambert's polygon formula, which has no singularity. Between patches rays are held to the closed form, down to a shared edge: [form factors](../crates/lumbre_bake/src/transport/form_factor_tests.rs) `perpendicular_squares_down_to_a_shared_edge`, `parallel_squares`.",
     ),
     (
         "coplanar faces, a lamp in the ceiling's plane, duplicate triangles",

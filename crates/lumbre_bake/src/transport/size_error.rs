@@ -1,7 +1,8 @@
 //! What the patches' size leaves in their light: the same system with patches twice as large, each the sum of those that it is made of, no
-//! ray more. The mean light of constant elements converges with the square of their size (as in Galerkin's method; Troutman and Max,
-//! "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993): by Richardson's extrapolation a third of what differs between the
-//! two is what the finer one is still off by. Not the noise of form factors: that is told by two halves of the rays.
+//! ray more. The mean light of constant elements converges with a power of their size: the second where light is smooth (as in Galerkin's method;
+//! Troutman and Max, "Radiosity Algorithms Using Higher Order Finite Element Methods", 1993), a lower one in rooms, whose shadows have edges that
+//! no patch follows. By Richardson's extrapolation that tells, from what differs between the two, what the finer one is still off by. Not the noise
+//! of form factors: that is told by two halves of the rays.
 
 use super::form_factors::FormFactors;
 use super::larger_patches::LargerPatches;
@@ -13,8 +14,8 @@ use crate::scene::BakeScene;
 
 /// Times larger.
 const COARSER: f32 = 2.0;
-/// Of the difference between both, the part that the finer one is off by: 1 / (2² - 1).
-const LEFT: f64 = 1.0 / 3.0;
+/// The power of the patches' size with which the error falls, as it was measured in rooms.
+const ORDER: f64 = 1.2;
 
 /// The error, with its sign, of each patch's irradiance by bounces, for grey reflectances, and light that direct light and the sky have
 /// brought (`first`, W/m²); `side` is the patches' own.
@@ -49,7 +50,9 @@ pub(super) fn size_error(
     let solution = solver.solve(&coarse, &mean(&|i| reflectance[i]), &mean(&|i| emission[i]), tolerance);
     let found = gather(&coarse, &solution.radiosity);
     let expected = mean(&|i| fine[i]);
-    let left = |large: &PatchIndex| (LEFT * (found[large.place()] - expected[large.place()])) as f32;
+    // Of what differs, the part that the finer one is off by.
+    let part = 1.0 / (f64::from(COARSER).powf(ORDER) - 1.0);
+    let left = |large: &PatchIndex| (part * (found[large.place()] - expected[large.place()])) as f32;
     larger.of.iter().map(left).collect()
 }
 
