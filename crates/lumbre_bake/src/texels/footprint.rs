@@ -46,6 +46,8 @@ pub(crate) struct Texel {
 /// Points along a side of a texel that several triangles share, and of one that geometry hides in part.
 const COARSE: u32 = 4;
 pub(crate) const FINE: u32 = 8;
+/// Points of a texel that several triangles fill.
+pub(crate) const GRID: usize = (COARSE * COARSE) as usize;
 
 /// The covered texels of all maps, map by map, row by row.
 pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texel> {

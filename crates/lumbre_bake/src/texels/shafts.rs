@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::footprint::{Footprint, Texel};
+use super::footprint::{Footprint, FootprintPoint, GRID, Texel, barycentric};
 use super::light_cuts::LightCuts;
 use super::light_visibility::visibilities;
 use super::tiles::{Tiles, area, positions_of, shows_plane};
@@ -134,7 +134,11 @@ impl<'a> Shafts<'a> {
 
     /// What may stand between a texel, by its number, and those of the sources for which that is known.
     pub fn visibility(&self, place: usize, texel: &Texel) -> Visibility<'_> {
-        let Some(&tile) = self.tile_of.get(place) else { return Visibility::UNKNOWN };
+        // Asked for by lights alone.
+        let square = if self.sources.lights.is_empty() { None } else { square(self.scene, texel) };
+        let Some(&tile) = self.tile_of.get(place) else {
+            return Visibility { square, ..Visibility::UNKNOWN };
+        };
         let tile = &self.tiles[tile as usize];
         let (mut own, mut positions) = (None, Vec::new());
         let one = |of_part: &OfPart| {
@@ -166,6 +170,7 @@ impl<'a> Shafts<'a> {
             parts,
             lights: &tile.lights,
             receiver_shape: in_shadow.then(|| receiver_shape(self.scene, texel)),
+            square,
         }
     }
 }
@@ -179,6 +184,31 @@ fn receiver_shape(scene: &BakeScene, texel: &Texel) -> ReceiverShape {
         (Footprint::Whole(_), [a, b, d, c]) => ReceiverShape::Parallelogram([a, b, c, d].map(place)),
         _ => ReceiverShape::Points(positions.iter().map(place).collect()),
     }
+}
+
+/// Of the distance that two corners of a texel have, how far its points may lie from the square of its triangle.
+const FLAT: f32 = 1e-3;
+
+/// The corners of a texel whose square is filled by one triangle, or by several as if they were one.
+fn square(scene: &BakeScene, texel: &Texel) -> Option<[DVec3; 4]> {
+    let triangle = &scene.triangles[texel.triangle as usize];
+    let corner = Vec2::new(texel.x as f32, texel.y as f32);
+    let place = |offset: Vec2| barycentric(triangle, corner + offset).map(|(u, v)| triangle.position(u, v));
+    let corners = [place(Vec2::ZERO)?, place(Vec2::X)?, place(Vec2::ONE)?, place(Vec2::Y)?];
+    let near = FLAT * corners[0].distance(corners[2]);
+    let fills = match &texel.footprint {
+        Footprint::Whole(_) => true,
+        Footprint::Points(points) => {
+            let on_square = |point: &FootprintPoint| {
+                let (u, v) = point.at;
+                let found = scene.triangles[point.triangle as usize].position(u, v);
+                place(point.offset).is_some_and(|place| place.distance(found) <= near)
+            };
+            points.len() == GRID && points.iter().all(on_square)
+        }
+        Footprint::Hidden => false,
+    };
+    fills.then(|| corners.map(|corner| corner.as_dvec3()))
 }
 
 /// Most triangles that may stand before an emitter, and most emitters of a lamp: beyond, rays are quicker.

@@ -41,6 +41,7 @@ pub(crate) mod shaft;
 mod share_variance;
 pub(crate) mod shared_samples;
 mod size_error;
+mod solid_angle;
 pub(crate) mod solution;
 mod solver;
 mod stationary;

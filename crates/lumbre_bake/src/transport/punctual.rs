@@ -7,7 +7,7 @@ use lumbre_optics::{BakeMode, LightKind};
 
 use super::cut_out::{GAP, Pieces};
 use super::direct::{BATCHES, Direct, Receiver, Sources, batch_of, variance_of_mean};
-use super::punctual_irradiance::{PunctualIrradiance, of_center, punctual_irradiance};
+use super::punctual_irradiance::{PunctualIrradiance, of_center, over_parallelogram, punctual_irradiance};
 use super::receiver_quadrature::ReceiverQuadrature;
 use super::shadow_clipping::{LightVisibility, ReceiverShape};
 use super::share_variance::share_variance;
@@ -59,8 +59,8 @@ impl Sum {
     }
 
     /// Mean irradiance per unit of colour, and its variance: the light of the centre times the seen share of the disc, which is
-    /// exact in full light and in full shadow; the seen disc's own mean where the horizon cuts it.
-    fn mean(&self, samples: u32) -> (f32, f32) {
+    /// exact in full light and in full shadow; the seen disc's own mean where the horizon cuts it. The light of the centre may be known.
+    fn mean(&self, samples: u32, known_center: Option<f32>) -> (f32, f32) {
         let samples = samples.max(1) as f32;
         let per_batch = BATCHES as f32 / samples;
         let total = |sums: &[f32; BATCHES]| sums.iter().sum::<f32>();
@@ -68,13 +68,17 @@ impl Sum {
         if self.sets || all <= 0.0 {
             return (total(&self.seen) / samples, variance_of_mean(self.seen.map(|sum| sum * per_batch)));
         }
-        let (center, share) = (total(&self.center) / samples, total(&self.seen) / all);
+        let center = known_center.unwrap_or(total(&self.center) / samples);
+        let share = total(&self.seen) / all;
         let of_batch = |batch: usize| match self.disc[batch] > 0.0 {
             true => self.seen[batch] / self.disc[batch],
             false => share,
         };
         let shares = std::array::from_fn(of_batch);
-        let uneven = variance_of_mean(self.center.map(|sum| sum * per_batch));
+        let uneven = match known_center {
+            Some(_) => 0.0,
+            None => variance_of_mean(self.center.map(|sum| sum * per_batch)),
+        };
         let partly = share_variance(shares, share, self.visible + self.hidden);
         (center * share, center * center * partly + share * share * uneven)
     }
@@ -117,7 +121,8 @@ impl Sources<'_> {
             Some(known) if !placed.is_sized() => self.past_shadows(index, known, visibility, point, direct),
             known => {
                 let clear = matches!(known, Some(LightVisibility::Clear));
-                self.sampled(index, clear, sequence, samples, point, direct)
+                let center = if placed.is_sized() { None } else { self.near(placed, visibility, point) };
+                self.sampled(index, (clear, center), sequence, samples, point, direct)
             }
         };
         let color = placed.light.diffuse;
@@ -130,11 +135,22 @@ impl Sources<'_> {
         }
     }
 
-    /// Mean irradiance of a light per unit of its colour, and its variance, by samples; by no rays if nothing stands between.
+    /// Of a light without size that is near a receiver on a plane the mean over all of it, whatever lies between.
+    fn near(
+        &self,
+        light: &PlacedLight,
+        visibility: &Visibility<'_>,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+    ) -> Option<f32> {
+        over_parallelogram(self.scene, light, visibility.square.as_ref()?, &point(0.5, 0.5)?)
+    }
+
+    /// Mean irradiance of a light per unit of its colour, and its variance, by samples; by no rays if all is `clear`, and that of its `center`
+    /// as it is known, if it is.
     fn sampled(
         &self,
         index: u32,
-        clear: bool,
+        (clear, center): (bool, Option<f32>),
         sequence: Sequence,
         samples: u32,
         point: &impl Fn(f32, f32) -> Option<Receiver>,
@@ -155,7 +171,7 @@ impl Sources<'_> {
         direct.rays += if clear { 0 } else { sum.visible + sum.hidden };
         direct.sampled |= !clear || sum.sets;
         direct.seen.add(FIRST_ID + index, sum.visible, sum.hidden);
-        sum.mean(samples)
+        sum.mean(samples, center)
     }
 
     /// The same for a light without size, exactly but for what differs within a lit piece of the receiver.
@@ -169,8 +185,10 @@ impl Sources<'_> {
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
         let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
-        let open =
+        let by_points =
             || ReceiverQuadrature::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
+        let open =
+            || self.near(light, visibility, point).map_or_else(by_points, |mean| (Vec3::splat(mean), 0.0));
         let (LightVisibility::Shadows(origin, shadows), Some(shape)) = (known, &visibility.receiver_shape)
         else {
             direct.seen.add(FIRST_ID + index, 1, 0);
@@ -196,8 +214,8 @@ impl Sources<'_> {
             _ => sum as f32,
         };
         // Of points in four rows or more, an edge is off by half a row at most.
-        let by_points = if hidden > 0 && !exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
-        (mean, variance * lit * lit + by_points)
+        let of_edges = if hidden > 0 && !exact { (open.x * HALF_A_ROW).powi(2) / 3.0 } else { 0.0 };
+        (mean, variance * lit * lit + of_edges)
     }
 }
 

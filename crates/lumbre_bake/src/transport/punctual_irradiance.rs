@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use lumbre_optics::{Light, LightKind, evaluate_light};
 
 use super::direct::Receiver;
+use super::solid_angle::of_parallelogram;
 use crate::scene::{BakeScene, PlacedLight};
 
 /// What arrives at a point from a light, whatever lies between.
@@ -46,6 +47,50 @@ pub(super) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Rece
     }
     let light = (strength * axis.dot(receiver.normal.as_dvec3()).max(0.0)) as f32;
     if light.is_finite() { light } else { 0.0 }
+}
+
+/// Of the side of a parallelogram, how far a light may be from its middle to count as near: beyond, a few points tell the mean to 0.01 %.
+const NEAR: f64 = 4.0;
+
+/// The mean over a parallelogram (its corners one after the other, canonical units) of a near light without size, per unit of its colour, whatever
+/// lies between: what a law of inverse squares sends through a surface is its solid angle, however close the light is. The window of a
+/// range and what a smooth normal differs by are those of the point nearest to the light, where most of it falls. `None` for other laws, for
+/// cones, and for lights that are not near.
+pub(super) fn over_parallelogram(
+    scene: &BakeScene,
+    placed: &PlacedLight,
+    corners: &[DVec3; 4],
+    middle: &Receiver,
+) -> Option<f32> {
+    let (light, law) = (&placed.light, &placed.light.attenuation);
+    let is_inverse_square = law.constant == 0.0 && law.linear == 0.0 && !law.clamp;
+    if light.kind != LightKind::Point || light.spot.is_some() || !is_inverse_square {
+        return None;
+    }
+    let eye = scene.space.place(placed.position);
+    let [a, right, _, up] = corners.map(|corner| corner - eye);
+    let (along, across) = (right - a, up - a);
+    let area = along.cross(across).length();
+    let to_middle = a + 0.5 * (along + across);
+    if area == 0.0 || to_middle.length_squared() > NEAR * NEAR * area {
+        return None;
+    }
+    // The light's foot, or the nearest to it that there is.
+    let [u, v] =
+        [along, across].map(|edge| (0.5 - to_middle.dot(edge) / edge.length_squared()).clamp(0.0, 1.0));
+    let nearest = Receiver { position: (corners[0] + along * u + across * v).as_vec3(), ..*middle };
+    let PunctualIrradiance { axis, distance, strength } =
+        punctual_irradiance(scene, placed, nearest.position)?;
+    let [cosine, facet] =
+        [nearest.normal, nearest.geometric_normal].map(|normal| axis.dot(normal.as_dvec3()));
+    if facet <= 0.0 {
+        return None;
+    }
+    let intensity = strength * distance * distance;
+    let solid_angle = of_parallelogram(corners.map(|corner| corner - eye));
+    let mean = intensity * solid_angle * scene.space.scale.powi(2) / area * (cosine.max(0.0) / facet);
+    let mean = mean as f32;
+    mean.is_finite().then_some(mean)
 }
 
 /// A light's factor at a distance in metres, without the floor that a frame sets at a centimetre: a model of a few centimetres has the

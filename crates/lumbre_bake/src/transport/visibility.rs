@@ -1,5 +1,7 @@
 //! What is known of the ways from a receiver to the sources. Not how it is found: that is `shaft`; not the light: that is `direct`.
 
+use glam::DVec3;
+
 use super::shadow_clipping::{LightVisibility, ReceiverShape};
 use super::shaft::Corners;
 
@@ -11,6 +13,8 @@ pub(crate) struct Visibility<'a> {
     pub lights: &'a [(u32, LightVisibility)],
     /// What the receiver shows, where shadows of lights may fall on it.
     pub receiver_shape: Option<ReceiverShape>,
+    /// Its corners, one after the other, if it is all of a parallelogram; canonical units.
+    pub square: Option<[DVec3; 4]>,
 }
 
 /// The triangles that may stand between a receiver and the emitters of one part of the sources: no others do.
@@ -22,7 +26,7 @@ pub(crate) struct PartOccluders {
 
 impl Visibility<'_> {
     /// Nothing is known.
-    pub const UNKNOWN: Self = Self { parts: Vec::new(), lights: &[], receiver_shape: None };
+    pub const UNKNOWN: Self = Self { parts: Vec::new(), lights: &[], receiver_shape: None, square: None };
 
     /// What is known of a light, by its number.
     pub fn of_light(&self, light: u32) -> Option<&LightVisibility> {

