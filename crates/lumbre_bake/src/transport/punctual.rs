@@ -21,6 +21,9 @@ pub(super) const FIRST_ID: u32 = 1 << 31;
 /// Inside the sphere, or near it, its disc is at most this large: a sine. It bounds what one sample weighs to 1/√(1 - this²) = 7.
 const LARGEST_SINE: f64 = 0.99;
 
+/// Fewest shadow rays to a near light: a thing the size of its fittings hides much of what it sends, from a small part of the texel.
+const NEAR_SAMPLES: u32 = 64;
+
 /// Of a receiver's side, half of the way from one row of its points to the next.
 const HALF_A_ROW: f32 = 0.125;
 
@@ -75,10 +78,8 @@ impl Sum {
             false => share,
         };
         let shares = std::array::from_fn(of_batch);
-        let uneven = match known_center {
-            Some(_) => 0.0,
-            None => variance_of_mean(self.center.map(|sum| sum * per_batch)),
-        };
+        // Where its light is uneven, the seen share is as uncertain as the mean by the samples.
+        let uneven = variance_of_mean(self.center.map(|sum| sum * per_batch));
         let partly = share_variance(shares, share, self.visible + self.hidden);
         (center * share, center * center * partly + share * share * uneven)
     }
@@ -160,6 +161,7 @@ impl Sources<'_> {
         let mut sum = Sum::default();
         let sequence = sequence.of(1 + index);
         let sized = light.is_sized();
+        let samples = if center.is_some() && !clear { samples.max(NEAR_SAMPLES) } else { samples };
         for sample in 0..samples {
             let [a, b, c, d] = sequence.point(sample, 0);
             let (x, y, u, v) = if sized { (c, d, a, b) } else { (a, b, c, d) };
@@ -171,7 +173,8 @@ impl Sources<'_> {
         direct.rays += if clear { 0 } else { sum.visible + sum.hidden };
         direct.sampled |= !clear || sum.sets;
         direct.seen.add(FIRST_ID + index, sum.visible, sum.hidden);
-        sum.mean(samples, center)
+        // Of a near light a shadow takes what the few samples in it do not tell.
+        sum.mean(samples, center.filter(|_| sum.hidden == 0))
     }
 
     /// The same for a light without size, exactly but for what differs within a lit piece of the receiver.
@@ -185,10 +188,11 @@ impl Sources<'_> {
     ) -> (f32, f32) {
         let light = &self.lights[index as usize];
         let arriving = |receiver: &Receiver| of_center(self.scene, light, receiver);
-        let by_points =
-            || ReceiverQuadrature::mean(|x, y| point(x, y).map(|receiver| Vec3::splat(arriving(&receiver))));
-        let open =
-            || self.near(light, visibility, point).map_or_else(by_points, |mean| (Vec3::splat(mean), 0.0));
+        let by_points = || ReceiverQuadrature::mean(|x, y| Some(Vec3::splat(arriving(&point(x, y)?))));
+        let open = || match self.near(light, visibility, point) {
+            Some(mean) => (Vec3::splat(mean), 0.0),
+            None => by_points(),
+        };
         let (LightVisibility::Shadows(origin, shadows), Some(shape)) = (known, &visibility.receiver_shape)
         else {
             direct.seen.add(FIRST_ID + index, 1, 0);
@@ -206,7 +210,8 @@ impl Sources<'_> {
         if lit == 0.0 {
             return (0.0, 0.0);
         }
-        let (open, variance) = open();
+        // Of a near light a shadow takes what no piece's middle tells.
+        let (open, variance) = if hidden == 0 { open() } else { by_points() };
         // Pieces have one point each, all of the receiver several.
         let whole = arriving(&middle);
         let mean = match shape {

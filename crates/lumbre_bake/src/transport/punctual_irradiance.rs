@@ -52,10 +52,13 @@ pub(super) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Rece
 /// Of the side of a parallelogram, how far a light may be from its middle to count as near: beyond, a few points tell the mean to 0.01 %.
 const NEAR: f64 = 4.0;
 
+/// Of a light's range, how far all of it may be from the light: there the window is above 0.998.
+const WELL_IN_RANGE: f64 = 0.2;
+
 /// The mean over a parallelogram (its corners one after the other, canonical units) of a near light without size, per unit of its colour, whatever
 /// lies between: what a law of inverse squares sends through a surface is its solid angle, however close the light is. The window of a
 /// range and what a smooth normal differs by are those of the point nearest to the light, where most of it falls. `None` for other laws, for
-/// cones, and for lights that are not near.
+/// cones, for ranges that end not far beyond, and for lights that are not near.
 pub(super) fn over_parallelogram(
     scene: &BakeScene,
     placed: &PlacedLight,
@@ -73,6 +76,10 @@ pub(super) fn over_parallelogram(
     let area = along.cross(across).length();
     let to_middle = a + 0.5 * (along + across);
     if area == 0.0 || to_middle.length_squared() > NEAR * NEAR * area {
+        return None;
+    }
+    let farthest = corners.map(|corner| (corner - eye).length()).into_iter().fold(0.0, f64::max);
+    if farthest > WELL_IN_RANGE * f64::from(law.range) * scene.space.scale {
         return None;
     }
     // The light's foot, or the nearest to it that there is.
