@@ -49,7 +49,7 @@ pub(super) fn of_center(scene: &BakeScene, placed: &PlacedLight, receiver: &Rece
     if light.is_finite() { light } else { 0.0 }
 }
 
-/// Of the side of a parallelogram, how far a light may be from its middle to count as near: beyond, a few points tell the mean to 0.01 %.
+/// Of the side of a parallelogram, how far a light may be from its middle to count as near: beyond, a few points tell the mean to 0.02 %.
 const NEAR: f64 = 4.0;
 
 /// Of a light's range, how far all of it may be from the light: there the window is above 0.998.
