@@ -2,6 +2,8 @@
 //! their features; no device is known here.
 //!
 //! ```text
+//!   g_buffer, deferred_lighting                                  the same surfaces, lit after all of them are drawn
+//!      ▼
 //!   forward ──► lighting, light_clusters, lightmap, textures …   the passes of lumbre_render
 //!      │           └──► optics/…                                 the equations, each with its f64 twin in lumbre_optics
 //!      ▼
@@ -32,10 +34,12 @@ macro_rules! modules {
 
 modules!(
     "behind",
+    "deferred_lighting",
     "display",
     "display_color",
     "forward",
     "frame",
+    "g_buffer",
     "irradiance_volume",
     "light_clusters",
     "light_counts",

@@ -17,6 +17,7 @@ use lumbre_optics::{
 use lumbre_render::effects::BuiltIn;
 use lumbre_render::{
     Display, FrameOptions, FrameReport, LightLists, Measure, Offscreen, OffscreenFormat, Renderer,
+    RenderingPath,
 };
 use lumbre_scene::{
     AmbientCube, Camera, Census, EmissiveLight, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
@@ -66,7 +67,9 @@ fn scene() -> Scene {
     let ball = world.spawn((Mesh(Arc::new(ball)), Material::matt(Vec3::splat(0.6)))).id();
     let camera = world.spawn((Camera::default(), Transform::from_xyz(0.0, 0.0, 3.5))).id();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.1), ..SceneSettings::default() });
-    Scene { world, ball, camera, options: FrameOptions::default(), format: OffscreenFormat::Rgba8 }
+    // Whatever draws.
+    let options = FrameOptions { rendering_path: RenderingPath::Forward, ..FrameOptions::default() };
+    Scene { world, ball, camera, options, format: OffscreenFormat::Rgba8 }
 }
 
 fn nothing(_: &mut Scene) {}
@@ -223,6 +226,13 @@ const ROWS: &[Row] = &[
             spawn(scene, ranged(Light::spot(Vec3::splat(9.0), cone)));
         },
         add: |scene| scene.options.light_lists = LightLists::Clusters,
+    },
+    Row {
+        effect: "deferred shading",
+        called_for_by: "`RenderingPath::Deferred`; by itself where a processor draws many lights with a range",
+        features: &["DEFERRED"],
+        before: |scene| spawn(scene, ranged(Light::point(Vec3::splat(9.0)))),
+        add: |scene| scene.options.rendering_path = RenderingPath::Deferred,
     },
     Row {
         effect: "shadows",
@@ -664,6 +674,8 @@ const NO_SCENE: &[(&str, &str)] = &[
     ("DISPLAY", "that the display is folded in, with a tone curve, a clamp or neither"),
     ("VIEWPORT", "frames in a part of their target: `display`'s tests"),
     ("MULTISAMPLED", "depths of several samples behind glass: `refraction`'s tests"),
+    ("G_BUFFER_DETAILS", "what the G-buffer holds of lightmaps and textures: `rendering_paths`' tests"),
+    ("TABLES_IN_TEXTURES", "of the device: where a processor draws"),
     ("DECODE_SRGB", "targets that encode by themselves: `display`'s tests"),
 ];
 
@@ -713,7 +725,7 @@ fn wgsl(variant: &str, is_there: impl Fn(&str) -> bool) -> String {
     let features: Vec<_> = variant.split(' ').map(|feature| (feature, true)).collect();
     let program = Program {
         modules: &modules,
-        root: "forward",
+        root: if variant.split(' ').any(|word| word == "DEFERRED") { "deferred_lighting" } else { "forward" },
         features: &features,
         unnamed: UnnamedFeatures::AreOff,
         kept: Kept::EntryPoints,
@@ -790,8 +802,9 @@ fn line(row: &Row) -> String {
     let plain = draw(&mut Renderer::new(gpu()), &mut without());
     let mut renderer = renderer();
     let effect = draw(&mut renderer, &mut with);
-    // Lists of lights are another way to the same picture, and what counts draws the same one.
-    let same_picture = ["CLUSTERS", "COUNT_LIGHTS"].iter().any(|feature| row.features.contains(feature));
+    // Lists of lights and deferred shading are other ways to the same picture, and what counts draws the same one.
+    let same_picture =
+        ["CLUSTERS", "COUNT_LIGHTS", "DEFERRED"].iter().any(|feature| row.features.contains(feature));
     let shown = effect.bytes != plain.bytes || same_picture;
     assert!(shown, "{}: the scene does not show it", row.effect);
     // What is left of it in a renderer that has drawn it, and in one that knows it and never did.
@@ -817,7 +830,9 @@ fn line(row: &Row) -> String {
         assert!(!words(&plain.variants).contains(feature), "{}: {feature} without it", row.effect);
     }
     let (has, had) = (contents(&effect.variants), contents(&plain.variants));
-    let modules: Vec<_> = has.modules.difference(&had.modules).copied().collect();
+    let modules = has.modules.difference(&had.modules).copied();
+    // The root of other variants has no path in names, and is imported where deferred shading is the root.
+    let modules: Vec<_> = modules.filter(|module| *module != "forward").collect();
     // The frame is that of a renderer without its modules: its shaders are, to the letter.
     for variant in &plain.variants {
         let built_without = wgsl(variant, |path| !modules.contains(&path));

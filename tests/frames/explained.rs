@@ -10,7 +10,7 @@ use lumbre_optics::{
     AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Light, Material, ReflectionModel, Shading,
     SpotCone, Surface,
 };
-use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer, explain};
+use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{
     AmbientCube, Camera, Census, ChildOf, DynamicObject, EmissiveLight, Hidden, IrradianceVolume, Lightmap,
     LightmapEncoding, LightmapImage, MaterialTextures, Mesh, NormalTexture, OcclusionTexture, SceneSettings,
@@ -183,7 +183,7 @@ fn what_is_explained_is_what_is_drawn() {
         };
         let report = renderer.render(&mut world, &target.target(), &options).unwrap();
         assert_eq!(report.statistics.objects_outside, 0, "all is in view");
-        let explained = explain(&mut world, &options, 48, 32).unwrap();
+        let explained = renderer.explain(&mut world, &options, 48, 32).unwrap();
         let named: Vec<&str> = explained
             .frame
             .passes

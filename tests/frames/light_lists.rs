@@ -9,7 +9,7 @@ use lumbre_mesh::shapes;
 use lumbre_optics::{
     AlphaMode, Attenuation, BakeMode, Light, Material, ReflectionModel, Shading, SpotCone, Surface,
 };
-use lumbre_render::{FrameOptions, FrameReport, LightLists, Measure, PassLights};
+use lumbre_render::{FrameOptions, FrameReport, LightLists, Measure, PassLights, RenderingPath};
 use lumbre_scene::{Camera, Mesh, Projection, SceneSettings, Transform};
 
 use crate::adapter::{draw, linear};
@@ -95,7 +95,9 @@ fn any_light(random: &mut Random, world: &mut World) {
 }
 
 fn by(lists: LightLists) -> FrameOptions {
-    FrameOptions { light_lists: lists, shading: Some(Shading::Phong), ..linear() }
+    // Which rounds as brute force does; rendering_paths.rs has the other.
+    let rendering_path = RenderingPath::Forward;
+    FrameOptions { light_lists: lists, rendering_path, shading: Some(Shading::Phong), ..linear() }
 }
 
 /// The largest difference of two frames, each pixel's relative to its brightest channel and a hundredth.

@@ -35,6 +35,7 @@ mod polygon_lights;
 mod properties;
 mod reflection;
 mod refraction;
+mod rendering_paths;
 mod settings;
 mod shading_by_need;
 mod shadows;

@@ -115,6 +115,7 @@ fn no_frame_of_a_test_goes_past_the_probe() -> Outcome {
                 "frames/explained.rs",
                 "frames/missing_pipelines.rs",
                 "frames/own_effects.rs",
+                "frames/rendering_paths.rs",
                 "frames/shadows.rs",
                 "frames/unchanged.rs",
                 "hard_cases/probe.rs",

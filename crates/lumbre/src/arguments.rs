@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use lumbre::optics::{FlatRule, NoShading, ReflectionModel, Shading};
-use lumbre::render::Display;
+use lumbre::render::{Display, RenderingPath};
 use lumbre::scene::{FrameSettings, PackedFormat, ShadowFilter};
 use lumbre::trace::{Aov, DEFAULT_WEIGHT, Filter, Integrator, TreeFormat};
 
@@ -538,6 +538,9 @@ pub struct Frame {
     /// Filters highlights within pixels under Phong shading, whatever the file says.
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     pub specular_antialiasing: Option<bool>,
+    /// Lights opaque surfaces where they are drawn, or afterwards from a G-buffer; auto (the default) does the latter where no GPU draws and many lights meet small triangles. The picture is the same.
+    #[arg(long, value_name = "auto|forward|deferred", value_parser = rendering_path)]
+    pub rendering_path: Option<RenderingPath>,
     /// From radiance to numbers: srgb for people (the default for PNG), linear as it is (for EXR), clamp as OpenGL.
     #[arg(long, value_name = "linear|clamp|srgb", value_parser = display)]
     pub display: Option<Display>,
@@ -728,6 +731,10 @@ fn shading(text: &str) -> Result<Shading, String> {
 
 fn reflection(text: &str) -> Result<ReflectionModel, String> {
     named(ReflectionModel::from_name(text), ReflectionModel::ALL.iter().map(|choice| choice.name()))
+}
+
+fn rendering_path(text: &str) -> Result<RenderingPath, String> {
+    named(RenderingPath::from_name(text), RenderingPath::ALL.iter().map(|choice| choice.name()))
 }
 
 fn integrator(text: &str) -> Result<Integrator, String> {

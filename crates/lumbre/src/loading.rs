@@ -125,6 +125,7 @@ pub fn frame_options(
         reflection: frame.reflection,
         flat_rule: frame.flat_rule,
         specular_antialiasing: frame.specular_antialiasing,
+        rendering_path: frame.rendering_path.unwrap_or_default(),
         lightmaps: !frame.no_lightmaps,
         irradiance_volumes: !frame.no_irradiance_volumes,
         shadows: !frame.no_shadows,

@@ -1,6 +1,6 @@
 //! What a frame costs against the number of lights: 64 balls (73,728 triangles with the floor) under point lights of three metres.
 //! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong|auto:0.01] [--reflection blinn]
-//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--png FOLDER] [--account] [LIGHTS …]`
+//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--path auto|forward|deferred] [--png FOLDER] [--account] [LIGHTS …]`
 //!
 //! Wall clock from the call to the finished frame, the device waited for: of frames of a still World the median and the least; the median of frames before each of which the camera is marked as
 //! changed, so that the World is looked through, and of frames that the target holds already (`FrameOptions::keep_unchanged`); and for all three the median of the CPU's part. With `--account`
@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Attenuation, Light, Material, ReflectionModel, Shading, SpotCone};
 use lumbre_render::{
-    FrameOptions, Gpu, LightLists, Measure, Offscreen, OffscreenFormat, RenderError, Renderer,
+    FrameOptions, Gpu, LightLists, Measure, Offscreen, OffscreenFormat, RenderError, Renderer, RenderingPath,
 };
 use lumbre_scene::{Camera, Mesh, Projection, Transform};
 
@@ -72,6 +72,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     "everything" => LightLists::Everything,
                     _ => return Err("--lists takes auto, objects, clusters or everything".into()),
                 }
+            }
+            "--path" => {
+                options.rendering_path =
+                    RenderingPath::from_name(&value()?).ok_or("--path takes auto, forward or deferred")?;
             }
             "--png" => png = Some(value()?),
             "--account" => account = true,

@@ -6,7 +6,11 @@ use crate::frame_bindings::FrameBuffer;
 use crate::growable_buffer::GrowableBuffer;
 use crate::layout::{ClusterGridData, InverseSquareLightData};
 use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
+use crate::table_texture::TableTexture;
 use crate::{Gpu, RenderError};
+
+/// The name of the lists in errors and debuggers.
+const LISTS: &str = "lists of lights per cluster";
 
 /// Those buffers of group 0 that belong to clusters.
 #[derive(Debug)]
@@ -16,6 +20,8 @@ pub(crate) struct ClusterBuffers {
     ranged: Vec<BoundingSphere>,
     grid: GrowableBuffer<ClusterGridData>,
     lists: Option<wgpu::Buffer>,
+    /// The same on a device that reads tables from textures.
+    list_table: TableTexture,
     lights: GrowableBuffer<InverseSquareLightData>,
 }
 
@@ -27,7 +33,8 @@ impl ClusterBuffers {
             ranged: Vec::new(),
             grid: GrowableBuffer::uniform("cluster grid", 1),
             lists: None,
-            lights: GrowableBuffer::uniform("inverse-square lights", UNIFORM_LIGHTS as usize + 1),
+            list_table: TableTexture::new(),
+            lights: GrowableBuffer::uniform_and_table("inverse-square lights", UNIFORM_LIGHTS as usize + 1),
         }
     }
 
@@ -71,18 +78,20 @@ impl ClusterBuffers {
     pub fn upload(&mut self, gpu: &Gpu) -> Result<bool, RenderError> {
         let mut renewed = self.grid.upload(gpu)? | self.lights.upload(gpu)?;
         let bytes: &[u8] = bytemuck::cast_slice(&self.clusters.values);
+        if gpu.reads_tables_from_textures() {
+            let (entries, entry_size) = (self.clusters.values.len(), size_of::<u32>());
+            renewed |= self.list_table.make_room(gpu, LISTS, (entries, entry_size))?;
+            self.list_table.write(gpu, bytes, entry_size, 0..entries);
+            return Ok(renewed);
+        }
         let size = bytes.len() as u64;
         if self.lists.as_ref().is_none_or(|lists| lists.size() < size) {
             let limit = gpu.device.limits().max_storage_buffer_binding_size;
             if size > limit {
-                return Err(RenderError::BufferTooLarge {
-                    what: "lists of lights per cluster",
-                    bytes: size,
-                    limit,
-                });
+                return Err(RenderError::BufferTooLarge { what: LISTS, bytes: size, limit });
             }
             self.lists = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("lists of lights per cluster"),
+                label: Some(LISTS),
                 size: size.next_power_of_two().min(limit),
                 usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
@@ -96,15 +105,18 @@ impl ClusterBuffers {
     }
 
     /// What is bound of them, once `upload` has made it.
-    pub fn buffer(&self, buffer: FrameBuffer) -> Option<wgpu::BufferBinding<'_>> {
-        let whole = |buffer| wgpu::BufferBinding { buffer, offset: 0, size: None };
+    pub fn bound(&self, buffer: FrameBuffer) -> Option<wgpu::BindingResource<'_>> {
         match buffer {
-            FrameBuffer::ClusterGrid => self.grid.buffer().map(whole),
-            FrameBuffer::ClusterLists => self.lists.as_ref().map(whole),
-            FrameBuffer::InverseSquareLights => self.lights.buffer().map(whole),
+            FrameBuffer::ClusterGrid => self.grid.buffer().map(wgpu::Buffer::as_entire_binding),
+            FrameBuffer::ClusterLists => {
+                let texture = self.list_table.view().map(wgpu::BindingResource::TextureView);
+                texture.or_else(|| self.lists.as_ref().map(wgpu::Buffer::as_entire_binding))
+            }
+            FrameBuffer::InverseSquareLights => self.lights.bound(),
             FrameBuffer::UniformLights => self.lights.buffer().map(|buffer| {
                 let bytes = u64::from(UNIFORM_LIGHTS + 1) * size_of::<InverseSquareLightData>() as u64;
-                wgpu::BufferBinding { buffer, offset: 0, size: wgpu::BufferSize::new(bytes) }
+                let size = wgpu::BufferSize::new(bytes);
+                wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
             }),
             _ => None,
         }

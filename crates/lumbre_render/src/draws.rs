@@ -7,8 +7,9 @@ use glam::DVec3;
 use lumbre_optics::{ErrorBound, Shading};
 use lumbre_scene::{ObjectTraits, SceneSettings};
 
-use crate::extract::{CameraView, LitPass, Object, Objects};
+use crate::extract::{CameraView, LitPass, Object, Objects, Window};
 use crate::features::{self, FrameFeatures};
+use crate::g_buffer::{self, DeferredVariants, GBufferContents};
 use crate::irradiance_volumes::IrradianceVolumes;
 use crate::layout::InstanceData;
 use crate::light_lists::ObjectLightLists;
@@ -25,14 +26,33 @@ pub(crate) struct Batch {
     pub texture_set: Option<Arc<TextureSet>>,
     /// Group 2: a lightmap or an irradiance volume.
     pub baked_light: Option<Arc<wgpu::BindGroup>>,
+    /// Of what lights it, if that is deferred; else 0.
+    pub class_number: u32,
     /// Into the instances of its view.
     pub instances: Range<u32>,
+}
+
+/// Surfaces of a pass that one draw lights from the G-buffer: those that one pipeline lights with the same baked light. Its number, from 1 on, is one more than its place.
+#[derive(Debug)]
+pub(crate) struct DeferredClass {
+    pub pass: LitPass,
+    pub pipeline: PipelineKey,
+    /// Group 2: a lightmap or an irradiance volume.
+    pub baked_light: Option<Arc<wgpu::BindGroup>>,
+    /// The part of the frame that its surfaces are in.
+    pub window: Window,
 }
 
 /// The draws of a view, by pass.
 #[derive(Debug, Default)]
 pub(crate) struct Draws {
+    /// What is drawn into the G-buffer, of any pass.
+    pub geometry: Vec<Batch>,
+    /// What lights it.
+    pub deferred: Vec<DeferredClass>,
+    /// What the lightmap pass draws itself.
     pub lightmapped: Vec<Batch>,
+    /// What the forward pass draws itself.
     pub opaque: Vec<Batch>,
     /// What lies behind them is drawn through them.
     pub refractive: Vec<Batch>,
@@ -56,21 +76,34 @@ pub(crate) struct VisibleObjects<'a> {
     outside: usize,
     depths: Option<[f64; 2]>,
     clustered_depths: Option<[f64; 2]>,
+    deferred: Vec<DeferredClass>,
 }
 
 struct Visible<'a> {
-    pass: LitPass,
+    /// None draws into the G-buffer.
+    pass: Option<LitPass>,
     slot: usize,
     /// Smaller is drawn earlier.
     order: f64,
     object: &'a Object,
-    pipeline: PipelineKey,
+    pipelines: ChosenPipelines,
+    /// Group 2 of what lights it.
+    baked_light: Option<&'a Arc<wgpu::BindGroup>>,
+    /// 0 is none.
+    class_number: u32,
+}
+
+/// What draws a surface, and what lights it: the same, unless that is deferred.
+#[derive(Clone, Copy)]
+struct ChosenPipelines {
+    drawn: PipelineKey,
+    lit: PipelineKey,
 }
 
 impl<'a> VisibleObjects<'a> {
     /// What `view` sees but for the objects in the slots `without`, each with the pipeline that `choose` answers with for the one that it calls for. What asks to be shaded by need is shaded as `need` says.
     pub fn new(
-        objects: &'a Objects,
+        (objects, volumes): (&'a Objects, &'a IrradianceVolumes),
         (view, without): (&CameraView, &[usize]),
         settings: &SceneSettings,
         frame: &FrameFeatures,
@@ -86,7 +119,7 @@ impl<'a> VisibleObjects<'a> {
         };
         // Most objects are as the one before.
         let mut known: Option<(ObjectTraits, Shading, Variant)> = None;
-        let mut known_key: Option<(PipelineKey, Option<PipelineKey>)> = None;
+        let mut known_key: Option<(PipelineKey, LitPass, Option<ChosenPipelines>)> = None;
         for (slot, object) in objects.iter() {
             if without.contains(&slot) {
                 continue;
@@ -116,98 +149,170 @@ impl<'a> VisibleObjects<'a> {
                 texture_mask: object.texture_set.as_ref().map_or(0, |set| set.mask),
             };
             let chosen = match known_key {
-                Some((of, chosen)) if of == pipeline => chosen,
-                _ => choose(pipeline),
+                Some((of, at, chosen)) if of == pipeline && at == pass => chosen,
+                _ => ChosenPipelines::of(pipeline, pass, frame.g_buffer, choose),
             };
-            known_key = Some((pipeline, chosen));
+            known_key = Some((pipeline, pass, chosen));
             // What waits for a pipeline is not drawn yet.
-            let Some(pipeline) = chosen else { continue };
+            let Some(mut pipelines) = chosen else { continue };
+            let has = |feature| pipelines.lit.variant.has(feature);
+            let lightmap = object.lightmap.as_ref().filter(|_| has(Feature::Lightmap));
+            let volume = || volumes.around(object.center);
+            let baked_light =
+                if has(Feature::IrradianceVolume) { lightmap.or_else(volume) } else { lightmap };
+            let class_number = match pipelines.is_deferred() {
+                true => seen.class(pass, pipelines.lit, baked_light, || {
+                    view.window_of_sphere(object.center, object.radius)
+                }),
+                false => Some(0),
+            };
+            if class_number.is_none() {
+                // There are more than the G-buffer has numbers for.
+                match choose(pipeline) {
+                    Some(forward) => pipelines = ChosenPipelines { drawn: forward, lit: forward },
+                    None => continue,
+                }
+            }
+            let class_number = class_number.unwrap_or(0);
             let depth = (view.eye - object.center).dot(view.basis.z_axis);
             let widened = |depths: Option<[f64; 2]>| {
                 let [near, far] = depths.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
                 Some([near.min(depth - object.radius), far.max(depth + object.radius)])
             };
             seen.depths = widened(seen.depths);
-            if pipeline.variant.has(Feature::Clusters) {
+            if pipelines.lit.variant.has(Feature::Clusters) {
                 seen.clustered_depths = widened(seen.clustered_depths);
             }
-            seen.visible.push(Visible { pass, slot, order: order(object, view.eye, pass), object, pipeline });
+            let order = order(object, view.eye, pass);
+            let pass = (class_number == 0).then_some(pass);
+            seen.visible.push(Visible { pass, slot, order, object, pipelines, baked_light, class_number });
         }
         seen
+    }
+
+    /// The number of the class of deferred surfaces that are lit so, if there is one left, and room for one more instance.
+    fn class(
+        &mut self,
+        pass: LitPass,
+        pipeline: PipelineKey,
+        baked_light: Option<&Arc<wgpu::BindGroup>>,
+        window: impl FnOnce() -> Window,
+    ) -> Option<u32> {
+        let is = |class: &DeferredClass| {
+            class.pass == pass && same(class.baked_light.as_ref(), baked_light) && class.pipeline == pipeline
+        };
+        let place = self.deferred.iter().position(is).unwrap_or(self.deferred.len());
+        let number = u32::try_from(place + 1).ok().filter(|number| *number <= g_buffer::LAST_CLASS)?;
+        if self.visible.len() > g_buffer::LAST_INSTANCE as usize {
+            return None;
+        }
+        match self.deferred.get_mut(place) {
+            Some(class) if class.window == Window::WHOLE => {}
+            Some(class) => class.window = class.window.and(window()),
+            None => {
+                let baked_light = baked_light.cloned();
+                self.deferred.push(DeferredClass { pass, pipeline, baked_light, window: window() });
+            }
+        }
+        Some(number)
+    }
+}
+
+impl ChosenPipelines {
+    /// Those of a surface that the forward pass would draw with `forward`, as far as `choose` has any.
+    fn of(
+        forward: PipelineKey,
+        pass: LitPass,
+        g_buffer: Option<GBufferContents>,
+        choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
+    ) -> Option<Self> {
+        let opaque = matches!(pass, LitPass::Lightmap | LitPass::Forward);
+        let contents = g_buffer.filter(|_| opaque && forward.samples == 1);
+        match contents.and_then(|contents| DeferredVariants::of(&forward.variant, contents)) {
+            Some(DeferredVariants { geometry, lighting }) => {
+                let drawn = PipelineKey { variant: geometry, format: g_buffer::FORMAT, ..forward };
+                // A triangle over the frame.
+                let lit = PipelineKey {
+                    variant: lighting,
+                    mirrored: false,
+                    double_sided: true,
+                    texture_mask: 0,
+                    ..forward
+                };
+                Some(Self { drawn: choose(drawn)?, lit: choose(lit)? })
+            }
+            None => choose(forward).map(|chosen| Self { drawn: chosen, lit: chosen }),
+        }
+    }
+
+    fn is_deferred(&self) -> bool {
+        self.lit.variant.has(Feature::Deferred)
     }
 }
 
 impl Draws {
     /// The draws of what is seen, with instances that come after so many of other views.
-    pub fn new(
-        seen: &VisibleObjects<'_>,
-        lights: &mut ObjectLightLists,
-        volumes: &IrradianceVolumes,
-        first_instance: u32,
-    ) -> Self {
-        let VisibleObjects { visible, outside, depths, clustered_depths } = seen;
-        let mut draws = Self {
-            outside: *outside,
-            first_instance,
-            depths: *depths,
-            clustered_depths: *clustered_depths,
-            ..Self::default()
-        };
+    pub fn new(seen: VisibleObjects<'_>, lights: &mut ObjectLightLists, first_instance: u32) -> Self {
+        let VisibleObjects { visible, outside, depths, clustered_depths, deferred } = seen;
+        let mut draws =
+            Self { outside, first_instance, depths, clustered_depths, deferred, ..Self::default() };
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
         // Sorted are numbers alone: what they stand for is large.
         let key = |(index, seen): (usize, &Visible)| (seen.pass, seen.order, index);
-        let mut order: Vec<(LitPass, f64, usize)> = visible.iter().enumerate().map(key).collect();
+        let mut order: Vec<(Option<LitPass>, f64, usize)> = visible.iter().enumerate().map(key).collect();
         order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
         draws.instances.reserve(visible.len());
         for (_, _, index) in order {
-            draws.push(&visible[index], lights, volumes);
+            draws.push(&visible[index], lights);
         }
         draws
     }
 
     /// Adds an instance, to the last batch if it fits.
-    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists, volumes: &IrradianceVolumes) {
+    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
         let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
         let list = lights.reaching(
             seen.object.entity,
             seen.object.center,
             seen.object.half_size,
-            seen.pipeline.variant.has(Feature::Clusters),
+            seen.pipelines.lit.variant.has(Feature::Clusters),
         );
-        self.instances.push(InstanceData { object, ..list });
+        self.instances.push(list.of_object(object, seen.class_number));
         let batches = match seen.pass {
-            LitPass::Lightmap => &mut self.lightmapped,
-            LitPass::Forward => &mut self.opaque,
-            LitPass::Refraction => &mut self.refractive,
-            LitPass::Transparent => &mut self.transparent,
+            None => &mut self.geometry,
+            Some(LitPass::Lightmap) => &mut self.lightmapped,
+            Some(LitPass::Forward) => &mut self.opaque,
+            Some(LitPass::Refraction) => &mut self.refractive,
+            Some(LitPass::Transparent) => &mut self.transparent,
         };
-        let has = |feature| seen.pipeline.variant.has(feature);
-        let lightmap = seen.object.lightmap.as_ref().filter(|_| has(Feature::Lightmap));
-        let volume = || volumes.around(seen.object.center);
-        let baked_light = if has(Feature::IrradianceVolume) { lightmap.or_else(volume) } else { lightmap };
+        let pipeline = seen.pipelines.drawn;
+        // What lights the G-buffer is bound it.
+        let baked_light = seen.baked_light.filter(|_| seen.pass.is_some());
         // A pipeline that stands in for another may have no textures.
-        let texture_set = seen.object.texture_set.as_ref().filter(|_| seen.pipeline.texture_mask != 0);
+        let texture_set = seen.object.texture_set.as_ref().filter(|_| pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {
-            batch.pipeline == seen.pipeline
+            batch.pipeline == pipeline
                 && batch.mesh == seen.object.mesh
                 && same(batch.texture_set.as_ref(), texture_set)
                 && same(batch.baked_light.as_ref(), baked_light)
+                && batch.class_number == seen.class_number
                 && batch.instances.end == instance
         };
         match batches.last_mut() {
             Some(last) if fits(last) => last.instances.end += 1,
             _ => batches.push(Batch {
-                pipeline: seen.pipeline,
+                pipeline,
                 mesh: seen.object.mesh,
                 texture_set: texture_set.cloned(),
                 baked_light: baked_light.cloned(),
+                class_number: seen.class_number,
                 instances: instance..instance + 1,
             }),
         }
     }
 
-    /// The batches of a pass.
+    /// The batches that a pass draws.
     pub fn of(&self, pass: LitPass) -> &[Batch] {
         match pass {
             LitPass::Lightmap => &self.lightmapped,
@@ -227,9 +332,27 @@ impl Draws {
         self.first_instance + batch.instances.start..self.first_instance + batch.instances.end
     }
 
-    /// Every batch, in the order of the passes.
+    /// Every batch, in the order of the passes: first those of the G-buffer.
     pub fn batches(&self) -> impl Iterator<Item = &Batch> {
-        LitPass::ALL.into_iter().flat_map(|pass| self.of(pass))
+        self.geometry.iter().chain(LitPass::ALL.into_iter().flat_map(|pass| self.of(pass)))
+    }
+
+    /// What a pass lights from the G-buffer, each with its number.
+    pub fn deferred_of(&self, pass: LitPass) -> impl Iterator<Item = (u32, &DeferredClass)> {
+        (1..).zip(&self.deferred).filter(move |(_, class)| class.pass == pass)
+    }
+
+    /// Every pipeline that it is drawn with: of batches, then of deferred lighting.
+    pub fn pipelines(&self) -> impl Iterator<Item = &PipelineKey> {
+        self.batches().map(|batch| &batch.pipeline).chain(self.deferred.iter().map(|class| &class.pipeline))
+    }
+
+    /// Every batch with the variant that lights it.
+    pub fn lit_batches(&self) -> impl Iterator<Item = (&Batch, &Variant)> {
+        self.batches().map(|batch| {
+            let class = batch.class_number.checked_sub(1).and_then(|place| self.deferred.get(place as usize));
+            (batch, class.map_or(&batch.pipeline.variant, |class| &class.pipeline.variant))
+        })
     }
 }
 

@@ -32,6 +32,8 @@ pub struct SceneExplanation {
     pub hidden_cones: Vec<HiddenCone>,
     /// The passes and resources of a frame.
     pub frame: Explanation,
+    /// Whether opaque surfaces are lit where they are drawn or afterwards, and why.
+    pub rendering_path: String,
     /// By which lists lights are found, and why.
     pub light_lists: Vec<String>,
     /// What objects take that are shaded by need, and why; nothing where none is.
@@ -52,7 +54,7 @@ pub fn explain(
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
-    explain_with(world, &mut effects::own(&[]), options, width, height)
+    explain_with(world, &mut effects::own(&[]), (options, false), width, height)
 }
 
 impl Renderer {
@@ -68,15 +70,16 @@ impl Renderer {
         height: u32,
     ) -> Result<SceneExplanation, RenderError> {
         let options = self.possible(options);
-        explain_with(world, self.effects_mut(), &options, width, height)
+        let software = self.gpu().is_software();
+        explain_with(world, self.effects_mut(), (&options, software), width, height)
     }
 }
 
-/// As [`explain`], for a frame with these effects.
+/// As [`explain`], for a frame with these effects; `software` on a software rasterizer.
 fn explain_with(
     world: &mut World,
     effects: &mut [Box<dyn Effect>],
-    options: &FrameOptions,
+    (options, software): (&FrameOptions, bool),
     width: u32,
     height: u32,
 ) -> Result<SceneExplanation, RenderError> {
@@ -92,7 +95,7 @@ fn explain_with(
     let objects = shown_objects(world);
     let counted = ObjectCensus::of(&objects);
     let volumes = usable_irradiance_volumes(world);
-    let facts = SceneFacts::new(&counted, &lights, volumes, &settings, options);
+    let facts = SceneFacts::new(&counted, &lights, volumes, &settings, options, (software, [width, height]));
     let mut radiance = false;
     for effect in effects.iter_mut() {
         let called_for = effect.extract(world, &facts, options);
@@ -119,6 +122,7 @@ fn explain_with(
         bindings = bindings.and(FrameBindings::of(&variant));
         *variants.entry(variant.to_string()).or_insert(0) += 1;
     }
+    let rendering_path = facts.path.to_string();
     let light_lists = lights.listing(options.light_lists, clustered, objects.len());
     let target = TextureDescriptor::new_2d(width, height, target_format);
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
@@ -135,6 +139,7 @@ fn explain_with(
         census,
         hidden_cones,
         frame,
+        rendering_path,
         light_lists,
         shading_by_need: needs.groups(),
         variants,
@@ -213,6 +218,7 @@ impl SceneExplanation {
         for line in self.frame.to_text().lines() {
             let _ = writeln!(text, "  {line}");
         }
+        let _ = writeln!(text, "\nRendering path\n  {}", self.rendering_path);
         text.push_str("\nLight lists\n");
         for line in &self.light_lists {
             let _ = writeln!(text, "  {line}");

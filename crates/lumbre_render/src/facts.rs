@@ -7,6 +7,8 @@ use lumbre_scene::{Census, ObjectCensus, SceneSettings};
 
 use crate::FrameOptions;
 use crate::extract::LightSet;
+use crate::g_buffer::GBufferContents;
+use crate::rendering_path::ChosenPath;
 
 /// What a scene and the options of a frame come to.
 #[derive(Clone, Debug)]
@@ -28,24 +30,32 @@ pub struct SceneFacts {
     pub shadow_lights: u32,
     /// Samples of a pixel.
     pub samples: u32,
+    /// Whether opaque surfaces are lit where they are drawn or afterwards.
+    pub(crate) path: ChosenPath,
+    /// What they are lit from afterwards, as far as they can be.
+    pub(crate) g_buffer: Option<GBufferContents>,
     /// What the scene sets: ambient light, fog, background, rates of evaluation.
     pub settings: SceneSettings,
 }
 
 impl SceneFacts {
-    /// Of objects, lights, and so many irradiance volumes that can be used.
+    /// Of objects, lights, and so many irradiance volumes that can be used, for a frame of this size; `software` on a software rasterizer.
     pub(crate) fn new(
         objects: &ObjectCensus,
         lights: &LightSet,
         irradiance_volumes: usize,
         settings: &SceneSettings,
         options: &FrameOptions,
+        (software, size): (bool, [u32; 2]),
     ) -> Self {
         let (refractive, lightmapped_refractive) = match options.refraction {
             true => (objects.refractive, objects.lightmapped_refractive),
             false => (0, 0),
         };
         let lightmapped = objects.lightmapped - objects.lightmapped_blended - lightmapped_refractive;
+        let samples = if options.multisample.or(settings.frame.multisample) == Some(true) { 4 } else { 1 };
+        let path = ChosenPath::new(options, lights, objects, (samples, software, size));
+        let details = lightmapped > 0 || objects.textured > 0 || objects.vertex_colors > 0;
         let by_lightmap = if options.lightmaps { lightmapped } else { 0 };
         Self {
             census: Arc::new(Census::new(objects, lights.census, irradiance_volumes, settings)),
@@ -55,7 +65,9 @@ impl SceneFacts {
             transparent: objects.alpha_blend,
             lights: lights.every.all,
             shadow_lights: lights.every.shadows.lights,
-            samples: if options.multisample.or(settings.frame.multisample) == Some(true) { 4 } else { 1 },
+            samples,
+            path,
+            g_buffer: path.is_deferred().then_some(GBufferContents { details }),
             settings: *settings,
         }
     }

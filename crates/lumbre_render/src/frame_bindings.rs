@@ -5,6 +5,7 @@ use lumbre_optics::Shading;
 
 use crate::Gpu;
 use crate::shader::{Feature, Variant};
+use crate::table_texture::table_binding;
 
 /// A buffer of group 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +54,16 @@ impl FrameBuffer {
 
     pub fn is_uniform(self) -> bool {
         matches!(self, Self::Frame | Self::ClusterGrid | Self::UniformLights)
+    }
+
+    /// Whether it is a texture on a device that reads tables from textures.
+    pub fn is_table(self) -> bool {
+        match self {
+            Self::Objects | Self::Materials | Self::Instances => true,
+            Self::Lights | Self::LightList | Self::ClusterLists | Self::InverseSquareLights => true,
+            Self::Frame | Self::ClusterGrid | Self::UniformLights => false,
+            Self::LightCounts | Self::VertexLightCounts => false,
+        }
     }
 
     /// Whether shaders write it.
@@ -131,13 +142,16 @@ impl FrameBindings {
         let entry = |buffer: FrameBuffer| wgpu::BindGroupLayoutEntry {
             binding: buffer.binding(),
             visibility: buffer.visibility(),
-            ty: wgpu::BindingType::Buffer {
-                ty: match buffer.is_uniform() {
-                    true => wgpu::BufferBindingType::Uniform,
-                    false => wgpu::BufferBindingType::Storage { read_only: !buffer.is_counted_in() },
+            ty: match buffer.is_table() {
+                true => table_binding(gpu.reads_tables_from_textures()),
+                false => wgpu::BindingType::Buffer {
+                    ty: match buffer.is_uniform() {
+                        true => wgpu::BufferBindingType::Uniform,
+                        false => wgpu::BufferBindingType::Storage { read_only: !buffer.is_counted_in() },
+                    },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
                 },
-                has_dynamic_offset: false,
-                min_binding_size: None,
             },
             count: None,
         };
@@ -183,7 +197,7 @@ mod tests {
                     let mut variant = Variant::new(*shading, ReflectionModel::Blinn);
                     features.iter().for_each(|feature| variant.set(*feature, true));
                     let variant = variant.reduced();
-                    let source = to_wgsl("forward", &variant.flags()).unwrap();
+                    let source = to_wgsl("forward", &variant.flags(false)).unwrap();
                     let module = naga::front::wgsl::parse_str(&source).unwrap();
                     let read: Vec<u32> = module
                         .global_variables

@@ -10,7 +10,7 @@ use lumbre_optics::FlatRule;
 use lumbre_scene::{Census, SceneSettings};
 
 use crate::draws::{Batch, Draws};
-use crate::extract::{CameraView, SceneLights};
+use crate::extract::{CameraView, LitPass, SceneLights};
 use crate::features::FrameFeatures;
 use crate::frame_bindings::FrameBindings;
 use crate::frame_plan::{FramePlan, FrameShape};
@@ -136,7 +136,7 @@ impl Decision {
 impl Decided {
     /// Whether any of its draws counts lights.
     pub fn counts_lights(&self) -> bool {
-        self.draws.batches().any(|batch| batch.pipeline.variant.has(Feature::CountLights))
+        self.draws.pipelines().any(|pipeline| pipeline.variant.has(Feature::CountLights))
     }
 
     /// The draws of each view: the camera's first, then those of mirrors.
@@ -152,20 +152,26 @@ impl Decided {
     /// What each of its lit passes draws and tests.
     pub fn lit_passes(&self) -> LitPasses {
         LitPasses {
-            lightmap: self.pass_lights(&self.draws.lightmapped),
-            forward: self.pass_lights(&self.draws.opaque),
-            refraction: self.pass_lights(&self.draws.refractive),
-            transparent: self.pass_lights(&self.draws.transparent),
+            lightmap: self.pass_lights(LitPass::Lightmap),
+            forward: self.pass_lights(LitPass::Forward),
+            refraction: self.pass_lights(LitPass::Refraction),
+            transparent: self.pass_lights(LitPass::Transparent),
         }
     }
 
-    fn pass_lights(&self, batches: &[Batch]) -> PassLights {
+    fn pass_lights(&self, pass: LitPass) -> PassLights {
         let (mut objects, mut entries) = (0, 0);
         let (mut lists, mut lights) = (HashSet::new(), HashSet::<u32>::new());
         let (mut inverse_square, mut ranged) = (false, false);
-        for batch in batches {
-            inverse_square |= batch.pipeline.variant.has(Feature::InverseSquareClusters);
-            ranged |= batch.pipeline.variant.has(Feature::RangedClusters);
+        let (batches, classes) = (self.draws.of(pass), || self.draws.deferred_of(pass));
+        let drawn = batches.iter().map(|batch| &batch.pipeline.variant);
+        for variant in drawn.chain(classes().map(|(_, class)| &class.pipeline.variant)) {
+            inverse_square |= variant.has(Feature::InverseSquareClusters);
+            ranged |= variant.has(Feature::RangedClusters);
+        }
+        let numbers: Vec<u32> = classes().map(|(number, _)| number).collect();
+        let of_pass = |batch: &&Batch| numbers.contains(&batch.class_number);
+        for batch in batches.iter().chain(self.draws.geometry.iter().filter(of_pass)) {
             for instance in
                 &self.draws.instances[batch.instances.start as usize..batch.instances.end as usize]
             {
@@ -182,7 +188,7 @@ impl Decided {
         let clustered: u32 = of_clusters.iter().filter(|(read, _)| *read).map(|(_, count)| count).sum();
         PassLights {
             objects,
-            draws: batches.len(),
+            draws: batches.len() + classes().count(),
             // Fewer than 2^32 lights have room; one may be in the lists of vertices and of clusters both.
             lights: (lights.len() as u32 + clustered).min(set.every.all),
             lights_per_object: entries as f32 / objects.max(1) as f32,
@@ -191,7 +197,8 @@ impl Decided {
 
     /// The buffers of group 0 that any of its draws reads.
     pub fn bindings(&self) -> FrameBindings {
-        let of = self.batches().map(|batch| FrameBindings::of(&batch.pipeline.variant));
+        let pipelines = self.every_draws().flat_map(Draws::pipelines);
+        let of = pipelines.map(|pipeline| FrameBindings::of(&pipeline.variant));
         of.fold(FrameBindings::default(), FrameBindings::and)
     }
 }

@@ -4,12 +4,12 @@ use bevy_ecs::entity::Entity;
 use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
 use lumbre_optics::FlatRule;
 
-use crate::draws::Draws;
+use crate::draws::{Batch, Draws};
 use crate::extract::{CameraView, LitPass, Objects};
 use crate::mesh_buffers::{Attribute, GpuMesh, MeshBuffers};
 use crate::mirror_views::MirrorView;
 use crate::pipelines::Pipelines;
-use crate::shader::Feature;
+use crate::shader::{Feature, Variant};
 use crate::shadows::ShadowMaps;
 use crate::view_buffers::{FrameGroup, ViewBuffers};
 
@@ -28,6 +28,8 @@ pub struct FrameScene<'a> {
     /// The buffers of each view: the camera's first, then those of mirrors.
     pub(crate) views: &'a [ViewBuffers],
     pub(crate) view: CameraView,
+    /// Width and height of the frame in texels.
+    pub(crate) size: [u32; 2],
     pub(crate) shadows: &'a ShadowMaps,
 }
 
@@ -68,7 +70,7 @@ impl<'a> FrameScene<'a> {
         let clip_from_world = self.view.clip_from_frame(DVec3::ZERO);
         let (objects, meshes) = (self.objects, self.meshes);
         self.draws.instances.iter().filter_map(move |instance| {
-            let object = objects.objects.get(instance.object as usize)?.as_ref()?;
+            let object = objects.objects.get(instance.object() as usize)?.as_ref()?;
             let mesh = meshes.get(object.mesh).filter(|mesh| mesh.has_positions())?;
             let world_from_mesh = object.world_from_mesh;
             let clip_from_mesh = (clip_from_world * DMat4::from(world_from_mesh)).as_mat4();
@@ -127,20 +129,90 @@ impl<'a> FrameScene<'a> {
         pass.draw_indexed(0..slices.count, 0, instance..instance + 1);
     }
 
-    /// Draws the lit surfaces of a pass that the camera sees.
+    /// Draws the surfaces of a pass that the camera sees.
     pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass) {
         self.draw_view(pass, lit_pass, 0);
     }
 
-    /// Draws the lit surfaces of a pass that a view shows: 0 is the camera's, 1 the first of those in mirrors.
+    /// Draws the opaque surfaces that the camera sees and that a pass does not light from the G-buffer. No pass lights the G-buffer after any of them: what it
+    /// lights may lie behind them.
+    pub(crate) fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass) {
+        let later = self.lights_deferred(LitPass::Forward);
+        if lit_pass == LitPass::Forward && later {
+            self.draw(pass, LitPass::Lightmap);
+        }
+        if lit_pass != LitPass::Lightmap || !later {
+            self.draw(pass, lit_pass);
+        }
+    }
+
+    /// Draws the surfaces of a pass that a view shows: 0 is the camera's, 1 the first of those in mirrors.
     pub(crate) fn draw_view(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass, view: usize) {
         let draws = match view {
             0 => Some(self.draws),
             mirrored => self.mirrors.get(mirrored - 1).map(|mirror| &mirror.draws),
         };
         let (Some(draws), Some(buffers)) = (draws, self.views.get(view)) else { return };
+        self.draw_batches(pass, draws.of(lit_pass), (draws, buffers), &|variant| {
+            FrameGroup::of(variant, lit_pass)
+        });
+    }
+
+    /// Draws into the G-buffer what the camera sees and is lit from there.
+    pub(crate) fn draw_g_buffer(&self, pass: &mut wgpu::RenderPass<'static>) {
+        let Some(buffers) = self.views.first() else { return };
+        let view = (self.draws, buffers);
+        self.draw_batches(pass, &self.draws.geometry, view, &FrameGroup::of_geometry);
+    }
+
+    /// Whether the camera sees anything of a pass that is lit from the G-buffer.
+    pub(crate) fn lights_deferred(&self, lit_pass: LitPass) -> bool {
+        self.draws.deferred_of(lit_pass).next().is_some()
+    }
+
+    /// The layout of the group that lighting from the G-buffer binds it in.
+    pub(crate) fn g_buffer_layout(&self) -> &wgpu::BindGroupLayout {
+        self.pipelines.g_buffer_layout()
+    }
+
+    /// Lights what the G-buffer holds of a pass.
+    pub(crate) fn light_deferred(
+        &self,
+        pass: &mut wgpu::RenderPass<'static>,
+        lit_pass: LitPass,
+        g_buffer: &wgpu::BindGroup,
+    ) {
+        let Some(buffers) = self.views.first() else { return };
+        for (number, class) in self.draws.deferred_of(lit_pass) {
+            let variant = &class.pipeline.variant;
+            let (Some(pipeline), Some(group)) =
+                (self.pipelines.get(&class.pipeline), buffers.group(&FrameGroup::of(variant, lit_pass)))
+            else {
+                continue;
+            };
+            pass.set_pipeline(&pipeline.pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.set_bind_group(1, g_buffer, &[]);
+            if self.bind_light(pass, variant, class.baked_light.as_deref()) {
+                let [x, y, width, height] = class.window.pixels(self.size);
+                pass.set_scissor_rect(x, y, width, height);
+                pass.draw(0..3, number..number + 1);
+            }
+        }
+        pass.set_scissor_rect(0, 0, self.size[0], self.size[1]);
+    }
+
+    /// Draws batches of a view; `group` answers with what a variant is bound in group 0.
+    fn draw_batches(
+        &self,
+        pass: &mut wgpu::RenderPass<'static>,
+        batches: &[Batch],
+        (draws, buffers): (&Draws, &ViewBuffers),
+        group: &dyn Fn(&Variant) -> FrameGroup,
+    ) {
         let mut bound = None;
-        for batch in draws.of(lit_pass) {
+        for batch in batches {
+            let variant = &batch.pipeline.variant;
             let (Some(pipeline), Some(mesh)) =
                 (self.pipelines.get(&batch.pipeline), self.meshes.get(batch.mesh))
             else {
@@ -151,7 +223,7 @@ impl<'a> FrameScene<'a> {
                 continue;
             }
             pass.set_pipeline(&pipeline.pipeline);
-            let wanted = FrameGroup::of(batch, lit_pass);
+            let wanted = group(variant);
             if bound != Some(wanted) {
                 let Some(group) = buffers.group(&wanted) else { continue };
                 pass.set_bind_group(0, group, &[]);
@@ -160,19 +232,8 @@ impl<'a> FrameScene<'a> {
             if let Some(set) = &batch.texture_set {
                 pass.set_bind_group(1, &set.bind_group, &[]);
             }
-            // A group behind one that the pipeline before had and this one has not: wgpu-core 30 takes the same group for bound still and leaves it
-            // out, though the device has dropped it. Taken away first, it is bound again.
-            let mut bind_again = |index: u32, group: &wgpu::BindGroup| {
-                pass.set_bind_group(index, None::<&wgpu::BindGroup>, &[]);
-                pass.set_bind_group(index, group, &[]);
-            };
-            if let Some(baked_light) = &batch.baked_light {
-                bind_again(2, baked_light);
-            }
-            if batch.pipeline.variant.has(Feature::Shadows) {
-                let maps = self.shadows.device().and_then(|maps| maps.receiver_group.as_ref());
-                let Some(group) = maps else { continue };
-                bind_again(3, group);
+            if !self.bind_light(pass, variant, batch.baked_light.as_deref()) {
+                continue;
             }
             for (slot, buffer) in (0..).zip(&slices.attributes) {
                 pass.set_vertex_buffer(slot, buffer.slice(..));
@@ -185,6 +246,30 @@ impl<'a> FrameScene<'a> {
                 None => pass.draw(0..slices.count, draws.instances_of(batch)),
             }
         }
+    }
+
+    /// Binds baked light and shadow maps, as far as a variant reads them; false if the maps are not there.
+    fn bind_light(
+        &self,
+        pass: &mut wgpu::RenderPass<'static>,
+        variant: &Variant,
+        baked_light: Option<&wgpu::BindGroup>,
+    ) -> bool {
+        // A group behind one that the pipeline before had and this one has not: wgpu-core 30 takes the same group for bound still and leaves it
+        // out, though the device has dropped it. Taken away first, it is bound again.
+        let mut bind_again = |index: u32, group: &wgpu::BindGroup| {
+            pass.set_bind_group(index, None::<&wgpu::BindGroup>, &[]);
+            pass.set_bind_group(index, group, &[]);
+        };
+        if let Some(baked_light) = baked_light {
+            bind_again(2, baked_light);
+        }
+        if variant.has(Feature::Shadows) {
+            let maps = self.shadows.device().and_then(|maps| maps.receiver_group.as_ref());
+            let Some(group) = maps else { return false };
+            bind_again(3, group);
+        }
+        true
     }
 }
 

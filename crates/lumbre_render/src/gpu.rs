@@ -164,6 +164,16 @@ impl Gpu {
         Self::from_parts(instance, adapter, device, queue)
     }
 
+    /// Whether a processor draws instead of a GPU.
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether the shaders of lit surfaces look things up in textures instead of storage buffers.
+    pub(crate) fn reads_tables_from_textures(&self) -> bool {
+        self.is_software()
+    }
+
     /// Where pipelines are made that no frame waits for.
     pub(crate) fn worker_thread(&self) -> &WorkerThread {
         &self.worker_thread

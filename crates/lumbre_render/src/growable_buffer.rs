@@ -1,15 +1,16 @@
-//! A storage buffer that mirrors a Vec and uploads only what changed.
+//! A storage buffer, or a table in a texture, that mirrors a Vec and uploads only what changed.
 
 use std::ops::Range;
 
 use bytemuck::Pod;
 
+use crate::table_texture::TableTexture;
 use crate::{Gpu, RenderError};
 
 /// Values between two changes that are sent along with them.
 const COALESCED: usize = 16;
 
-/// A mirrored storage buffer.
+/// A mirrored storage buffer, or table.
 #[derive(Debug)]
 pub(crate) struct GrowableBuffer<T> {
     label: &'static str,
@@ -20,18 +21,53 @@ pub(crate) struct GrowableBuffer<T> {
     buffer: Option<wgpu::Buffer>,
     capacity: usize,
     usage: wgpu::BufferUsages,
+    kept_in: KeptIn,
+    texture: TableTexture,
+}
+
+/// Where the values are on a device that reads tables from textures; any other has them in a buffer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum KeptIn {
+    Buffer,
+    Texture,
+    Both,
 }
 
 impl<T: Pod + PartialEq> GrowableBuffer<T> {
     pub fn new(label: &'static str) -> Self {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        Self { label, values: Vec::new(), dirty: Vec::new(), least: 1, buffer: None, capacity: 0, usage }
+        Self {
+            label,
+            values: Vec::new(),
+            dirty: Vec::new(),
+            least: 1,
+            buffer: None,
+            capacity: 0,
+            usage,
+            kept_in: KeptIn::Buffer,
+            texture: TableTexture::new(),
+        }
+    }
+
+    /// A table, which is a texture on a device that reads tables from textures.
+    pub fn table(label: &'static str) -> Self {
+        Self { kept_in: KeptIn::Texture, ..Self::new(label) }
+    }
+
+    /// A table that is a buffer everywhere too, for shaders that read that.
+    pub fn table_and_buffer(label: &'static str) -> Self {
+        Self { kept_in: KeptIn::Both, ..Self::new(label) }
     }
 
     /// A buffer that is a uniform one too, of which shaders read `least` values whether they are there or not.
     pub fn uniform(label: &'static str, least: usize) -> Self {
         let new = Self::new(label);
         Self { least, usage: new.usage | wgpu::BufferUsages::UNIFORM, ..new }
+    }
+
+    /// As [`uniform`](Self::uniform), and a table for shaders that read more than a uniform buffer holds.
+    pub fn uniform_and_table(label: &'static str, least: usize) -> Self {
+        Self { kept_in: KeptIn::Both, ..Self::uniform(label, least) }
     }
 
     /// Sets one value and remembers it for the next upload.
@@ -71,10 +107,22 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         (dirty * size_of::<T>()) as u64
     }
 
-    /// Brings the GPU's copy up to date; true if the buffer is another one than before.
+    /// Brings the GPU's copies up to date; true if one is another than before.
+    ///
+    /// # Errors
+    /// [`RenderError::BufferTooLarge`].
     pub fn upload(&mut self, gpu: &Gpu) -> Result<bool, RenderError> {
+        let textured = self.kept_in != KeptIn::Buffer && gpu.reads_tables_from_textures();
+        let buffered = self.kept_in != KeptIn::Texture || !textured;
         let mut renewed = false;
-        if self.buffer.is_none() || self.values.len() > self.capacity {
+        if textured {
+            let entries = self.values.len().max(self.least);
+            renewed = self.texture.make_room(gpu, self.label, (entries, size_of::<T>()))?;
+            if renewed {
+                self.send_everything();
+            }
+        }
+        if buffered && (self.buffer.is_none() || self.values.len() > self.capacity) {
             let limit = gpu.device.limits().max_storage_buffer_binding_size;
             let bytes = size_of_val(self.values.as_slice()) as u64;
             if bytes > limit {
@@ -89,14 +137,15 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
                 usage: self.usage,
                 mapped_at_creation: false,
             }));
-            self.dirty.clear();
-            if !self.values.is_empty() {
-                self.dirty.push(0..self.values.len());
-            }
+            self.send_everything();
             renewed = true;
         }
-        if let Some(buffer) = &self.buffer {
-            for range in self.dirty.drain(..) {
+        for range in self.dirty.drain(..) {
+            if textured {
+                let bytes = bytemuck::cast_slice(&self.values);
+                self.texture.write(gpu, bytes, size_of::<T>(), range.clone());
+            }
+            if let Some(buffer) = self.buffer.as_ref().filter(|_| buffered) {
                 let offset = (range.start * size_of::<T>()) as u64;
                 gpu.queue.write_buffer(buffer, offset, bytemuck::cast_slice(&self.values[range]));
             }
@@ -104,7 +153,20 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         Ok(renewed)
     }
 
-    /// The GPU's copy, once `upload` has made it.
+    fn send_everything(&mut self) {
+        self.dirty.clear();
+        if !self.values.is_empty() {
+            self.dirty.push(0..self.values.len());
+        }
+    }
+
+    /// What the shaders of lit surfaces are bound of it, once `upload` has made it.
+    pub fn bound(&self) -> Option<wgpu::BindingResource<'_>> {
+        let texture = self.texture.view().map(wgpu::BindingResource::TextureView);
+        texture.or_else(|| self.buffer.as_ref().map(wgpu::Buffer::as_entire_binding))
+    }
+
+    /// The copy in a buffer, once `upload` has made it.
     pub fn buffer(&self) -> Option<&wgpu::Buffer> {
         self.buffer.as_ref()
     }

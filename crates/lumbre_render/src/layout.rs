@@ -22,16 +22,40 @@ pub(crate) struct FrameData {
     pub fog_color: Vec3,
     pub padding_3: f32,
     pub fog_parameters: [f32; 4],
+    pub corner: Vec3,
+    pub parallel: f32,
+    pub pixel_right: Vec3,
+    pub padding_4: f32,
+    pub pixel_down: Vec3,
+    pub padding_5: f32,
 }
 
 /// `Instance`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct InstanceData {
-    pub object: u32,
+    /// The object, and from bit 24 on the class of a deferred surface.
+    object_and_class: u32,
     pub first_light: u32,
     pub dynamic_end: u32,
     pub static_end: u32,
+}
+
+impl InstanceData {
+    /// The same light for an object, of which a table has fewer than 2^24, and for the class of deferred surfaces that it is of; 0 for none.
+    pub fn of_object(self, object: u32, class_number: u32) -> Self {
+        Self { object_and_class: object | class_number << 24, ..self }
+    }
+
+    /// The lights that reach no object in particular: baked ones begin at `dynamic_end`.
+    pub fn lit_by(first_light: u32, dynamic_end: u32, static_end: u32) -> Self {
+        Self { object_and_class: 0, first_light, dynamic_end, static_end }
+    }
+
+    /// The slot of the object.
+    pub fn object(&self) -> u32 {
+        self.object_and_class & 0xff_ffff
+    }
 }
 
 /// `Object`.
@@ -329,7 +353,7 @@ mod tests {
 
     #[test]
     fn sizes_are_those_of_the_shaders() {
-        assert_eq!(size_of::<FrameData>(), 144);
+        assert_eq!(size_of::<FrameData>(), 192);
         assert_eq!(size_of::<ObjectData>(), 96);
         assert_eq!(size_of::<MaterialData>(), 2 * 64 + 3 * 32 + 4 * 16);
         assert_eq!(size_of::<SurfaceMapsData>(), 2 * 32);

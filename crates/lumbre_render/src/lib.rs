@@ -2,10 +2,11 @@
 //!
 //! ```text
 //!   World ──► extract ─────────► draws ──────────────► effects ───────────────────► target
-//!             changed components  cull, sort, batch     shadows ► lightmap ►           Offscreen or
-//!             to GPU buffers      variants, light lists    forward ► mirrors ►            WindowSurface
-//!                 │               and again for mirrors    refraction ► transparent ►
-//!                 │                    │                   yours ► display ► yours
+//!             changed components  cull, sort, batch     shadows ► g-buffer ►           Offscreen or
+//!             to GPU buffers      variants, light lists    lightmap ► forward ►           WindowSurface
+//!                 │               and again for mirrors    mirrors ► refraction ►
+//!                 │                    │                   transparent ► yours ►
+//!                 │                    │                   display ► yours
 //!                 └──── facts ─────────┴──► explain: what the scene calls for, and what not
 //! ```
 //!
@@ -53,6 +54,7 @@ mod frame_graph;
 mod frame_plan;
 mod frame_report;
 mod frame_scene;
+mod g_buffer;
 mod gpu;
 mod growable_buffer;
 mod irradiance_volumes;
@@ -72,6 +74,7 @@ mod options;
 mod pipelines;
 mod rehearsal;
 mod renderer;
+mod rendering_path;
 mod schedule;
 mod shader;
 mod shading_by_need;
@@ -80,6 +83,7 @@ mod shadow_light;
 mod shadows;
 mod stage_clock;
 mod statistics;
+mod table_texture;
 mod target;
 mod texture_sets;
 mod textures;
@@ -102,7 +106,7 @@ pub use frame_scene::{DrawnObject, FrameScene, FrameView};
 pub use gpu::Gpu;
 pub use metering::{LightMeter, Metering, meter};
 pub use offscreen::{Offscreen, OffscreenFormat, read_texture};
-pub use options::{Display, FrameOptions, LightLists, Measure, MissingPipelines};
+pub use options::{Display, FrameOptions, LightLists, Measure, MissingPipelines, RenderingPath};
 pub use renderer::{Renderer, RendererBuilder};
 pub use schedule::{CurrentTarget, LastFrame, RenderSet, render_frame};
 pub use shading_need::{ShadingNeed, ShadingNeeds};

@@ -87,12 +87,7 @@ impl<'a> ObjectLightLists<'a> {
         let first_light = end(self.indices.len());
         let dynamic = list.iter().filter(|index| !self.reaches[**index as usize].baked).count();
         self.indices.extend_from_slice(&list);
-        let instance = InstanceData {
-            object: 0,
-            first_light,
-            dynamic_end: first_light + end(dynamic),
-            static_end: end(self.indices.len()),
-        };
+        let instance = InstanceData::lit_by(first_light, first_light + end(dynamic), end(self.indices.len()));
         self.known.insert(list, instance);
         instance
     }

@@ -76,6 +76,40 @@ pub enum LightLists {
     Everything,
 }
 
+/// Whether surfaces are lit where they are drawn, or after all of them are drawn. What is drawn is the same to rounding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum RenderingPath {
+    /// Deferred on a software rasterizer where many lights meet small triangles, else forward: 64 lights that fragments find by clusters, and a triangle for every 16 pixels of
+    /// the frame, without lightmaps. A software rasterizer shades whole blocks of pixels for each triangle, and
+    /// small triangles fill little of a block.
+    #[default]
+    Auto,
+    /// Each surface is lit where it is drawn.
+    Forward,
+    /// Opaque surfaces under Phong shading are drawn into a G-buffer, and what is seen of them is lit once. Those are lit forward as ever that have textures for
+    /// anything but their base colour, are cut out by alpha, or have their highlights filtered, and so is every surface of a frame with several samples per pixel.
+    Deferred,
+}
+
+impl RenderingPath {
+    /// Every choice.
+    pub const ALL: &'static [Self] = &[Self::Auto, Self::Forward, Self::Deferred];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Forward => "forward",
+            Self::Deferred => "deferred",
+        }
+    }
+
+    /// The choice with that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|path| path.name() == name)
+    }
+}
+
 /// Choices for one frame.
 #[derive(Resource, Clone, Debug, PartialEq)]
 pub struct FrameOptions {
@@ -91,6 +125,8 @@ pub struct FrameOptions {
     pub specular_antialiasing: Option<bool>,
     /// By which lists lights are found.
     pub light_lists: LightLists,
+    /// Whether opaque surfaces are lit where they are drawn, or afterwards.
+    pub rendering_path: RenderingPath,
     /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
     pub lightmaps: bool,
     /// Lights what has no lightmap by the irradiance volumes of a bake, where there are any. Without them it takes the scene's ambient light.
@@ -130,6 +166,7 @@ impl Default for FrameOptions {
             flat_rule: None,
             specular_antialiasing: None,
             light_lists: LightLists::Auto,
+            rendering_path: RenderingPath::Auto,
             lightmaps: true,
             irradiance_volumes: true,
             shadows: true,

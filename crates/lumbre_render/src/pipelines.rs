@@ -1,4 +1,4 @@
-//! Render pipelines of the forward shader's variants, made when a draw first asks for one, at once or on the device's thread. Which draw asks for which: `draws`.
+//! Render pipelines of the variants that draw and light surfaces, made when a draw first asks for one, at once or on the device's thread. Which draw asks for which: `draws`.
 
 use std::cmp::Reverse;
 use std::collections::HashMap;
@@ -8,6 +8,7 @@ use lumbre_optics::Shading;
 
 use crate::deferred::Deferred;
 use crate::frame_bindings::FrameBindings;
+use crate::g_buffer;
 use crate::irradiance_volumes;
 use crate::mesh_buffers::Attribute;
 use crate::shader::{self, Feature, Variant};
@@ -45,6 +46,7 @@ pub(crate) struct Pipelines {
     frame_layouts: HashMap<FrameBindings, wgpu::BindGroupLayout>,
     shadow_layout: wgpu::BindGroupLayout,
     volume_layout: wgpu::BindGroupLayout,
+    g_buffer_layout: wgpu::BindGroupLayout,
     modules: Modules,
     pipelines: HashMap<PipelineKey, Deferred<Pipeline>>,
 }
@@ -61,6 +63,7 @@ impl Pipelines {
             frame_layouts: HashMap::new(),
             shadow_layout: shadows::receiver_layout(gpu),
             volume_layout: irradiance_volumes::layout(gpu),
+            g_buffer_layout: g_buffer::layout(gpu),
             modules: Modules::default(),
             pipelines: HashMap::new(),
         }
@@ -79,6 +82,11 @@ impl Pipelines {
     /// The layout of group 2, of variants that read an irradiance volume.
     pub fn volume_layout(&self) -> &wgpu::BindGroupLayout {
         &self.volume_layout
+    }
+
+    /// The layout of group 1, of variants that light from the G-buffer.
+    pub fn g_buffer_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.g_buffer_layout
     }
 
     /// Number of shader variants compiled so far.
@@ -105,8 +113,13 @@ impl Pipelines {
         afterwards: impl FnOnce() -> Option<Afterwards>,
     ) -> Result<bool, RenderError> {
         if !self.pipelines.contains_key(&key) {
-            let textures = sets.layout(gpu, key.texture_mask);
-            let baked_light = match key.variant.has(Feature::Lightmap) {
+            let textures = match key.variant.has(Feature::Deferred) {
+                true => Some(self.g_buffer_layout.clone()),
+                false => sets.layout(gpu, key.texture_mask),
+            };
+            // Into the G-buffer go coordinates of a lightmap.
+            let lightmap = key.variant.has(Feature::Lightmap) && !key.variant.has(Feature::GBuffer);
+            let baked_light = match lightmap {
                 true => Some(sets.lightmap_layout(gpu)),
                 false => key.variant.has(Feature::IrradianceVolume).then(|| self.volume_layout.clone()),
             };
@@ -114,8 +127,9 @@ impl Pipelines {
             let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_layout.clone());
             let groups = [Some(frame), textures, baked_light, shadows];
             let (device, modules) = (gpu.device.clone(), Arc::clone(&self.modules));
+            let tables_in_textures = gpu.reads_tables_from_textures();
             let afterwards = if wait { None } else { afterwards() };
-            let make = move || match make(&device, &modules, &groups, key) {
+            let make = move || match make(&device, &modules, &groups, key, tables_in_textures) {
                 Ok(pipeline) => {
                     afterwards.into_iter().for_each(|afterwards| afterwards());
                     Ok(pipeline)
@@ -160,6 +174,7 @@ pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
     Attribute::ALL
         .into_iter()
         .filter(|attribute| match attribute {
+            _ if variant.has(Feature::Deferred) => false,
             Attribute::Position => true,
             Attribute::Normal => {
                 let per_fragment = variant.has(Feature::Lights) || variant.has(Feature::IrradianceVolume);
@@ -184,8 +199,9 @@ fn make(
     modules: &Modules,
     groups: &[Option<wgpu::BindGroupLayout>; 4],
     key: PipelineKey,
+    tables_in_textures: bool,
 ) -> Result<Pipeline, RenderError> {
-    let module = &module(device, modules, key.variant)?;
+    let module = &module(device, modules, key.variant, tables_in_textures)?;
     let groups = groups.each_ref().map(Option::as_ref);
     let used = groups.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     let attributes = attributes(&key.variant);
@@ -207,9 +223,19 @@ fn make(
         })
         .collect();
     let label = key.variant.to_string();
+    let fullscreen = key.variant.has(Feature::Deferred);
+    let target = Some(wgpu::ColorTargetState {
+        format: key.format,
+        blend: key.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
+        write_mask: wgpu::ColorWrites::ALL,
+    });
+    let targets = match key.variant.has(Feature::GBufferDetails) {
+        true => vec![target.clone(), target],
+        false => vec![target],
+    };
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("forward"),
+        label: Some(key.variant.module()),
         bind_group_layouts: &groups[..used],
         immediate_size: 0,
     });
@@ -229,9 +255,13 @@ fn make(
         },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
-            depth_write_enabled: Some(!key.blend),
+            depth_write_enabled: Some(!key.blend && !fullscreen),
             // Reversed-Z: nearer is greater. Equal passes: of coplanar faces the one drawn last is seen.
-            depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+            depth_compare: Some(match fullscreen {
+                // Where nothing is drawn it is behind the triangle, and nothing is run.
+                true => wgpu::CompareFunction::LessEqual,
+                false => wgpu::CompareFunction::GreaterEqual,
+            }),
             stencil: Default::default(),
             bias: Default::default(),
         }),
@@ -240,11 +270,7 @@ fn make(
             module,
             entry_point: Some("fragment"),
             compilation_options: Default::default(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format: key.format,
-                blend: key.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
-                write_mask: wgpu::ColorWrites::ALL,
-            })],
+            targets: &targets,
         }),
         multiview_mask: None,
         cache: None,
@@ -260,12 +286,13 @@ fn module(
     device: &wgpu::Device,
     modules: &Modules,
     variant: Variant,
+    tables_in_textures: bool,
 ) -> Result<wgpu::ShaderModule, RenderError> {
     let known = modules.lock().ok().and_then(|modules| modules.get(&variant).cloned());
     if let Some(known) = known {
         return Ok(known);
     }
-    let module = shader::compile(device, "forward", &variant.flags())?;
+    let module = shader::compile(device, variant.module(), &variant.flags(tables_in_textures))?;
     if let Ok(mut modules) = modules.lock() {
         modules.insert(variant, module.clone());
     }

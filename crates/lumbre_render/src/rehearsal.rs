@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 use lumbre_scene::{Lightmap, LightmapEncoding, LightmapImage, MaterialTextures};
 
 use crate::frame_bindings::{FrameBindings, FrameBuffer};
+use crate::g_buffer;
 use crate::irradiance_volumes;
 use crate::pipelines::{Afterwards, Pipeline, PipelineKey, Pipelines};
 use crate::shader::Feature;
@@ -74,7 +75,7 @@ impl Rehearsals {
         gpu: &Gpu,
         draw: impl FnOnce(&mut Rehearsal) -> Result<(), E> + Send + 'static,
     ) -> Option<Afterwards> {
-        if gpu.adapter.get_info().device_type != wgpu::DeviceType::Cpu {
+        if !gpu.is_software() {
             return None;
         }
         let (place, instance, adapter) = (Arc::clone(&self.0), gpu.instance.clone(), gpu.adapter.clone());
@@ -122,7 +123,9 @@ impl Rehearsal {
             Some(textures) => self.sets.set(&self.gpu, &mut self.textures, textures)?,
             None => None,
         };
-        let baked_light = match key.variant.has(Feature::Lightmap) {
+        let g_buffer = key.variant.has(Feature::Deferred).then(|| self.g_buffer_group());
+        let lightmap = key.variant.has(Feature::Lightmap) && !key.variant.has(Feature::GBuffer);
+        let baked_light = match lightmap {
             true => {
                 let (name, encoding) = ("rehearsal".to_owned(), LightmapEncoding::default());
                 let texels = vec![glam::Vec3::ZERO; 16];
@@ -137,8 +140,8 @@ impl Rehearsal {
         let frame = self.frame_group(FrameBindings::of(&key.variant));
         let shadows = key.variant.has(Feature::Shadows).then(|| self.shadow_group());
         let Some(pipeline) = self.pipelines.get(&key) else { return Ok(()) };
-        let groups =
-            [Some(&frame), set.as_ref().map(|set| &set.bind_group), baked_light.as_deref(), shadows.as_ref()];
+        let textures = g_buffer.as_ref().or(set.as_ref().map(|set| &set.bind_group));
+        let groups = [Some(&frame), textures, baked_light.as_deref(), shadows.as_ref()];
         let drawn = self.submit(key, pipeline, groups);
         self.sets.sweep();
         self.textures.sweep();
@@ -148,8 +151,9 @@ impl Rehearsal {
     /// Draws a caster into a map.
     fn draw_casters(&mut self) -> Result<(), RenderError> {
         let device = &self.gpu.device;
-        let pipelines = CasterPipelines::new(device)?;
-        let group = pipelines.group(device, &self.zeros, &self.zeros);
+        let pipelines = CasterPipelines::new(device, self.gpu.reads_tables_from_textures())?;
+        let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);
+        let group = pipelines.group(device, self.table(&table), &self.zeros);
         let map = self.texture(DEPTH_FORMAT, 1);
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -205,7 +209,7 @@ impl Rehearsal {
             sample_count,
             dimension: wgpu::TextureDimension::D2,
             format,
-            usage: match format == DEPTH_FORMAT && sample_count == 1 {
+            usage: match (format == DEPTH_FORMAT || format == g_buffer::FORMAT) && sample_count == 1 {
                 true => wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
                 false => wgpu::TextureUsages::RENDER_ATTACHMENT,
             },
@@ -220,11 +224,14 @@ impl Rehearsal {
         pipeline: &Pipeline,
         groups: [Option<&wgpu::BindGroup>; 4],
     ) -> Result<(), RenderError> {
-        let (color, depth) = (self.texture(key.format, key.samples), self.texture(DEPTH_FORMAT, key.samples));
+        let colors = if key.variant.has(Feature::GBufferDetails) { 2 } else { 1 };
+        let colors: Vec<_> = (0..colors).map(|_| self.texture(key.format, key.samples)).collect();
+        let attachments: Vec<_> = colors.iter().map(|color| Some(color_attachment(color))).collect();
+        let depth = self.texture(DEPTH_FORMAT, key.samples);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("rehearsal"),
-            color_attachments: &[Some(color_attachment(&color))],
+            color_attachments: &attachments,
             depth_stencil_attachment: Some(depth_attachment(&depth)),
             ..Default::default()
         });
@@ -235,7 +242,7 @@ impl Rehearsal {
         for slot in 0..pipeline.attributes.len() as u32 {
             pass.set_vertex_buffer(slot, self.zeros.slice(..));
         }
-        if pipeline.flat {
+        if pipeline.flat || pipeline.attributes.is_empty() {
             pass.draw(0..3, 0..1);
         } else {
             pass.set_index_buffer(self.zeros.slice(..), wgpu::IndexFormat::Uint32);
@@ -245,29 +252,49 @@ impl Rehearsal {
         self.finish(encoder)
     }
 
+    /// Zeros where a table is bound: this texture on a device that reads tables from textures.
+    fn table<'a>(&'a self, texture: &'a wgpu::TextureView) -> wgpu::BindingResource<'a> {
+        match self.gpu.reads_tables_from_textures() {
+            true => wgpu::BindingResource::TextureView(texture),
+            false => self.zeros.as_entire_binding(),
+        }
+    }
+
     /// Group 0.
     fn frame_group(&mut self, bindings: FrameBindings) -> wgpu::BindGroup {
+        let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);
+        let layout = self.pipelines.frame_layout(&self.gpu, bindings).clone();
         let entry = |buffer: FrameBuffer| wgpu::BindGroupEntry {
             binding: buffer.binding(),
-            resource: self.zeros.as_entire_binding(),
+            resource: match buffer.is_table() {
+                true => self.table(&table),
+                false => self.zeros.as_entire_binding(),
+            },
         };
         let entries: Vec<_> = bindings.buffers().map(entry).collect();
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("rehearsal"),
-            layout: self.pipelines.frame_layout(&self.gpu, bindings),
+            layout: &layout,
             entries: &entries,
         })
+    }
+
+    /// Group 1 of what lights from the G-buffer.
+    fn g_buffer_group(&self) -> wgpu::BindGroup {
+        let surfaces = self.texture(g_buffer::FORMAT, 1);
+        g_buffer::group(&self.gpu.device, self.pipelines.g_buffer_layout(), &surfaces, None)
     }
 
     /// Group 3.
     fn shadow_group(&self) -> wgpu::BindGroup {
         let atlas = self.texture(DEPTH_FORMAT, 1);
+        let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("rehearsal"),
             layout: self.pipelines.shadow_layout(),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&atlas) },
-                wgpu::BindGroupEntry { binding: 1, resource: self.zeros.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: self.table(&table) },
             ],
         })
     }

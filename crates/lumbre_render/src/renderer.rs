@@ -134,9 +134,9 @@ impl Renderer {
             objects: Objects::new(),
             emitters: Emitters::default(),
             volumes: IrradianceVolumes::default(),
-            lights: GrowableBuffer::new("lights"),
-            instances: GrowableBuffer::new("instances"),
-            light_list: GrowableBuffer::new("light list"),
+            lights: GrowableBuffer::table("lights"),
+            instances: GrowableBuffer::table("instances"),
+            light_list: GrowableBuffer::table("light list"),
             views: vec![ViewBuffers::new(gpu)],
             shadows: ShadowMaps::new(),
             meshes: MeshBuffers::default(),
@@ -229,6 +229,11 @@ impl Renderer {
         let mut possible = options.clone();
         self.without.iter().for_each(|effect| effect.switch_off(&mut possible));
         possible
+    }
+
+    /// The device that it draws on.
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
     /// Its effects, in the order of their stages.
@@ -399,7 +404,13 @@ impl Renderer {
             lights.lamps.iter_mut().for_each(|lamp| lamp.light.shadow = false);
         }
         clock.lap(|cpu| &mut cpu.lights_ms);
-        let facts = SceneFacts::new(&self.objects.census, &lights.set, self.volumes.len(), settings, options);
+        let device = (self.gpu.is_software(), [seen.target.width, seen.target.height]);
+        let (objects, volumes) = (&self.objects.census, self.volumes.len());
+        let mut facts = SceneFacts::new(objects, &lights.set, volumes, settings, options, device);
+        if let Some(former) = former {
+            // What draws surfaces stays what it was.
+            facts.g_buffer = former.features.g_buffer;
+        }
         clock.lap(|cpu| &mut cpu.census_ms);
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms);
         let called_for: Vec<bool> =
@@ -463,7 +474,7 @@ impl Renderer {
             chosen.shading
         };
         let visible = VisibleObjects::new(
-            &self.objects,
+            (&self.objects, &self.volumes),
             (&seen.view, &[]),
             settings,
             &decision.features,
@@ -472,7 +483,7 @@ impl Renderer {
             &mut need,
         );
         clock.lap(|cpu| &mut cpu.visibility_ms);
-        let draws = Draws::new(&visible, &mut lists, &self.volumes, 0);
+        let draws = Draws::new(visible, &mut lists, 0);
         let mut mirrors = Vec::new();
         if facts.calls_for_mirrors(options) && decision.plan.ending == Ending::DisplayPass {
             let look = MirrorLook {
@@ -482,12 +493,13 @@ impl Renderer {
             };
             mirrors = mirror_views(&self.objects, &seen.view, look, options.mirror_depth, left_out);
             // Counts are of the passes that have a row in the account.
-            let features = FrameFeatures { counted: CountedStages::default(), ..decision.features };
+            let counted = CountedStages::default();
+            let features = FrameFeatures { counted, g_buffer: None, ..decision.features };
             let mut instances = draws.instances.len();
             for mirror in &mut mirrors {
                 let own: Vec<usize> = mirror.mirrors.iter().map(|surface| surface.slot).collect();
                 let visible = VisibleObjects::new(
-                    &self.objects,
+                    (&self.objects, &self.volumes),
                     (&mirror.view, &own),
                     settings,
                     &features,
@@ -496,7 +508,7 @@ impl Renderer {
                     &mut |_, _, _| Shading::Phong,
                 );
                 let first = u32::try_from(instances).unwrap_or(u32::MAX);
-                mirror.draws = Draws::new(&visible, &mut lists, &self.volumes, first);
+                mirror.draws = Draws::new(visible, &mut lists, first);
                 instances += mirror.draws.instances.len();
             }
         }
@@ -527,8 +539,9 @@ impl Renderer {
         wait: bool,
     ) -> Result<usize, RenderError> {
         let mut awaited = HashSet::new();
-        for batch in decided.batches() {
-            let (key, set) = (batch.pipeline, batch.texture_set.as_deref());
+        let drawn = decided.batches().map(|batch| (batch.pipeline, batch.texture_set.as_deref()));
+        let lit = decided.draws.deferred.iter().map(|class| (class.pipeline, None));
+        for (key, set) in drawn.chain(lit) {
             let rehearse = || self.rehearsals.of(&self.gpu, key, set);
             if !self.pipelines.prepare(&self.gpu, &mut self.sets, key, wait, rehearse)? {
                 awaited.insert(key);
@@ -616,12 +629,10 @@ impl Renderer {
         let flat_rule = decided.decision.flat_rule();
         let mut triangles = 0;
         self.drawn.clear();
-        for batch in decided.batches() {
+        for (batch, lit_with) in decided.every_draws().flat_map(Draws::lit_batches) {
             match self.drawn.last_mut() {
-                Some((variant, count)) if *variant == batch.pipeline.variant => {
-                    *count += batch.instances.len()
-                }
-                _ => self.drawn.push((batch.pipeline.variant, batch.instances.len())),
+                Some((variant, count)) if variant == lit_with => *count += batch.instances.len(),
+                _ => self.drawn.push((*lit_with, batch.instances.len())),
             }
             let variant = &batch.pipeline.variant;
             if let Some(mesh) = self.meshes.get_mut(batch.mesh) {
@@ -668,7 +679,7 @@ impl Renderer {
             objects: draws.instances.len(),
             objects_outside: draws.outside,
             triangles,
-            draws: decided.batches().count(),
+            draws: decided.batches().count() + draws.deferred.len(),
             mirror_views: mirrors.len(),
             variants: self.pipelines.variants(),
             pipelines_made: self.pipelines.made(),
@@ -719,12 +730,17 @@ impl Renderer {
             mirrors: &decided.mirrors,
             views: &self.views,
             view: frame.view,
+            size: shape.size,
             shadows: &self.shadows,
         };
         let effects = (self.effects.as_slice(), decided.declared.as_slice(), &decided.decision.plan);
         let light = decided.bindings().light_resources();
         let shared = self.shared_buffers();
-        let bound = |buffer| self.views[0].bound(buffer, None, &shared).map(|bound| bound.buffer.clone());
+        // What is in a texture is of no pass of the graph.
+        let bound = |buffer| match self.views[0].bound(buffer, None, &shared) {
+            Some(wgpu::BindingResource::Buffer(bound)) => Some(bound.buffer.clone()),
+            _ => None,
+        };
         let light: Vec<_> = light.filter_map(|(name, of)| Some((name, of, bound(of)?))).collect();
         let counts = if decided.counts_lights() { self.light_counter.copy(&self.gpu) } else { None };
         let last = Last { overlay, counts: counts.clone() };
@@ -786,7 +802,7 @@ impl Renderer {
         let draws = &decided.draws;
         let instances = draws.refractive.iter().flat_map(|batch| batch.instances.clone());
         let surfaces = instances.filter_map(|instance| {
-            let slot = draws.instances.get(instance as usize)?.object as usize;
+            let slot = draws.instances.get(instance as usize)?.object() as usize;
             let object = self.objects.objects.get(slot)?.as_ref()?;
             let refractor = object.refractor.as_ref()?;
             let flat = object.planar_mirror.is_some();
@@ -829,7 +845,8 @@ impl Renderer {
             self.light_list.upload(&self.gpu),
         ];
         for ((view, draws), buffers) in views_of(decided, seen).zip(&mut self.views) {
-            buffers.write(&self.gpu, (&view, origin), settings, lights, seen.exposure);
+            let size = [seen.target.width, seen.target.height];
+            buffers.write(&self.gpu, (&view, origin, size), settings, lights, seen.exposure);
             if draws.clustered_depths.is_some() {
                 uploads.clusters += buffers.clusters.pending_bytes();
                 renewed.push(buffers.clusters.upload(&self.gpu));
@@ -840,7 +857,7 @@ impl Renderer {
             self.views.iter_mut().for_each(ViewBuffers::forget_groups);
         }
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
-        if let Some(transforms) = self.objects.transforms.buffer().filter(|_| shadowed) {
+        if let Some(transforms) = self.objects.transforms.bound().filter(|_| shadowed) {
             let layout = self.pipelines.shadow_layout();
             let of_shadows = self.shadows.upload(&self.gpu, transforms, &mut self.meshes, layout)?;
             (uploads.shadows, uploads.meshes) = (of_shadows.shadows, of_shadows.meshes);
@@ -851,11 +868,11 @@ impl Renderer {
     /// The buffers of group 0 that all views share.
     fn shared_buffers(&self) -> SharedBuffers<'_> {
         SharedBuffers {
-            objects: self.objects.transforms.buffer(),
-            materials: self.objects.materials.buffer(),
-            instances: self.instances.buffer(),
-            lights: self.lights.buffer(),
-            light_list: self.light_list.buffer(),
+            objects: self.objects.transforms.bound(),
+            materials: self.objects.materials.bound(),
+            instances: self.instances.bound(),
+            lights: self.lights.bound(),
+            light_list: self.light_list.bound(),
             counter: &self.light_counter,
         }
     }

@@ -8,20 +8,20 @@ use lumbre_scene::SceneSettings;
 
 use crate::Gpu;
 use crate::cluster_buffers::ClusterBuffers;
-use crate::draws::{Batch, Draws};
+use crate::draws::Draws;
 use crate::extract::{CameraView, LightSet, LitPass};
 use crate::frame_bindings::{FrameBindings, FrameBuffer};
 use crate::layout::{FrameData, radiance};
 use crate::light_counter::LightCounter;
+use crate::shader::Variant;
 
 /// The buffers of group 0 that all views of a frame share, as far as they are there.
-#[derive(Clone, Copy)]
 pub(crate) struct SharedBuffers<'a> {
-    pub objects: Option<&'a wgpu::Buffer>,
-    pub materials: Option<&'a wgpu::Buffer>,
-    pub instances: Option<&'a wgpu::Buffer>,
-    pub lights: Option<&'a wgpu::Buffer>,
-    pub light_list: Option<&'a wgpu::Buffer>,
+    pub objects: Option<wgpu::BindingResource<'a>>,
+    pub materials: Option<wgpu::BindingResource<'a>>,
+    pub instances: Option<wgpu::BindingResource<'a>>,
+    pub lights: Option<wgpu::BindingResource<'a>>,
+    pub light_list: Option<wgpu::BindingResource<'a>>,
     /// Where lights are counted.
     pub counter: &'a LightCounter,
 }
@@ -34,10 +34,15 @@ pub(crate) struct FrameGroup {
 }
 
 impl FrameGroup {
-    /// What a batch is drawn with in a pass.
-    pub fn of(batch: &Batch, pass: LitPass) -> Self {
-        let bindings = FrameBindings::of(&batch.pipeline.variant);
+    /// What a variant is bound in a pass.
+    pub fn of(variant: &Variant, pass: LitPass) -> Self {
+        let bindings = FrameBindings::of(variant);
         Self { bindings, counted_in: bindings.count_lights().then_some(pass) }
+    }
+
+    /// What a variant that draws into the G-buffer is bound.
+    pub fn of_geometry(variant: &Variant) -> Self {
+        Self { bindings: FrameBindings::of(variant), counted_in: None }
     }
 }
 
@@ -64,12 +69,13 @@ impl ViewBuffers {
     pub fn write(
         &self,
         gpu: &Gpu,
-        (view, origin): (&CameraView, DVec3),
+        (view, origin, size): (&CameraView, DVec3, [u32; 2]),
         settings: &SceneSettings,
         lights: &LightSet,
         exposure: f32,
     ) {
         let fog = settings.fog.as_ref();
+        let pixels = view.pixel_rays(size);
         let data = FrameData {
             clip_from_frame: view.clip_from_frame(origin).as_mat4().to_cols_array_2d(),
             eye: (view.eye - origin).as_vec3(),
@@ -81,6 +87,12 @@ impl ViewBuffers {
             fog_color: fog.map_or(Vec3::ZERO, |fog| radiance(fog.color)),
             padding_3: 0.0,
             fog_parameters: fog.map_or([0.0; 4], |fog| fog.mode.parameters()),
+            corner: pixels.corner.as_vec3(),
+            parallel: if pixels.parallel { 1.0 } else { 0.0 },
+            pixel_right: pixels.right.as_vec3(),
+            padding_4: 0.0,
+            pixel_down: pixels.down.as_vec3(),
+            padding_5: 0.0,
         };
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&data));
     }
@@ -91,20 +103,19 @@ impl ViewBuffers {
         buffer: FrameBuffer,
         counted_in: Option<LitPass>,
         shared: &SharedBuffers<'a>,
-    ) -> Option<wgpu::BufferBinding<'a>> {
-        let whole = match buffer {
-            FrameBuffer::Frame => Some(&self.frame),
-            FrameBuffer::Objects => shared.objects,
-            FrameBuffer::Materials => shared.materials,
-            FrameBuffer::Instances => shared.instances,
-            FrameBuffer::Lights => shared.lights,
-            FrameBuffer::LightList => shared.light_list,
+    ) -> Option<wgpu::BindingResource<'a>> {
+        match buffer {
+            FrameBuffer::Frame => Some(self.frame.as_entire_binding()),
+            FrameBuffer::Objects => shared.objects.clone(),
+            FrameBuffer::Materials => shared.materials.clone(),
+            FrameBuffer::Instances => shared.instances.clone(),
+            FrameBuffer::Lights => shared.lights.clone(),
+            FrameBuffer::LightList => shared.light_list.clone(),
             FrameBuffer::LightCounts | FrameBuffer::VertexLightCounts => {
-                return shared.counter.binding(counted_in?);
+                shared.counter.binding(counted_in?).map(wgpu::BindingResource::Buffer)
             }
-            of_clusters => return self.clusters.buffer(of_clusters),
-        };
-        whole.map(|buffer| wgpu::BufferBinding { buffer, offset: 0, size: None })
+            of_clusters => self.clusters.bound(of_clusters),
+        }
     }
 
     /// What shaders know of the view.
@@ -124,10 +135,13 @@ impl ViewBuffers {
 
     /// The groups 0 of these draws that are not there yet.
     pub fn missing_groups(&self, draws: &Draws) -> HashSet<FrameGroup> {
-        let groups = LitPass::ALL
-            .into_iter()
-            .flat_map(|pass| draws.of(pass).iter().map(move |batch| FrameGroup::of(batch, pass)));
-        groups.filter(|wanted| !self.groups.contains_key(wanted)).collect()
+        let of_geometry = draws.geometry.iter().map(|batch| FrameGroup::of_geometry(&batch.pipeline.variant));
+        let groups = LitPass::ALL.into_iter().flat_map(|pass| {
+            let drawn = draws.of(pass).iter().map(|batch| &batch.pipeline.variant);
+            let variants = drawn.chain(draws.deferred_of(pass).map(|(_, class)| &class.pipeline.variant));
+            variants.map(move |variant| FrameGroup::of(variant, pass))
+        });
+        of_geometry.chain(groups).filter(|wanted| !self.groups.contains_key(wanted)).collect()
     }
 
     /// Makes a group 0.
@@ -139,7 +153,7 @@ impl ViewBuffers {
         shared: &SharedBuffers<'_>,
     ) {
         let entry = |buffer: FrameBuffer| {
-            let resource = wgpu::BindingResource::Buffer(self.bound(buffer, wanted.counted_in, shared)?);
+            let resource = self.bound(buffer, wanted.counted_in, shared)?;
             Some(wgpu::BindGroupEntry { binding: buffer.binding(), resource })
         };
         let entries: Vec<_> = wanted.bindings.buffers().filter_map(entry).collect();

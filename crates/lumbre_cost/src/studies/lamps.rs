@@ -1,6 +1,6 @@
 //! Many lamps: all for every fragment, by lists of objects, by clusters; and lamps that end where they bring too little to be seen.
 
-use lumbre_render::{FrameOptions, LightLists};
+use lumbre_render::{FrameOptions, LightLists, RenderingPath};
 
 use crate::findings::{cheapest_by_error, is_above_one, listed, percent, ratio_of, rounded, short};
 use crate::frames::{DrawnFrame, Frame, draw_frames};
@@ -76,6 +76,11 @@ fn study() -> Study {
     }
 }
 
+/// A frame whose lamps are found so. On every machine by the same path: lists are what is compared.
+fn found_by(light_lists: LightLists) -> FrameOptions {
+    FrameOptions { light_lists, rendering_path: RenderingPath::Forward, ..FrameOptions::default() }
+}
+
 /// Lamps, with the times of each list.
 type TimesByNumber = Vec<(u32, Vec<DrawnFrame>)>;
 
@@ -86,7 +91,7 @@ fn by_number(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<Tim
         let asked = BallsAndLamps { lamps, threshold: USUAL, seed: conditions.seed };
         let scene = SceneFile::made(conditions, &format!("lamps-{lamps}"), balls_and_lamps(asked))?;
         for (light_lists, name) in LISTS {
-            let options = FrameOptions { light_lists, ..FrameOptions::default() };
+            let options = found_by(light_lists);
             let frame = Frame::new(scene.open(conditions.aspect())?, options);
             frames.push(if lamps <= SHARING { frame.sharing(name) } else { frame });
         }
@@ -196,7 +201,7 @@ fn by_threshold(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<
         };
         let scene = SceneFile::made(conditions, &name, balls_and_lamps(asked))?;
         let light_lists = if *threshold == 0.0 { LightLists::Everything } else { LightLists::Clusters };
-        let options = FrameOptions { light_lists, ..FrameOptions::default() };
+        let options = found_by(light_lists);
         let frame = Frame::new(scene.open(conditions.aspect())?, options);
         frames.push(if lamps <= SHARING {
             frame.sharing(if *threshold == 0.0 { "endless" } else { ENDING })
@@ -254,7 +259,7 @@ fn of_files(conditions: &Conditions<'_>, measured: &mut Measured) -> Result<(), 
     let mut frames = Vec::new();
     for scene in &scenes {
         for (light_lists, _) in LISTS {
-            let options = FrameOptions { light_lists, ..FrameOptions::default() };
+            let options = found_by(light_lists);
             frames.push(Frame::new(scene.open(conditions.aspect())?, options));
         }
     }

@@ -1,9 +1,8 @@
 //! Opaque surfaces without a lightmap: flat, Gouraud and Phong shading in one pass over all lights.
 
 use bevy_ecs::world::World;
-use lumbre_graph::LoadOp;
 
-use super::{Board, Effect, FrameGraph, Stage};
+use super::{Board, Effect, FrameGraph, Stage, g_buffer};
 use crate::FrameOptions;
 use crate::extract::LitPass;
 use crate::facts::SceneFacts;
@@ -32,13 +31,7 @@ impl Effect for Forward {
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
-        board
-            .lit_pass(graph, self.name(), LoadOp::Load)
-            .calls_for(self.opaque, "opaque mesh without a lightmap")
-            .depth(&mut board.depth, LoadOp::Load)
-            .run(|context| {
-                context.user.draw(context.pass, LitPass::Forward);
-                Ok(())
-            });
+        let calls = [(self.opaque, "opaque mesh without a lightmap")];
+        g_buffer::opaque_pass(graph, board, LitPass::Forward, &calls);
     }
 }

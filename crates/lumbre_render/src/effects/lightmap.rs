@@ -1,9 +1,8 @@
 //! Opaque surfaces whose light is baked: the lightmap's diffuse light, and what dynamic lights add to it.
 
 use bevy_ecs::world::World;
-use lumbre_graph::LoadOp;
 
-use super::{Board, Effect, EffectWork, FrameGraph, Stage};
+use super::{Board, Effect, EffectWork, FrameGraph, Stage, g_buffer};
 use crate::error::EffectError;
 use crate::extract::LitPass;
 use crate::facts::SceneFacts;
@@ -45,14 +44,7 @@ impl Effect for Lightmap {
     }
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
-        board
-            .lit_pass(graph, self.name(), LoadOp::Load)
-            .calls_for(self.lightmapped, "lightmapped mesh")
-            .calls_for(self.switched_on, "lightmaps switched on")
-            .depth(&mut board.depth, LoadOp::Load)
-            .run(|context| {
-                context.user.draw(context.pass, LitPass::Lightmap);
-                Ok(())
-            });
+        let calls = [(self.lightmapped, "lightmapped mesh"), (self.switched_on, "lightmaps switched on")];
+        g_buffer::opaque_pass(graph, board, LitPass::Lightmap, &calls);
     }
 }

@@ -13,6 +13,7 @@ mod background;
 mod board;
 mod display;
 mod forward;
+mod g_buffer;
 mod lightmap;
 mod mirrors;
 mod refraction;
@@ -30,7 +31,7 @@ use crate::error::EffectError;
 use crate::facts::SceneFacts;
 use crate::frame_plan::FrameShape;
 use crate::frame_scene::FrameScene;
-use crate::{FrameOptions, Gpu};
+use crate::{FrameOptions, Gpu, RenderingPath};
 
 /// The graph of a frame. Its passes are lent the frame's scene as `context.user`.
 pub type FrameGraph<'a> = Graph<'a, FrameScene<'a>>;
@@ -39,7 +40,7 @@ pub type FrameGraph<'a> = Graph<'a, FrameScene<'a>>;
 /// after its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
-    /// What surfaces are lit with: shadow maps. Nothing is drawn yet.
+    /// What surfaces are lit with: shadow maps, the G-buffer. Nothing is lit yet.
     Light,
     /// What lies behind everything.
     Background,
@@ -146,6 +147,8 @@ pub trait Effect: Send + Sync {
 pub enum BuiltIn {
     /// Shadow maps: without them lights cast no shadows.
     ShadowMaps,
+    /// The G-buffer: without it all surfaces are lit where they are drawn.
+    GBuffer,
     /// Surfaces with a lightmap: without it they are lit as any others.
     Lightmap,
     /// Opaque surfaces: without it they are not drawn.
@@ -162,8 +165,9 @@ pub enum BuiltIn {
 
 impl BuiltIn {
     /// Every one.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::ShadowMaps,
+        Self::GBuffer,
         Self::Lightmap,
         Self::Forward,
         Self::Mirrors,
@@ -176,6 +180,7 @@ impl BuiltIn {
     pub fn name(self) -> &'static str {
         match self {
             Self::ShadowMaps => "shadow maps",
+            Self::GBuffer => "g-buffer",
             Self::Lightmap => "lightmap",
             Self::Forward => "forward",
             Self::Mirrors => "mirrors",
@@ -189,18 +194,22 @@ impl BuiltIn {
     pub(crate) fn switch_off(self, options: &mut FrameOptions) {
         match self {
             Self::ShadowMaps => options.shadows = false,
+            Self::GBuffer => options.rendering_path = RenderingPath::Forward,
             Self::Lightmap => options.lightmaps = false,
             Self::Mirrors => options.mirror_depth = 0,
             Self::Refraction => options.refraction = false,
-            Self::Forward | Self::Transparent | Self::Display => {}
+            // What the G-buffer holds of opaque surfaces would be lit by nothing.
+            Self::Forward => options.rendering_path = RenderingPath::Forward,
+            Self::Transparent | Self::Display => {}
         }
     }
 }
 
 /// The effects of this crate but for some, each in its stage.
 pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
-    let all: [Box<dyn Effect>; 8] = [
+    let all: [Box<dyn Effect>; 9] = [
         Box::new(shadows::Shadows::default()),
+        Box::new(g_buffer::GBufferPass::default()),
         Box::new(background::Background::default()),
         Box::new(lightmap::Lightmap::default()),
         Box::new(forward::Forward::default()),

@@ -29,6 +29,18 @@ pub(crate) struct CameraView {
     clip_from_view: DMat4,
 }
 
+/// Where the pixels of a frame look, across the line of sight: metres for each metre of depth, or metres where rays are parallel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PixelRays {
+    /// From the eye to the frame's upper left corner.
+    pub corner: DVec3,
+    /// One pixel to the right.
+    pub right: DVec3,
+    /// One pixel down.
+    pub down: DVec3,
+    pub parallel: bool,
+}
+
 /// A rectangle of the frame, in normalized device coordinates: from -1 to 1, to the right and up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Window {
@@ -39,6 +51,11 @@ pub(crate) struct Window {
 impl Window {
     /// The whole frame.
     pub const WHOLE: Self = Self { low: DVec2::NEG_ONE, high: DVec2::ONE };
+
+    /// The least rectangle that holds both.
+    pub fn and(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
 
     /// The part of the frame that it covers, at most 1.
     pub fn area(&self) -> f64 {
@@ -179,6 +196,21 @@ impl CameraView {
         }
     }
 
+    /// Where the pixels of a frame of this size look.
+    pub fn pixel_rays(&self, [width, height]: [u32; 2]) -> PixelRays {
+        let (half_width, half_height, parallel) = match self.volume {
+            ViewVolume::Perspective { half_width, half_height, .. } => (half_width, half_height, false),
+            ViewVolume::Orthographic { half_width, half_height, .. } => (half_width, half_height, true),
+        };
+        let (right, up) = (self.basis.x_axis * half_width, self.basis.y_axis * half_height);
+        PixelRays {
+            corner: up - right,
+            right: right * (2.0 / f64::from(width.max(1))),
+            down: up * (-2.0 / f64::from(height.max(1))),
+            parallel,
+        }
+    }
+
     /// The part of the window in which a box may be seen that stands in the world along its axes; `None` where it is outside.
     pub fn window_of_box(&self, center: DVec3, half_size: DVec3) -> Option<Window> {
         let clip = self.clip_from_frame(center);
@@ -210,6 +242,31 @@ impl CameraView {
         }
         let window = Window { low: low.max(self.window.low), high: high.min(self.window.high) };
         (window.low.cmplt(window.high).all()).then_some(window)
+    }
+
+    /// A part of the window outside of which no point of a sphere is seen, which stands in the world.
+    pub fn window_of_sphere(&self, center: DVec3, radius: f64) -> Window {
+        let in_view = self.basis.transpose() * (center - self.eye);
+        let depth = -in_view.z;
+        let scale = match self.volume {
+            ViewVolume::Perspective { half_width, half_height, near } => {
+                if depth - radius < near {
+                    return self.window;
+                }
+                DVec2::new(half_width, half_height)
+            }
+            ViewVolume::Orthographic { half_width, half_height, .. } => DVec2::new(half_width, half_height),
+        };
+        // Of the box around it: the nearer face on the side away from the line of sight, else the farther one.
+        let edge = |at: f64, outwards: bool| match self.volume {
+            ViewVolume::Perspective { .. } => at / if outwards { depth - radius } else { depth + radius },
+            ViewVolume::Orthographic { .. } => at,
+        };
+        let low = (in_view.truncate() - radius).map(|at| edge(at, at < 0.0)) / scale;
+        let high = (in_view.truncate() + radius).map(|at| edge(at, at > 0.0)) / scale;
+        let (low, high) = (low.min(high), low.max(high));
+        let low = low.clamp(self.window.low, self.window.high);
+        Window { low, high: high.clamp(low, self.window.high) }
     }
 
     /// The corners of what is drawn between two depths along the line of sight, in frame space.
@@ -280,6 +337,39 @@ mod tests {
         let orthographic = orthographic_reversed(1.0, 1.0, 1.0, 3.0);
         assert!((orthographic.project_point3(DVec3::new(0.0, 0.0, -1.0)).z - 1.0).abs() < 1e-12);
         assert!(orthographic.project_point3(DVec3::new(0.0, 0.0, -3.0)).z.abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_seen_of_a_sphere_is_in_its_window() {
+        for projection in [
+            Projection::Perspective { vertical_fov: 1.2, aspect: None, near: 0.1, far: None },
+            Projection::Orthographic { half_width: -4.0, half_height: 3.0, near: 0.1, far: 50.0 },
+        ] {
+            let mut world = World::new();
+            let transform = lumbre_scene::Transform::from_xyz(1.0, 2.0, 3.0);
+            let transform = transform.looking_at(DVec3::new(0.5, 0.0, -4.0), DVec3::Y);
+            let camera = Camera { projection, exposure: 1.0 };
+            let entity = world.spawn((camera, GlobalTransform(transform.affine()))).id();
+            let view = CameraView::new(&world, entity, 1.3).unwrap();
+            let clip_from_world = view.clip_from_frame(DVec3::ZERO);
+            let mut narrow = 0;
+            for step in 0..400 {
+                let t = f64::from(step);
+                let along = |t: f64| DVec3::new((t * 0.37).sin(), (t * 0.73).sin(), (t * 0.11).cos());
+                let (center, radius) = (along(t) * 6.0 - 2.0 * DVec3::Z, 0.1 + (0.31 * t).sin().abs());
+                let window = view.window_of_sphere(center, radius);
+                narrow += usize::from(window.area() < 0.1);
+                for part in 0..64 {
+                    let direction = along(f64::from(part) * 3.1 + 0.5).normalize();
+                    let clip = clip_from_world * (center + direction * radius).extend(1.0);
+                    let at = clip.truncate().truncate() / clip.w;
+                    let seen = clip.w > 0.0 && clip.z <= clip.w && at.abs().max_element() <= 1.0;
+                    let held = at.cmpge(window.low - 1e-12).all() && at.cmple(window.high + 1e-12).all();
+                    assert!(held || !seen, "{at} of a sphere at {center} is outside {window:?}");
+                }
+            }
+            assert!(narrow > 100, "{narrow}");
+        }
     }
 
     #[test]

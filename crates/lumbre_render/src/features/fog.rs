@@ -3,7 +3,7 @@
 use lumbre_optics::FogMode;
 
 use super::Subject;
-use crate::shader::{Feature, Variant};
+use crate::shader::{Feature, TABLES_IN_TEXTURES, Variant};
 
 pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     let Some(fog) = &subject.settings.fog else { return };
@@ -21,7 +21,7 @@ pub(crate) fn fog_feature(mode: &FogMode) -> Feature {
     }
 }
 
-/// Fog in shaders that know no other feature.
+/// Fog in shaders that know no other feature, and read tables from buffers.
 pub(crate) fn fog_flags(fog: Option<Feature>) -> Vec<(&'static str, bool)> {
     let features = [
         Feature::Fog,
@@ -31,5 +31,6 @@ pub(crate) fn fog_flags(fog: Option<Feature>) -> Vec<(&'static str, bool)> {
         Feature::FogDepthCue,
     ];
     let on = |feature| fog.is_some_and(|mode| feature == mode || feature == Feature::Fog);
-    features.map(|feature| (feature.name(), on(feature))).to_vec()
+    let flags = features.into_iter().map(|feature| (feature.name(), on(feature)));
+    flags.chain([(TABLES_IN_TEXTURES, false)]).collect()
 }

@@ -20,6 +20,7 @@ use lumbre_scene::{ObjectTraits, SceneSettings, ShadowFilter};
 use crate::extract::LightSet;
 use crate::facts::SceneFacts;
 use crate::frame_plan::Ending;
+use crate::g_buffer::GBufferContents;
 use crate::light_counter::CountedStages;
 use crate::shader::{DisplayVariant, Feature, Variant};
 use crate::{Display, FrameOptions};
@@ -45,6 +46,8 @@ pub(crate) struct FrameFeatures {
     pub clustered: bool,
     /// Colours are made as the target holds them.
     pub display: Option<DisplayVariant>,
+    /// What opaque surfaces are lit from that are shaded deferred, as far as they can be.
+    pub g_buffer: Option<GBufferContents>,
     /// Where lights are counted: nowhere, unless the frame is measured so.
     pub counted: CountedStages,
 }
@@ -72,6 +75,7 @@ impl FrameFeatures {
             hard_shadows: settings.frame.shadow_filter == ShadowFilter::Hard,
             clustered: lights.are_clustered(options.light_lists),
             display: (ending == Ending::Folded).then(|| DisplayVariant::new(options.display, target)),
+            g_buffer: facts.g_buffer,
             counted: CountedStages::default(),
         }
     }

@@ -46,7 +46,7 @@ mod tests {
 
     /// The WGSL of a variant, which naga accepts.
     fn valid(variant: &Variant) -> Arc<str> {
-        let mut source = to_wgsl("forward", &variant.flags()).unwrap();
+        let mut source = to_wgsl("forward", &variant.flags(false)).unwrap();
         if variant.has(Feature::CountLights) {
             source = tested_early(&source).into();
             assert_eq!(source.matches("@early_depth_test(force) @fragment").count(), 1, "{source}");

@@ -140,7 +140,16 @@ features! {
     CountLights = 55 => "COUNT_LIGHTS",
     /// Reads one texel of a shadow map.
     HardShadows = 56 => "HARD_SHADOWS",
+    /// Draws a shape into the G-buffer.
+    GBuffer = 57 => "G_BUFFER",
+    /// The G-buffer has details.
+    GBufferDetails = 58 => "G_BUFFER_DETAILS",
+    /// Lights what is in the G-buffer.
+    Deferred = 59 => "DEFERRED",
 }
+
+/// What shaders ask about that read the tables of a frame: whether these are textures.
+pub(crate) const TABLES_IN_TEXTURES: &str = "TABLES_IN_TEXTURES";
 
 /// Features that the frame, its lights and their lists decide on, and not a material alone.
 const OF_THE_FRAME: u64 = Feature::Lightmap as u64
@@ -175,7 +184,10 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::ShadowCascades as u64
     | Feature::SoftShadows as u64
     | Feature::HardShadows as u64
-    | Feature::CountLights as u64;
+    | Feature::CountLights as u64
+    | Feature::GBuffer as u64
+    | Feature::GBufferDetails as u64
+    | Feature::Deferred as u64;
 
 /// Features that make a colour differ from place to place on a surface, or from its front to its back.
 const VARYING: u64 = Feature::Lights as u64
@@ -190,7 +202,7 @@ const VARYING: u64 = Feature::Lights as u64
     | Feature::TwoSided as u64
     | Feature::Fog as u64;
 
-/// A variant of the forward shader.
+/// A variant of the shaders of lit surfaces: of the forward shader, or of those that shade deferred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Rate of evaluation.
@@ -210,6 +222,21 @@ impl Variant {
     pub fn set(&mut self, feature: Feature, called_for: bool) {
         if called_for {
             self.bits |= feature as u64;
+        }
+    }
+
+    /// The variant without these features.
+    pub(crate) fn without(mut self, features: &[Feature]) -> Self {
+        features.iter().for_each(|feature| self.bits &= !(*feature as u64));
+        self
+    }
+
+    /// The shader module that it is a variant of.
+    pub(crate) fn module(&self) -> &'static str {
+        match (self.has(Feature::GBuffer), self.has(Feature::Deferred)) {
+            (true, _) => "g_buffer",
+            (_, true) => "deferred_lighting",
+            (false, false) => "forward",
         }
     }
 
@@ -317,8 +344,8 @@ impl Variant {
         self
     }
 
-    /// The shader's feature flags: each name, and whether it is on.
-    pub(crate) fn flags(&self) -> Vec<(&'static str, bool)> {
+    /// The shader's feature flags on a device that reads tables from textures or does not: each name, and whether it is on.
+    pub(crate) fn flags(&self, tables_in_textures: bool) -> Vec<(&'static str, bool)> {
         let features = Feature::ALL.iter().map(|feature| (feature.name(), self.has(*feature)));
         let shading = [
             ("SHADING_FLAT", Shading::Flat),
@@ -334,7 +361,7 @@ impl Variant {
         ];
         features
             // Ambient lights are summed before the frame: no shader meets one.
-            .chain([("AMBIENT_LIGHTS", false)])
+            .chain([("AMBIENT_LIGHTS", false), (TABLES_IN_TEXTURES, tables_in_textures)])
             .chain(shading.map(|(name, value)| (name, value == self.shading)))
             .chain(reflection.map(|(name, value)| (name, value == self.reflection)))
             .collect()
@@ -344,7 +371,7 @@ impl Variant {
 impl std::fmt::Display for Variant {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut separator = "";
-        for (name, on) in self.flags() {
+        for (name, on) in self.flags(false) {
             if on {
                 write!(formatter, "{separator}{name}")?;
                 separator = " ";

@@ -11,7 +11,9 @@ use crate::deferred::Deferred;
 use crate::extract::{CameraView, Object, Objects};
 use crate::growable_buffer::GrowableBuffer;
 use crate::mesh_buffers::{Attribute, MeshBuffers, MeshKey};
+use crate::shader::{self, TABLES_IN_TEXTURES};
 use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight};
+use crate::table_texture::table_binding;
 use crate::{Gpu, RenderError, Uploads};
 
 /// Largest side of the atlas, in texels.
@@ -106,7 +108,7 @@ impl ShadowMaps {
         Self {
             drawn: Vec::new(),
             stale: Vec::new(),
-            views: GrowableBuffer::new("shadow views"),
+            views: GrowableBuffer::table("shadow views"),
             matrices: Vec::new(),
             casters: None,
             device: None,
@@ -126,10 +128,10 @@ impl ShadowMaps {
         afterwards: impl FnOnce() -> Option<Box<dyn FnOnce() + Send>>,
     ) -> Result<bool, RenderError> {
         let casters = self.casters.get_or_insert_with(|| {
-            let device = gpu.device.clone();
+            let (device, tables_in_textures) = (gpu.device.clone(), gpu.reads_tables_from_textures());
             let afterwards = if wait { None } else { afterwards() };
             let make = move || {
-                let casters = CasterPipelines::new(&device)?;
+                let casters = CasterPipelines::new(&device, tables_in_textures)?;
                 afterwards.into_iter().for_each(|afterwards| afterwards());
                 Ok(casters)
             };
@@ -229,7 +231,7 @@ impl ShadowMaps {
     pub fn upload(
         &mut self,
         gpu: &Gpu,
-        objects: &wgpu::Buffer,
+        objects: wgpu::BindingResource<'_>,
         meshes: &mut MeshBuffers,
         layout: &wgpu::BindGroupLayout,
     ) -> Result<Uploads, RenderError> {
@@ -245,7 +247,7 @@ impl ShadowMaps {
             gpu.queue.write_buffer(&device.matrices, 0, &self.matrices);
         }
         if renewed || device.receiver_group.is_none() {
-            device.receiver_group = self.views.buffer().map(|views| device.receivers(gpu, views, layout));
+            device.receiver_group = self.views.bound().map(|views| device.receivers(gpu, views, layout));
         }
         let pipelines = self.casters.as_ref().and_then(|casters| casters.get()?.ok());
         device.caster_group =
@@ -354,11 +356,7 @@ pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    let views = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Storage { read_only: true },
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
+    let views = table_binding(gpu.reads_tables_from_textures());
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("shadows"),
         entries: &[entry(0, atlas), entry(1, views)],
@@ -366,19 +364,26 @@ pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
 }
 
 impl CasterPipelines {
-    pub fn new(device: &wgpu::Device) -> Result<Self, RenderError> {
-        let entry = |binding, ty, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
+    /// On a device that reads tables from textures or does not.
+    pub fn new(device: &wgpu::Device, tables_in_textures: bool) -> Result<Self, RenderError> {
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::VERTEX,
-            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
+            ty,
             count: None,
         };
-        let storage = wgpu::BufferBindingType::Storage { read_only: true };
+        let table = table_binding(tables_in_textures);
+        let matrix = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: true,
+            min_binding_size: None,
+        };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("shadow casters"),
-            entries: &[entry(0, storage, false), entry(1, wgpu::BufferBindingType::Uniform, true)],
+            entries: &[entry(0, table), entry(1, matrix)],
         });
-        let module = crate::shader::compile(device, "shadow_caster", &[])?;
+        let flags = [(TABLES_IN_TEXTURES, tables_in_textures)];
+        let module = shader::compile(device, "shadow_caster", &flags)?;
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("shadow casters"),
             bind_group_layouts: &[Some(&layout)],
@@ -425,7 +430,7 @@ impl CasterPipelines {
     pub fn group(
         &self,
         device: &wgpu::Device,
-        objects: &wgpu::Buffer,
+        objects: wgpu::BindingResource<'_>,
         matrices: &wgpu::Buffer,
     ) -> wgpu::BindGroup {
         let matrix = wgpu::BufferBinding { buffer: matrices, offset: 0, size: wgpu::BufferSize::new(64) };
@@ -433,7 +438,7 @@ impl CasterPipelines {
             label: Some("shadow casters"),
             layout: &self.layout,
             entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: objects.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 0, resource: objects },
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(matrix) },
             ],
         })
@@ -468,15 +473,17 @@ impl OnDevice {
         }
     }
 
-    fn receivers(&self, gpu: &Gpu, views: &wgpu::Buffer, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
+    fn receivers(
+        &self,
+        gpu: &Gpu,
+        views: wgpu::BindingResource<'_>,
+        layout: &wgpu::BindGroupLayout,
+    ) -> wgpu::BindGroup {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("shadows"),
             layout,
-            entries: &[
-                entry(0, wgpu::BindingResource::TextureView(&self.atlas_view)),
-                entry(1, views.as_entire_binding()),
-            ],
+            entries: &[entry(0, wgpu::BindingResource::TextureView(&self.atlas_view)), entry(1, views)],
         })
     }
 }

@@ -1,0 +1,106 @@
+//! The G-buffer of deferred shading: which surfaces can be lit from it, with which variants, and how it is bound. Its pass is `effects::g_buffer`, what a frame draws with it
+//! is decided in `draws`. Layout twin of shaders/g_buffer.wesl.
+
+use lumbre_optics::Shading;
+
+use crate::Gpu;
+use crate::shader::{Feature, Variant};
+
+/// What the G-buffer of a frame holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct GBufferContents {
+    /// Coordinates of lightmaps, and what textures and vertex colours modulate light with: of frames that have any.
+    pub details: bool,
+}
+
+/// Of each of its textures. Two of them are as much as every device draws into at once.
+pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+/// The largest number of a class; 0 is none.
+pub(crate) const LAST_CLASS: u32 = 0xff;
+/// The largest number of an instance that it has room for.
+pub(crate) const LAST_INSTANCE: u32 = (1 << 23) - 1;
+
+/// The variants of a deferred surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct DeferredVariants {
+    /// Draws its shape into the G-buffer.
+    pub geometry: Variant,
+    /// Lights it, with all others that take the same.
+    pub lighting: Variant,
+}
+
+/// What stands in the G-buffer's details, or is read there for them.
+const DETAILED: [Feature; 5] =
+    [Feature::Uv0, Feature::Uv1, Feature::BaseColorTexture, Feature::VertexColor, Feature::Lightmap];
+
+/// What the G-buffer has no room for: numbers of a material that differ from place to place, frames of tangents, what neighbours on the same surface differ in, and
+/// coverage.
+const FORWARD_ONLY: [Feature; 7] = [
+    Feature::EmissiveTexture,
+    Feature::MetallicRoughnessTexture,
+    Feature::NormalTexture,
+    Feature::OcclusionTexture,
+    Feature::SpecularAntialiasing,
+    Feature::Alpha,
+    Feature::AlphaMask,
+];
+
+impl DeferredVariants {
+    /// Those of a surface that the forward pass draws with `forward`; none if the G-buffer has no room for what that one reads, or if no light is evaluated in
+    /// its fragments.
+    pub fn of(forward: &Variant, contents: GBufferContents) -> Option<Self> {
+        let has = |feature: &Feature| forward.has(*feature);
+        let lit_per_fragment =
+            has(&Feature::Lit) && has(&Feature::Lights) && forward.shading == Shading::Phong;
+        let detailed = DETAILED.iter().any(has);
+        if !lit_per_fragment || FORWARD_ONLY.iter().any(has) || (detailed && !contents.details) {
+            return None;
+        }
+        let mut geometry = Variant::new(Shading::Phong, Default::default());
+        for feature in DETAILED.into_iter().chain([Feature::Lit, Feature::Lights]) {
+            geometry.set(feature, has(&feature));
+        }
+        geometry.set(Feature::GBuffer, true);
+        geometry.set(Feature::GBufferDetails, contents.details);
+        let tinted = has(&Feature::BaseColorTexture) || has(&Feature::VertexColor);
+        let read = [Feature::Uv0, Feature::Uv1, Feature::BaseColorTexture];
+        let mut lighting = forward.without(&read);
+        lighting.set(Feature::VertexColor, tinted);
+        lighting.set(Feature::Deferred, true);
+        Some(Self { geometry, lighting })
+    }
+}
+
+/// The layout of group 1 of what lights from it: its two textures, or the first one twice.
+pub(crate) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    let entry = |binding| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty: wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Uint,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+        count: None,
+    };
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("g-buffer"),
+        entries: &[entry(0), entry(1)],
+    })
+}
+
+/// Group 1 of what lights from it.
+pub(crate) fn group(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    surfaces: &wgpu::TextureView,
+    details: Option<&wgpu::TextureView>,
+) -> wgpu::BindGroup {
+    let entry =
+        |binding, view| wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) };
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("g-buffer"),
+        layout,
+        entries: &[entry(0, surfaces), entry(1, details.unwrap_or(surfaces))],
+    })
+}

@@ -1,0 +1,350 @@
+//! Frames that are shaded deferred against the same frames shaded forward: the same to rounding, whatever is in them, and in whatever order it is drawn.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, UVec3, Vec2, Vec3, Vec4};
+use lumbre_mesh::{TriangleMesh, shapes};
+use lumbre_optics::{AlphaMode, BakeMode, Fog, FogMode, Light, Material, Shading, SpotCone, Surface};
+use lumbre_render::effects::BuiltIn;
+use lumbre_render::{
+    FrameOptions, FrameReport, LightLists, Measure, Offscreen, OffscreenFormat, Renderer, RenderingPath,
+    Viewport,
+};
+use lumbre_scene::{
+    AmbientCube, Camera, DynamicObject, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
+    MaterialTextures, Mesh, Projection, SceneSettings, Transform,
+};
+use lumbre_tests::panes::{image, sharp};
+
+use crate::adapter::{Canvas, draw, gpu, linear};
+
+/// The largest difference of a pixel that is let pass, relative to its brightest channel and a hundredth: a point is found from its pixel and its depth, and a normal is stored
+/// on the octahedron, instead of being interpolated, which rounds too. A step of eight bits is 4e-3.
+const ROUNDING: f64 = 6e-5;
+/// Where textures or vertex colours modulate light: they are stored to 2^-13 of what they are.
+const TINTED: f64 = 1.22e-4 + ROUNDING;
+
+const SIZE: (u32, u32) = (131, 83);
+
+fn by(rendering_path: RenderingPath) -> FrameOptions {
+    FrameOptions { rendering_path, shading: Some(Shading::Phong), ..linear() }
+}
+
+fn largest_difference(expected: &[DVec3], got: &[DVec3]) -> f64 {
+    assert!(expected.iter().any(|pixel| pixel.max_element() > 0.01), "the frame is black");
+    let of = |(a, b): (&DVec3, &DVec3)| (*a - *b).abs().max_element() / (a.abs().max_element() + 0.01);
+    expected.iter().zip(got).map(of).fold(0.0, f64::max)
+}
+
+/// The difference of both paths, and what the deferred frame reports.
+fn difference(world: &mut World, options: &FrameOptions) -> (f64, FrameReport) {
+    let with = |rendering_path| FrameOptions { rendering_path, ..options.clone() };
+    let (expected, forward) = draw(world, SIZE.0, SIZE.1, &with(RenderingPath::Forward));
+    let (got, deferred) = draw(world, SIZE.0, SIZE.1, &with(RenderingPath::Deferred));
+    assert!(!forward.plan.status("g-buffer").unwrap().runs());
+    assert!(deferred.plan.status("g-buffer").unwrap().runs());
+    (largest_difference(&expected, &got), deferred)
+}
+
+/// A shiny surface of a colour.
+fn shiny(red: f32, green: f32, blue: f32) -> Material {
+    let front = Surface {
+        ambient: Vec3::splat(0.2),
+        diffuse: Vec3::new(red, green, blue),
+        specular: Vec3::splat(0.4),
+        emission: Vec3::new(0.0, 0.02, 0.01),
+        shininess: 60.0,
+    };
+    Material { front, ..Material::default() }
+}
+
+fn ball() -> TriangleMesh {
+    shapes::uv_sphere(1.0, 24, 12)
+}
+
+fn perspective() -> Projection {
+    Projection::Perspective { vertical_fov: 0.9, aspect: None, near: 0.1, far: None }
+}
+
+/// A floor, nine balls and lamps above them, seen from above.
+fn room(projection: Projection) -> World {
+    let mut world = World::new();
+    world.spawn((Mesh::from(shapes::plane(30.0, 30.0, 2, 2)), shiny(0.5, 0.6, 0.7), Transform::IDENTITY));
+    let mesh = Arc::new(ball());
+    for number in 0..9 {
+        let (x, z) = (f64::from(number % 3) * 3.0 - 3.0, f64::from(number / 3) * 3.0 - 3.0);
+        let material = shiny(0.2 + 0.08 * number as f32, 0.5, 0.9 - 0.08 * number as f32);
+        world.spawn((Mesh(mesh.clone()), material, Transform::from_xyz(x, 0.8, z)));
+    }
+    for number in 0..24 {
+        let turn = f64::from(number) * 2.4;
+        let place = DVec3::new(turn.cos(), 0.0, turn.sin()) * (0.4 * f64::from(number).sqrt() * 3.0);
+        let color = Vec3::new(0.4, 0.2 + 0.02 * number as f32, 0.8 - 0.02 * number as f32);
+        let lamp = Light::point(color).with_range(4.0);
+        world.spawn((lamp, Transform::from_translation(place + DVec3::Y * 2.2)));
+    }
+    let sun = Light::directional(Vec3::splat(0.1));
+    world.spawn((sun, Transform::from_xyz(3.0, 9.0, 1.0).looking_at(DVec3::ZERO, DVec3::Y)));
+    let eye = Transform::from_xyz(1.0, 6.0, 11.0).looking_at(DVec3::new(0.0, 0.5, 0.0), DVec3::Y);
+    world.spawn((Camera { projection, exposure: 1.0 }, eye));
+    world
+}
+
+fn lightmap(color: Vec3) -> Lightmap {
+    let texels = (0..16).map(|number| color * (0.5 + 0.1 * number as f32)).collect();
+    let encoding = LightmapEncoding::default();
+    let image = LightmapImage { name: "map".to_owned(), width: 4, height: 4, texels, encoding };
+    Lightmap { image: Arc::new(image) }
+}
+
+fn lightmapped(mut mesh: TriangleMesh) -> TriangleMesh {
+    let turned = |at: &Vec3| Vec2::new(0.5 + 0.2 * at.x, 0.5 - 0.2 * at.z).clamp(Vec2::ZERO, Vec2::ONE);
+    mesh.uv1 = mesh.positions.iter().map(turned).collect();
+    mesh
+}
+
+#[test]
+fn any_camera_and_any_lists_show_the_same() {
+    let views = [
+        ("perspective", perspective()),
+        ("wide", Projection::Perspective { vertical_fov: 2.6, aspect: None, near: 1e-3, far: None }),
+        ("narrow", Projection::Perspective { vertical_fov: 0.02, aspect: None, near: 1.0, far: None }),
+        ("parallel", Projection::orthographic(14.0, 9.0, 40.0)),
+        ("mirrored", Projection::Orthographic { half_width: -7.0, half_height: 5.0, near: 0.5, far: 40.0 }),
+    ];
+    for (name, projection) in views {
+        let mut world = room(projection);
+        for light_lists in [LightLists::Clusters, LightLists::Objects, LightLists::Everything] {
+            let options = FrameOptions { light_lists, ..by(RenderingPath::Deferred) };
+            let (apart, report) = difference(&mut world, &options);
+            println!("{name}, {light_lists:?}: {apart:.1e}");
+            assert!(apart < ROUNDING, "{name}, {light_lists:?}: {apart}");
+            assert_eq!(report.statistics.objects + report.statistics.objects_outside, 10);
+        }
+    }
+}
+
+#[test]
+fn what_the_g_buffer_has_no_room_for_is_drawn_with_the_rest() {
+    // In front of deferred surfaces and behind them, with and without lightmaps, so that neither pass may paint over the other.
+    let mut world = room(perspective());
+    let mesh = |mesh: TriangleMesh| Mesh::from(mesh);
+    let at = |x: f64, y: f64, z: f64| Transform::from_xyz(x, y, z).with_scale(DVec3::splat(0.7));
+    let holes = image(2, &[[255; 4], [0; 4], [0; 4], [255; 4]]);
+    let masked = Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..shiny(0.9, 0.3, 0.2) };
+    let textures = MaterialTextures { base_color: Some(sharp(&holes)), ..MaterialTextures::default() };
+    for (x, z) in [(-1.6, 4.2), (1.5, -1.5)] {
+        let fence = lightmapped(ball());
+        world.spawn((mesh(fence), masked.clone(), textures.clone(), lightmap(Vec3::ONE), at(x, 1.0, z)));
+        world.spawn((mesh(ball()), masked.clone(), textures.clone(), at(x + 1.0, 1.6, z)));
+    }
+    let glass = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..shiny(0.3, 0.9, 0.3) };
+    world.spawn((mesh(ball()), glass, at(0.0, 1.5, 3.0)));
+    let unlit = Material { unlit: true, ..shiny(0.9, 0.9, 0.1) };
+    world.spawn((mesh(ball()), unlit, at(3.0, 0.5, 4.0)));
+    world.spawn((mesh(ball()), shiny(0.8, 0.2, 0.8), Shading::Gouraud, at(-3.0, 0.6, 4.5)));
+    world.spawn((mesh(lightmapped(ball())), shiny(0.5, 0.5, 0.5), lightmap(Vec3::X), at(0.4, 0.8, 5.0)));
+    let options = FrameOptions { shading: None, ..by(RenderingPath::Deferred) };
+    world.insert_resource(SceneSettings { shading: Shading::Phong, ..SceneSettings::default() });
+    let (apart, report) = difference(&mut world, &options);
+    println!("{apart:.1e}");
+    assert!(apart < ROUNDING, "{apart}");
+    for pass in ["lightmap", "forward", "transparent"] {
+        assert!(report.plan.status(pass).unwrap().runs(), "{pass}");
+    }
+}
+
+#[test]
+fn baked_light_shadows_fog_and_backs_are_the_same() {
+    let mut world = room(perspective());
+    let open = {
+        // A ball without its upper half, which shows its inside.
+        let mut mesh = ball();
+        mesh.indices.truncate(mesh.indices.len() / 2);
+        mesh
+    };
+    let back = Surface { diffuse: Vec3::new(0.1, 0.8, 0.2), ..shiny(0.0, 0.0, 0.0).front };
+    let two_sided = Material { double_sided: true, back: Some(back), ..shiny(0.8, 0.2, 0.1) };
+    let flipped = Transform::from_xyz(-1.5, 1.0, 4.0).with_scale(DVec3::new(-0.8, 0.8, 0.8));
+    world.spawn((Mesh::from(open.clone()), two_sided.clone(), flipped));
+    world.spawn((
+        Mesh::from(lightmapped(open)),
+        two_sided,
+        lightmap(Vec3::Y),
+        Transform::from_xyz(1.6, 1.2, 4.0),
+    ));
+    for number in 0..3 {
+        let color = [Vec3::X, Vec3::Y, Vec3::Z][number];
+        let place = Transform::from_xyz(number as f64 * 2.0 - 2.0, 0.5, 5.5).with_scale(DVec3::splat(0.5));
+        world.spawn((Mesh::from(lightmapped(ball())), shiny(0.6, 0.6, 0.6), lightmap(color), place));
+    }
+    world.spawn((
+        Mesh::from(ball()),
+        shiny(0.7, 0.7, 0.7),
+        DynamicObject,
+        Transform::from_xyz(3.5, 0.8, 3.0),
+    ));
+    let cubes = (0..8).map(|number| AmbientCube([Vec3::splat(0.05 * number as f32); 6])).collect();
+    let volume = IrradianceVolume { resolution: UVec3::splat(2), cubes, inside: Vec::new() };
+    world.spawn((volume, Transform::from_scale(20.0)));
+    let spot = Light::spot(Vec3::splat(30.0), SpotCone::Smooth { inner: 0.2, outer: 0.7 });
+    let spot = Light { shadow: true, ..spot.with_range(30.0) };
+    world.spawn((spot, Transform::from_xyz(4.0, 9.0, 4.0).looking_at(DVec3::ZERO, DVec3::Y)));
+    let baked = Light { bake: BakeMode::Static, ..Light::point(Vec3::splat(2.0)).with_range(9.0) };
+    world.spawn((baked, Transform::from_xyz(-3.0, 3.0, 5.0)));
+    let fog = Fog { color: Vec3::new(0.3, 0.3, 0.4), mode: FogMode::Exponential { density: 0.05 } };
+    world.insert_resource(SceneSettings { fog: Some(fog), two_sided: true, ..SceneSettings::default() });
+    let (apart, report) = difference(&mut world, &by(RenderingPath::Deferred));
+    println!("{apart:.1e}");
+    assert!(apart < ROUNDING, "{apart}");
+    assert!(report.plan.status("shadow maps").unwrap().runs());
+    // Nothing of this frame had to be drawn forward.
+    assert_eq!(report.statistics.lit_passes, Default::default());
+    let measured = FrameOptions { measure: Measure::Time, ..by(RenderingPath::Deferred) };
+    let (_, deferred) = draw(&mut world, SIZE.0, SIZE.1, &measured);
+    let (_, forward) = draw(
+        &mut world,
+        SIZE.0,
+        SIZE.1,
+        &FrameOptions { rendering_path: RenderingPath::Forward, ..measured },
+    );
+    let [deferred, forward] = [deferred, forward].map(|report| report.statistics.lit_passes);
+    for (deferred, forward) in [(deferred.lightmap, forward.lightmap), (deferred.forward, forward.forward)] {
+        assert!(forward.objects > 0);
+        assert_eq!((deferred.objects, deferred.lights), (forward.objects, forward.lights));
+        assert_eq!(deferred.lights_per_object, forward.lights_per_object);
+    }
+}
+
+#[test]
+fn textures_and_vertex_colors_modulate_the_same_light() {
+    let mut world = room(perspective());
+    let board = image(2, &[[250, 40, 40, 255], [30, 200, 90, 255], [10, 10, 240, 255], [128; 4]]);
+    let textures = |tex_coord| MaterialTextures {
+        base_color: Some(lumbre_scene::TextureReference { tex_coord, ..sharp(&board) }),
+        ..MaterialTextures::default()
+    };
+    let at = |x: f64| Transform::from_xyz(x, 1.0, 4.5).with_scale(DVec3::splat(0.8));
+    let mut colored = ball();
+    colored.colors = colored.positions.iter().map(|at| (*at * 0.5 + 0.5).extend(1.0)).collect();
+    world.spawn((Mesh::from(ball()), shiny(1.0, 1.0, 1.0), textures(0), at(-3.0)));
+    world.spawn((Mesh::from(lightmapped(ball())), shiny(1.0, 1.0, 1.0), textures(1), at(-1.2)));
+    world.spawn((Mesh::from(colored.clone()), shiny(1.0, 1.0, 1.0), at(0.6)));
+    // Brighter than white.
+    colored.colors.iter_mut().for_each(|color| *color *= Vec4::new(3.0, 2.0, 4.0, 1.0));
+    let both = (Mesh::from(lightmapped(colored)), shiny(1.0, 1.0, 1.0), textures(0), lightmap(Vec3::ONE));
+    world.spawn((both, at(2.4)));
+    let (apart, _) = difference(&mut world, &by(RenderingPath::Deferred));
+    println!("{apart:.1e}");
+    assert!(apart < TINTED, "{apart}");
+}
+
+#[test]
+fn more_lightmaps_than_classes_are_all_shown() {
+    let mut world = room(perspective());
+    let mesh = Arc::new(lightmapped(ball()));
+    for number in 0..300 {
+        let (x, z) = (f64::from(number % 20) * 0.6 - 5.7, f64::from(number / 20) * 0.6 - 4.0);
+        let place = Transform::from_xyz(x, 1.9, z).with_scale(DVec3::splat(0.25));
+        let color = Vec3::new(0.2, 0.003 * number as f32, 0.5);
+        world.spawn((Mesh(mesh.clone()), shiny(0.5, 0.5, 0.5), lightmap(color), place));
+    }
+    let (apart, report) = difference(&mut world, &by(RenderingPath::Deferred));
+    println!("{apart:.1e}, {} draws", report.statistics.draws);
+    assert!(apart < ROUNDING, "{apart}");
+}
+
+#[test]
+fn a_light_that_is_left_out_is_missed() {
+    // Negative control: what deferred shading leaves out shows.
+    let mut world = room(perspective());
+    let (expected, _) = draw(&mut world, SIZE.0, SIZE.1, &by(RenderingPath::Forward));
+    let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
+    let lamp = lamps[2];
+    world.get_mut::<Light>(lamp).unwrap().enabled = false;
+    let (got, _) = draw(&mut world, SIZE.0, SIZE.1, &by(RenderingPath::Deferred));
+    assert!(largest_difference(&expected, &got) > 100.0 * ROUNDING);
+}
+
+#[test]
+fn automatic_is_deferred_where_software_draws_many_lights() {
+    let mut world = room(perspective());
+    let far = Transform::from_xyz(0.0, 90.0, 0.0);
+    let lamps: Vec<Entity> =
+        (0..60).map(|_| world.spawn((Light::point(Vec3::ONE).with_range(4.0), far)).id()).collect();
+    let runs = |world: &mut World, options: &FrameOptions| {
+        let (_, report) = draw(world, 40, 30, options);
+        report.plan.status("g-buffer").unwrap().runs()
+    };
+    let auto = by(RenderingPath::Auto);
+    assert_eq!(runs(&mut world, &auto), gpu().is_software());
+    assert!(!runs(&mut world, &FrameOptions { light_lists: LightLists::Objects, ..auto.clone() }));
+    assert!(!runs(&mut world, &FrameOptions { multisample: Some(true), ..auto.clone() }));
+    // Triangles that are large in the frame fill what is shaded for them.
+    assert!(!draw(&mut world, 640, 480, &auto).1.plan.status("g-buffer").unwrap().runs());
+    // Whatever is asked: of several samples in a pixel the G-buffer would hold one.
+    let several = FrameOptions { multisample: Some(true), ..by(RenderingPath::Deferred) };
+    assert!(!runs(&mut world, &several));
+    // The plan without a frame says the same as the frame's.
+    let explained = Renderer::new(gpu()).explain(&mut world, &auto, 40, 30).unwrap();
+    let pass = explained.frame.passes.iter().find(|pass| pass.name == "g-buffer").unwrap();
+    assert_eq!(pass.group.is_some(), gpu().is_software());
+    let path = |explained: lumbre_render::SceneExplanation| explained.rendering_path;
+    assert_eq!(path(explained).starts_with("deferred"), gpu().is_software());
+    let without_a_device = lumbre_render::explain(&mut world, &auto, 40, 30).unwrap();
+    assert!(path(without_a_device).contains("deferred where a processor draws"));
+    // With fewer lights it is not worth a G-buffer.
+    lamps.into_iter().for_each(|lamp| assert!(world.despawn(lamp)));
+    assert!(!runs(&mut world, &auto));
+}
+
+#[test]
+fn a_part_of_a_target_and_what_mirrors_show_are_the_same() {
+    let mut world = room(perspective());
+    let mirror = Material { mirror: Vec3::splat(0.8), ..shiny(0.1, 0.1, 0.1) };
+    let wall = Transform::from_xyz(0.0, 2.0, -4.5).looking_at(DVec3::new(0.0, -9.0, -4.5), DVec3::Z);
+    world.spawn((Mesh::from(shapes::plane(9.0, 4.0, 1, 1)), mirror, wall));
+    let mut drawn = |rendering_path, viewport: Option<Viewport>| {
+        let frame = Offscreen::new(gpu(), 96, 64, OffscreenFormat::Rgba8).unwrap();
+        let target = match viewport {
+            Some(viewport) => frame.target().with_viewport(viewport),
+            None => frame.target(),
+        };
+        let options =
+            FrameOptions { rendering_path, shading: Some(Shading::Phong), ..FrameOptions::default() };
+        let mut renderer = Renderer::new(gpu());
+        let report = renderer.render(&mut world, &target, &options).unwrap();
+        (frame.read_rgba8(gpu()).unwrap(), report)
+    };
+    for viewport in [None, Some(Viewport::new([17, 9], [60, 41]))] {
+        let (expected, _) = drawn(RenderingPath::Forward, viewport);
+        let (got, report) = drawn(RenderingPath::Deferred, viewport);
+        assert!(report.plan.status("g-buffer").unwrap().runs());
+        assert_eq!(report.statistics.mirror_views, 1);
+        let apart = expected.iter().zip(&got).map(|(a, b)| a.abs_diff(*b)).max();
+        println!("{viewport:?}: {apart:?} of 255");
+        assert!(apart <= Some(1), "{viewport:?}: {apart:?}");
+    }
+    // A renderer that was built without the G-buffer lights every surface where it is drawn.
+    let frame = Offscreen::new(gpu(), 48, 32, OffscreenFormat::Rgba8).unwrap();
+    let mut without = Renderer::builder().without(BuiltIn::GBuffer).build(gpu());
+    let asked = FrameOptions { rendering_path: RenderingPath::Deferred, ..FrameOptions::default() };
+    let report = without.render(&mut world, &frame.target(), &asked).unwrap();
+    assert!(report.plan.status("g-buffer").is_none());
+}
+
+#[test]
+fn frames_that_change_their_path_and_their_light_stay_right() {
+    let mut world = room(perspective());
+    let mut canvas = Canvas::new(SIZE.0, SIZE.1);
+    let lamps: Vec<Entity> = world.query_filtered::<Entity, With<Light>>().iter(&world).collect();
+    for (number, lamp) in lamps.into_iter().enumerate().step_by(3) {
+        world.get_mut::<Light>(lamp).unwrap().enabled = false;
+        let [forward, deferred] = [RenderingPath::Forward, RenderingPath::Deferred].map(by);
+        let order = if number % 2 == 0 { [&forward, &deferred] } else { [&deferred, &forward] };
+        let [a, b] = order.map(|options| canvas.draw(&mut world, options).0);
+        let apart = largest_difference(&a, &b).max(largest_difference(&b, &a));
+        assert!(apart < ROUNDING, "after {number} lamps: {apart}");
+    }
+}
