@@ -10,7 +10,7 @@ use lumbre_optics::{
     AlphaMode, Attenuation, BakeMode, Distribution, Fog, FogMode, Light, Material, ReflectionModel, Shading,
     SpotCone, Surface,
 };
-use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer};
+use lumbre_render::{Display, FrameOptions, Offscreen, OffscreenFormat, Renderer, RenderingPath};
 use lumbre_scene::{
     AmbientCube, Camera, Census, ChildOf, DynamicObject, EmissiveLight, Hidden, IrradianceVolume, Lightmap,
     LightmapEncoding, LightmapImage, MaterialTextures, Mesh, NormalTexture, OcclusionTexture, SceneSettings,
@@ -179,6 +179,7 @@ fn what_is_explained_is_what_is_drawn() {
             full_precision: random.once_in(8),
             display: random.one_of(Display::ALL),
             shading: random.once_in(6).then_some(Shading::Gouraud),
+            rendering_path: RenderingPath::ALL[number % 3],
             ..FrameOptions::default()
         };
         let report = renderer.render(&mut world, &target.target(), &options).unwrap();

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec3, Vec2, Vec3, Vec4};
+use lumbre_graph::LoadOp;
 use lumbre_mesh::{TriangleMesh, shapes};
 use lumbre_optics::{AlphaMode, BakeMode, Fog, FogMode, Light, Material, Shading, SpotCone, Surface};
-use lumbre_render::effects::BuiltIn;
+use lumbre_render::effects::{Board, BuiltIn, Effect, FrameGraph, Stage};
 use lumbre_render::{
     FrameOptions, FrameReport, LightLists, Measure, Offscreen, OffscreenFormat, Renderer, RenderingPath,
-    Viewport,
+    SceneFacts, Viewport,
 };
 use lumbre_scene::{
     AmbientCube, Camera, DynamicObject, IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage,
@@ -240,6 +241,62 @@ fn textures_and_vertex_colors_modulate_the_same_light() {
     assert!(apart < TINTED, "{apart}");
 }
 
+/// What hides everything behind the middle of what a parallel camera sees.
+struct Curtain;
+
+impl Effect for Curtain {
+    fn name(&self) -> &'static str {
+        "curtain"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Background
+    }
+
+    fn extract(&mut self, _: &mut World, _: &SceneFacts, _: &FrameOptions) -> bool {
+        true
+    }
+
+    fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
+        let pass = board.lit_pass(graph, "curtain", LoadOp::Load);
+        pass.depth(&mut board.depth, LoadOp::Clear(0.5)).run(|_| Ok(()));
+    }
+}
+
+#[test]
+fn what_a_program_draws_behind_everything_hides_the_same() {
+    let mut world = room(Projection::orthographic(14.0, 9.0, 23.0));
+    let mut drawn = |rendering_path, hidden: bool| {
+        let builder = Renderer::builder();
+        let mut renderer = if hidden { builder.with(Curtain).build(gpu()) } else { builder.build(gpu()) };
+        let frame = Offscreen::new(gpu(), SIZE.0, SIZE.1, OffscreenFormat::LinearFloat).unwrap();
+        renderer.render(&mut world, &frame.target(), &by(rendering_path)).unwrap();
+        let pixels = frame.read_linear(gpu()).unwrap();
+        pixels.iter().map(|pixel| pixel.truncate().as_dvec3()).collect::<Vec<_>>()
+    };
+    let forward = drawn(RenderingPath::Forward, true);
+    let apart = largest_difference(&forward, &drawn(RenderingPath::Deferred, true));
+    assert!(apart < ROUNDING, "{apart}");
+    assert!(largest_difference(&forward, &drawn(RenderingPath::Forward, false)) > 0.1, "nothing is hidden");
+}
+
+#[test]
+fn of_coplanar_surfaces_the_same_is_seen() {
+    let mut world = room(perspective());
+    // Nearer to the eye than the wall's farthest corner, and in its plane; and the same mesh twice, the older one without a lightmap.
+    let wall =
+        |y: f64, z: f64| Transform::from_xyz(0.0, y, z).looking_at(DVec3::new(0.0, -90.0, z), DVec3::Z);
+    let (large, small) = (shapes::plane(8.0, 4.0, 1, 1), shapes::plane(1.0, 1.0, 1, 1));
+    world.spawn((Mesh::from(small), shiny(0.9, 0.1, 0.1), wall(3.0, 2.0)));
+    world.spawn((Mesh::from(lightmapped(large)), shiny(0.1, 0.9, 0.1), lightmap(Vec3::ONE), wall(3.0, 2.0)));
+    let at = Transform::from_xyz(2.0, 1.0, 6.0).with_scale(DVec3::splat(0.6));
+    world.spawn((Mesh::from(ball()), shiny(0.9, 0.1, 0.1), at));
+    world.spawn((Mesh::from(lightmapped(ball())), shiny(0.1, 0.9, 0.1), lightmap(Vec3::ONE), at));
+    let (apart, _) = difference(&mut world, &by(RenderingPath::Deferred));
+    println!("{apart:.1e}");
+    assert!(apart < ROUNDING, "{apart}");
+}
+
 #[test]
 fn more_lightmaps_than_classes_are_all_shown() {
     let mut world = room(perspective());
@@ -281,6 +338,8 @@ fn automatic_is_deferred_where_software_draws_many_lights() {
     assert_eq!(runs(&mut world, &auto), gpu().is_software());
     assert!(!runs(&mut world, &FrameOptions { light_lists: LightLists::Objects, ..auto.clone() }));
     assert!(!runs(&mut world, &FrameOptions { multisample: Some(true), ..auto.clone() }));
+    assert!(!runs(&mut world, &FrameOptions { shading: Some(Shading::Gouraud), ..auto.clone() }));
+    assert!(!runs(&mut world, &FrameOptions { specular_antialiasing: Some(true), ..auto.clone() }));
     // Triangles that are large in the frame fill what is shaded for them.
     assert!(!draw(&mut world, 640, 480, &auto).1.plan.status("g-buffer").unwrap().runs());
     // Whatever is asked: of several samples in a pixel the G-buffer would hold one.

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::Context;
 use bevy_ecs::world::World;
-use lumbre::render::{Display, FrameOptions, Gpu, effect_costs, explain, removable_effects};
+use lumbre::render::{Display, FrameOptions, Gpu, Renderer, effect_costs, explain, removable_effects};
 use lumbre::scene::{add_default_light, is_without_light};
 
 use crate::arguments::{Explain, ExplainFormat, Frame};
@@ -22,6 +22,8 @@ pub fn run(asked: &Explain) -> anyhow::Result<()> {
     let mut explanation = explain(&mut world, &options, width, height)?;
     if let Some(time) = asked.measure {
         let gpu = Gpu::headless()?;
+        // The frame of the device that it is measured on.
+        explanation = Renderer::new(&gpu).explain(&mut world, &options, width, height)?;
         let effects = removable_effects(&explanation.census, &options);
         let mut again = || again(asked);
         let cost = effect_costs(&gpu, &mut again, &effects, [width, height], time)

@@ -80,8 +80,7 @@ pub(crate) struct VisibleObjects<'a> {
 }
 
 struct Visible<'a> {
-    /// None draws into the G-buffer.
-    pass: Option<LitPass>,
+    pass: LitPass,
     slot: usize,
     /// Smaller is drawn earlier.
     order: f64,
@@ -91,6 +90,12 @@ struct Visible<'a> {
     baked_light: Option<&'a Arc<wgpu::BindGroup>>,
     /// 0 is none.
     class_number: u32,
+}
+
+impl Visible<'_> {
+    fn is_deferred(&self) -> bool {
+        self.class_number > 0
+    }
 }
 
 /// What draws a surface, and what lights it: the same, unless that is deferred.
@@ -184,7 +189,6 @@ impl<'a> VisibleObjects<'a> {
                 seen.clustered_depths = widened(seen.clustered_depths);
             }
             let order = order(object, view.eye, pass);
-            let pass = (class_number == 0).then_some(pass);
             seen.visible.push(Visible { pass, slot, order, object, pipelines, baked_light, class_number });
         }
         seen
@@ -226,9 +230,7 @@ impl ChosenPipelines {
         g_buffer: Option<GBufferContents>,
         choose: &dyn Fn(PipelineKey) -> Option<PipelineKey>,
     ) -> Option<Self> {
-        let opaque = matches!(pass, LitPass::Lightmap | LitPass::Forward);
-        let contents = g_buffer.filter(|_| opaque && forward.samples == 1);
-        match contents.and_then(|contents| DeferredVariants::of(&forward.variant, contents)) {
+        match DeferredVariants::of(&forward.variant, pass, g_buffer) {
             Some(DeferredVariants { geometry, lighting }) => {
                 let drawn = PipelineKey { variant: geometry, format: g_buffer::FORMAT, ..forward };
                 // A triangle over the frame.
@@ -258,8 +260,8 @@ impl Draws {
             Self { outside, first_instance, depths, clustered_depths, deferred, ..Self::default() };
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
         // Sorted are numbers alone: what they stand for is large.
-        let key = |(index, seen): (usize, &Visible)| (seen.pass, seen.order, index);
-        let mut order: Vec<(Option<LitPass>, f64, usize)> = visible.iter().enumerate().map(key).collect();
+        let key = |(index, seen): (usize, &Visible)| ((!seen.is_deferred(), seen.pass), seen.order, index);
+        let mut order: Vec<((bool, LitPass), f64, usize)> = visible.iter().enumerate().map(key).collect();
         order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
         draws.instances.reserve(visible.len());
         for (_, _, index) in order {
@@ -280,15 +282,15 @@ impl Draws {
         );
         self.instances.push(list.of_object(object, seen.class_number));
         let batches = match seen.pass {
-            None => &mut self.geometry,
-            Some(LitPass::Lightmap) => &mut self.lightmapped,
-            Some(LitPass::Forward) => &mut self.opaque,
-            Some(LitPass::Refraction) => &mut self.refractive,
-            Some(LitPass::Transparent) => &mut self.transparent,
+            _ if seen.is_deferred() => &mut self.geometry,
+            LitPass::Lightmap => &mut self.lightmapped,
+            LitPass::Forward => &mut self.opaque,
+            LitPass::Refraction => &mut self.refractive,
+            LitPass::Transparent => &mut self.transparent,
         };
         let pipeline = seen.pipelines.drawn;
         // What lights the G-buffer is bound it.
-        let baked_light = seen.baked_light.filter(|_| seen.pass.is_some());
+        let baked_light = seen.baked_light.filter(|_| !seen.is_deferred());
         // A pipeline that stands in for another may have no textures.
         let texture_set = seen.object.texture_set.as_ref().filter(|_| pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {

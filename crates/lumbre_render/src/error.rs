@@ -116,8 +116,8 @@ pub enum RenderError {
         /// Values there should be.
         expected: u64,
     },
-    /// More than a storage buffer holds.
-    #[error("{what}: {bytes} bytes are beyond this device's storage buffers of {limit}; have fewer of them")]
+    /// More than a storage buffer holds, or a texture where tables are textures.
+    #[error("{what}: {bytes} bytes are beyond the {limit} that this device has room for; have fewer of them")]
     BufferTooLarge {
         /// What was to be stored.
         what: &'static str,

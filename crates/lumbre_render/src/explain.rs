@@ -12,12 +12,13 @@ use lumbre_scene::{
 
 use crate::effect_costs::{BY_NEED, FrameCost};
 use crate::effects::{self, Effect};
-use crate::extract::LightSet;
+use crate::extract::{LightSet, LitPass};
 use crate::facts::SceneFacts;
 use crate::features::{self, FrameFeatures};
 use crate::frame_bindings::FrameBindings;
 use crate::frame_graph::{Last, declare};
 use crate::frame_plan::{Ending, FramePlan};
+use crate::g_buffer::DeferredVariants;
 use crate::shader::Feature;
 use crate::shading_by_need::{Conditions, WorldNeeds, is_shaded_by_need};
 use crate::shading_need::ShadingNeed;
@@ -117,7 +118,10 @@ fn explain_with(
             Shading::Auto { max_error } => needs.choose(index, max_error),
             asked => asked,
         };
-        let variant = features::variant(object, shading, &settings, &common);
+        let forward = features::variant(object, shading, &settings, &common);
+        let pass = LitPass::of(object, common.lightmaps, common.refraction);
+        let deferred = DeferredVariants::of(&forward, pass, common.g_buffer);
+        let variant = deferred.map_or(forward, |deferred| deferred.lighting);
         clustered += usize::from(variant.has(Feature::Clusters));
         bindings = bindings.and(FrameBindings::of(&variant));
         *variants.entry(variant.to_string()).or_insert(0) += 1;
@@ -126,7 +130,9 @@ fn explain_with(
     let light_lists = lights.listing(options.light_lists, clustered, objects.len());
     let target = TextureDescriptor::new_2d(width, height, target_format);
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
-    let light = bindings.light_resources().map(|(name, buffer)| (name, buffer, usage));
+    // Tables in textures are no resources of the graph.
+    let light = bindings.light_resources().filter(|(_, buffer)| !(software && buffer.is_table()));
+    let light = light.map(|(name, buffer)| (name, buffer, usage));
     let frame =
         declare(effects.iter(), &plan, (target, None, &mut { light }), Last::default()).compile()?.explain();
     let hidden_cones = match options.shading {

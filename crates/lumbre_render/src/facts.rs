@@ -54,7 +54,7 @@ impl SceneFacts {
         };
         let lightmapped = objects.lightmapped - objects.lightmapped_blended - lightmapped_refractive;
         let samples = if options.multisample.or(settings.frame.multisample) == Some(true) { 4 } else { 1 };
-        let path = ChosenPath::new(options, lights, objects, (samples, software, size));
+        let path = ChosenPath::new((options, settings), lights, objects, (samples, software, size));
         let details = lightmapped > 0 || objects.textured > 0 || objects.vertex_colors > 0;
         let by_lightmap = if options.lightmaps { lightmapped } else { 0 };
         Self {

@@ -4,6 +4,7 @@
 use lumbre_optics::Shading;
 
 use crate::Gpu;
+use crate::extract::LitPass;
 use crate::shader::{Feature, Variant};
 
 /// What the G-buffer of a frame holds.
@@ -46,9 +47,10 @@ const FORWARD_ONLY: [Feature; 7] = [
 ];
 
 impl DeferredVariants {
-    /// Those of a surface that the forward pass draws with `forward`; none if the G-buffer has no room for what that one reads, or if no light is evaluated in
-    /// its fragments.
-    pub fn of(forward: &Variant, contents: GBufferContents) -> Option<Self> {
+    /// Those of a surface that a pass would draw with `forward`, where the frame has a G-buffer; none if that has no room for what `forward` reads, or if no light is
+    /// evaluated in fragments.
+    pub fn of(forward: &Variant, pass: LitPass, contents: Option<GBufferContents>) -> Option<Self> {
+        let contents = contents.filter(|_| matches!(pass, LitPass::Lightmap | LitPass::Forward))?;
         let has = |feature: &Feature| forward.has(*feature);
         let lit_per_fragment =
             has(&Feature::Lit) && has(&Feature::Lights) && forward.shading == Shading::Phong;
@@ -67,6 +69,8 @@ impl DeferredVariants {
         let mut lighting = forward.without(&read);
         lighting.set(Feature::VertexColor, tinted);
         lighting.set(Feature::Deferred, true);
+        // So that nothing stands in for it that reads what this frame has not.
+        lighting.set(Feature::GBufferDetails, contents.details);
         Some(Self { geometry, lighting })
     }
 }

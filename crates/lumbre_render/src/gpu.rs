@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use bevy_ecs::resource::Resource;
 
 use crate::RenderError;
+use crate::table_texture;
 use crate::worker_thread::WorkerThread;
 
 /// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
@@ -38,7 +39,8 @@ const LEAST_LIMITS: [LeastLimit; 4] = [
     (
         "max_sampled_textures_per_shader_stage",
         |limits| u64::from(limits.max_sampled_textures_per_shader_stage),
-        7,
+        // Five of a material, one of baked light, the atlas of shadow maps; and eight tables where they are textures.
+        15,
     ),
     ("max_uniform_buffer_binding_size", |limits| limits.max_uniform_buffer_binding_size, 1 << 16),
 ];
@@ -172,6 +174,15 @@ impl Gpu {
     /// Whether the shaders of lit surfaces look things up in textures instead of storage buffers.
     pub(crate) fn reads_tables_from_textures(&self) -> bool {
         self.is_software()
+    }
+
+    /// Bytes that a table of words holds at most.
+    pub(crate) fn most_bytes_of_words(&self) -> u64 {
+        let limits = self.device.limits();
+        match self.reads_tables_from_textures() {
+            true => table_texture::most_bytes_of_words(&limits),
+            false => limits.max_storage_buffer_binding_size,
+        }
     }
 
     /// Where pipelines are made that no frame waits for.

@@ -159,7 +159,7 @@ impl CoordinatesData {
     }
 }
 
-/// `Material`.
+/// The 18 texels of a material; the constants behind `coordinates_of` in shaders/frame.wesl say which is which.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MaterialData {

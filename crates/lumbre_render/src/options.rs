@@ -76,7 +76,7 @@ pub enum LightLists {
     Everything,
 }
 
-/// Whether surfaces are lit where they are drawn, or after all of them are drawn. What is drawn is the same to rounding.
+/// Whether surfaces are lit where they are drawn, or after all of them are drawn. What is drawn is the same to rounding, but for coplanar surfaces of both kinds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum RenderingPath {
     /// Deferred on a software rasterizer where many lights meet small triangles, else forward: 64 lights that fragments find by clusters, and a triangle for every 16 pixels of
@@ -87,7 +87,8 @@ pub enum RenderingPath {
     /// Each surface is lit where it is drawn.
     Forward,
     /// Opaque surfaces under Phong shading are drawn into a G-buffer, and what is seen of them is lit once. Those are lit forward as ever that have textures for
-    /// anything but their base colour, are cut out by alpha, or have their highlights filtered, and so is every surface of a frame with several samples per pixel.
+    /// anything but their base colour, are cut out by alpha, have their highlights filtered, or are lit by no light or by more than 255 lightmaps; and so is every surface of a frame
+    /// with several samples per pixel. Of coplanar surfaces one that is lit forward is seen before one that is not.
     Deferred,
 }
 

@@ -229,10 +229,7 @@ fn make(
         blend: key.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
         write_mask: wgpu::ColorWrites::ALL,
     });
-    let targets = match key.variant.has(Feature::GBufferDetails) {
-        true => vec![target.clone(), target],
-        false => vec![target],
-    };
+    let targets = vec![target; key.variant.targets()];
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(key.variant.module()),

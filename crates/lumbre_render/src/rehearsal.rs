@@ -224,8 +224,8 @@ impl Rehearsal {
         pipeline: &Pipeline,
         groups: [Option<&wgpu::BindGroup>; 4],
     ) -> Result<(), RenderError> {
-        let colors = if key.variant.has(Feature::GBufferDetails) { 2 } else { 1 };
-        let colors: Vec<_> = (0..colors).map(|_| self.texture(key.format, key.samples)).collect();
+        let colors: Vec<_> =
+            (0..key.variant.targets()).map(|_| self.texture(key.format, key.samples)).collect();
         let attachments: Vec<_> = colors.iter().map(|color| Some(color_attachment(color))).collect();
         let depth = self.texture(DEPTH_FORMAT, key.samples);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());

@@ -443,7 +443,7 @@ impl Renderer {
         {
             return Err(RenderError::NoDisplay);
         }
-        let limit = self.gpu.device.limits().max_storage_buffer_binding_size;
+        let limit = self.gpu.most_bytes_of_words();
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
         clock.lap(|cpu| &mut cpu.draws_ms);

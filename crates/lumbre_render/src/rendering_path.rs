@@ -2,7 +2,8 @@
 
 use std::fmt::{Display, Formatter};
 
-use lumbre_scene::ObjectCensus;
+use lumbre_optics::Shading;
+use lumbre_scene::{ObjectCensus, SceneSettings};
 
 use crate::extract::LightSet;
 use crate::{FrameOptions, RenderingPath};
@@ -19,6 +20,8 @@ pub(crate) enum ChosenPath {
     Asked(RenderingPath),
     /// Several samples of a pixel, of which the G-buffer would hold one.
     SeveralSamples,
+    /// Surfaces that are lit at vertices, or whose highlights are filtered within pixels: the G-buffer would be empty.
+    NotDeferrable,
     /// A light loop that is short.
     FewLights(u32),
     /// Triangles of the scene that are large in a frame of so many pixels.
@@ -32,12 +35,15 @@ pub(crate) enum ChosenPath {
 impl ChosenPath {
     /// The path of a frame of this size.
     pub fn new(
-        options: &FrameOptions,
+        (options, settings): (&FrameOptions, &SceneSettings),
         lights: &LightSet,
         objects: &ObjectCensus,
         (samples, software, [width, height]): (u32, bool, [u32; 2]),
     ) -> Self {
         let pixels = u64::from(width) * u64::from(height);
+        let shading = options.shading.unwrap_or(settings.shading);
+        let filtered = options.specular_antialiasing.unwrap_or(settings.specular_antialiasing);
+        let lit_by_pixel = matches!(shading, Shading::Phong | Shading::Auto { .. }) && !filtered;
         let (triangles, lightmapped) = (objects.triangles, objects.lightmapped);
         let clustered = match lights.are_clustered(options.light_lists) {
             true => lights.inverse_square.all + lights.ranged.all,
@@ -47,6 +53,7 @@ impl ChosenPath {
             RenderingPath::Forward => Self::Asked(RenderingPath::Forward),
             _ if samples > 1 => Self::SeveralSamples,
             RenderingPath::Deferred => Self::Asked(RenderingPath::Deferred),
+            RenderingPath::Auto if !lit_by_pixel => Self::NotDeferrable,
             RenderingPath::Auto if clustered < ENOUGH_LIGHTS => Self::FewLights(clustered),
             RenderingPath::Auto if pixels > MOST_PIXELS * triangles as u64 => {
                 Self::LargeTriangles { triangles, pixels }
@@ -66,6 +73,9 @@ impl Display for ChosenPath {
         match self {
             Self::Asked(path) => write!(out, "{}, as was asked", path.name()),
             Self::SeveralSamples => write!(out, "forward: a G-buffer has one sample of each pixel"),
+            Self::NotDeferrable => {
+                write!(out, "forward: surfaces are lit at vertices, or highlights are filtered within pixels")
+            }
             Self::FewLights(lights) => {
                 write!(out, "forward: fragments find {lights} lights by clusters, fewer than {ENOUGH_LIGHTS}")
             }

@@ -30,6 +30,11 @@ pub(crate) fn table_binding(in_texture: bool) -> wgpu::BindingType {
     }
 }
 
+/// Bytes of words that a texture holds at most.
+pub(crate) fn most_bytes_of_words(limits: &wgpu::Limits) -> u64 {
+    (WIDTH * size_of::<u32>()) as u64 * u64::from(limits.max_texture_dimension_2d)
+}
+
 /// Bytes of a texel, as large as the entries of a table allow: 16 or 4.
 fn texel_size(entry_size: usize) -> usize {
     if entry_size.is_multiple_of(16) { 16 } else { 4 }

@@ -1,11 +1,10 @@
-//! What lies behind everything: the scene's background colour. Clears depth too, unless the G-buffer's pass has.
+//! What lies behind everything: the scene's background colour. Clears depth too.
 
 use bevy_ecs::world::World;
 use glam::Vec3;
 use lumbre_graph::LoadOp;
 use lumbre_scene::SceneSettings;
 
-use super::g_buffer::GBuffer;
 use super::{Board, Effect, FrameGraph, Stage, display_color};
 use crate::error::EffectError;
 use crate::facts::SceneFacts;
@@ -55,7 +54,6 @@ impl Effect for Background {
         let color = self.color.as_dvec3();
         let clear = wgpu::Color { r: color.x, g: color.y, b: color.z, a: 1.0 };
         let pass = board.lit_pass(graph, self.name(), LoadOp::Clear(clear));
-        let depth = if board.get::<GBuffer>().is_some() { LoadOp::Load } else { LoadOp::Clear(0.0) };
-        pass.depth(&mut board.depth, depth).run(|_| Ok(()));
+        pass.depth(&mut board.depth, LoadOp::Clear(0.0)).run(|_| Ok(()));
     }
 }

@@ -1,4 +1,4 @@
-//! The G-buffer: the nearest of the surfaces that are lit deferred, drawn before anything is lit. The passes of opaque surfaces read it ([`GBuffer`]) and light what it holds
+//! The G-buffer: the nearest of the surfaces that are lit deferred, drawn before any of them is lit. The passes of opaque surfaces read it ([`GBuffer`]) and light what it holds
 //! of theirs.
 
 use bevy_ecs::world::World;
@@ -30,7 +30,7 @@ impl Effect for GBufferPass {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Light
+        Stage::Opaque
     }
 
     fn extract(&mut self, _: &mut World, facts: &SceneFacts, _: &FrameOptions) -> bool {
@@ -57,7 +57,8 @@ impl Effect for GBufferPass {
         if let Some(details) = &mut details {
             pass = pass.color(details, nothing);
         }
-        pass.depth(&mut board.depth, LoadOp::Clear(0.0)).run(|context| {
+        // What an effect at the stage of the background has drawn nearer stays.
+        pass.depth(&mut board.depth, LoadOp::Load).run(|context| {
             context.user.draw_g_buffer(context.pass);
             Ok(())
         });

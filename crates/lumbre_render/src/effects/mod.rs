@@ -40,7 +40,7 @@ pub type FrameGraph<'a> = Graph<'a, FrameScene<'a>>;
 /// after its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
-    /// What surfaces are lit with: shadow maps, the G-buffer. Nothing is lit yet.
+    /// What surfaces are lit with: shadow maps. Nothing is drawn yet.
     Light,
     /// What lies behind everything.
     Background,
@@ -209,8 +209,8 @@ impl BuiltIn {
 pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
     let all: [Box<dyn Effect>; 9] = [
         Box::new(shadows::Shadows::default()),
-        Box::new(g_buffer::GBufferPass::default()),
         Box::new(background::Background::default()),
+        Box::new(g_buffer::GBufferPass::default()),
         Box::new(lightmap::Lightmap::default()),
         Box::new(forward::Forward::default()),
         Box::new(mirrors::Mirrors::default()),

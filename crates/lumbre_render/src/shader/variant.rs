@@ -231,6 +231,11 @@ impl Variant {
         self
     }
 
+    /// How many textures it draws into.
+    pub(crate) fn targets(&self) -> usize {
+        if self.has(Feature::GBuffer) && self.has(Feature::GBufferDetails) { 2 } else { 1 }
+    }
+
     /// The shader module that it is a variant of.
     pub(crate) fn module(&self) -> &'static str {
         match (self.has(Feature::GBuffer), self.has(Feature::Deferred)) {
