@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex};
 use bevy_ecs::resource::Resource;
 
 use crate::RenderError;
-use crate::table_texture;
 use crate::worker_thread::WorkerThread;
 
 /// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
@@ -174,15 +173,6 @@ impl Gpu {
     /// Whether the shaders of lit surfaces look things up in textures instead of storage buffers.
     pub(crate) fn reads_tables_from_textures(&self) -> bool {
         self.is_software()
-    }
-
-    /// Bytes that a table of words holds at most.
-    pub(crate) fn most_bytes_of_words(&self) -> u64 {
-        let limits = self.device.limits();
-        match self.reads_tables_from_textures() {
-            true => table_texture::most_bytes_of_words(&limits),
-            false => limits.max_storage_buffer_binding_size,
-        }
     }
 
     /// Where pipelines are made that no frame waits for.

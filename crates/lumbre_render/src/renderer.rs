@@ -40,6 +40,7 @@ use crate::shading_by_need::{Conditions, ShadingByNeed, SizedView, is_shaded_by_
 use crate::shading_need::ShadingNeeds;
 use crate::shadows::{CasterPipelines, ShadowMaps, ShadowedView};
 use crate::stage_clock::{StageClock, timed};
+use crate::table_texture::most_bytes_of_words;
 use crate::texture_sets::TextureSets;
 use crate::textures::Textures;
 use crate::view_buffers::{SharedBuffers, ViewBuffers};
@@ -443,7 +444,7 @@ impl Renderer {
         {
             return Err(RenderError::NoDisplay);
         }
-        let limit = self.gpu.most_bytes_of_words();
+        let limit = most_bytes_of_words(&self.gpu);
         let everything = options.light_lists == LightLists::Everything;
         let mut lists = ObjectLightLists::new(&lights.reaches, everything, limit);
         clock.lap(|cpu| &mut cpu.draws_ms);

@@ -30,9 +30,13 @@ pub(crate) fn table_binding(in_texture: bool) -> wgpu::BindingType {
     }
 }
 
-/// Bytes of words that a texture holds at most.
-pub(crate) fn most_bytes_of_words(limits: &wgpu::Limits) -> u64 {
-    (WIDTH * size_of::<u32>()) as u64 * u64::from(limits.max_texture_dimension_2d)
+/// Bytes that a table of words holds at most, in a texture or in a storage buffer.
+pub(crate) fn most_bytes_of_words(gpu: &Gpu) -> u64 {
+    let limits = gpu.device.limits();
+    match gpu.reads_tables_from_textures() {
+        true => (WIDTH * size_of::<u32>()) as u64 * u64::from(limits.max_texture_dimension_2d),
+        false => limits.max_storage_buffer_binding_size,
+    }
 }
 
 /// Bytes of a texel, as large as the entries of a table allow: 16 or 4.
