@@ -117,9 +117,7 @@ impl Pipelines {
                 true => Some(self.g_buffer_layout.clone()),
                 false => sets.layout(gpu, key.texture_mask),
             };
-            // Into the G-buffer go coordinates of a lightmap.
-            let lightmap = key.variant.has(Feature::Lightmap) && !key.variant.has(Feature::GBuffer);
-            let baked_light = match lightmap {
+            let baked_light = match key.variant.samples_lightmap() {
                 true => Some(sets.lightmap_layout(gpu)),
                 false => key.variant.has(Feature::IrradianceVolume).then(|| self.volume_layout.clone()),
             };

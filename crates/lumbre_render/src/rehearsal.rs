@@ -124,8 +124,7 @@ impl Rehearsal {
             None => None,
         };
         let g_buffer = key.variant.has(Feature::Deferred).then(|| self.g_buffer_group());
-        let lightmap = key.variant.has(Feature::Lightmap) && !key.variant.has(Feature::GBuffer);
-        let baked_light = match lightmap {
+        let baked_light = match key.variant.samples_lightmap() {
             true => {
                 let (name, encoding) = ("rehearsal".to_owned(), LightmapEncoding::default());
                 let texels = vec![glam::Vec3::ZERO; 16];

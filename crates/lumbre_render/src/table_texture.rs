@@ -70,16 +70,12 @@ impl TableTexture {
             return Ok(false);
         }
         let most = gpu.device.limits().max_texture_dimension_2d;
-        let height = u32::try_from(rows.next_power_of_two()).unwrap_or(u32::MAX);
-        let height = if rows <= most as usize { height.min(most) } else { height };
-        if height > most {
+        let Some(rows) = u32::try_from(rows).ok().filter(|rows| *rows <= most) else {
             let bytes_of = |rows: u64| rows * (WIDTH * size) as u64;
-            return Err(RenderError::BufferTooLarge {
-                what: label,
-                bytes: bytes_of(rows as u64),
-                limit: bytes_of(u64::from(most)),
-            });
-        }
+            let (bytes, limit) = (bytes_of(rows as u64), bytes_of(u64::from(most)));
+            return Err(RenderError::BufferTooLarge { what: label, bytes, limit });
+        };
+        let height = rows.next_power_of_two().min(most);
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d { width: WIDTH as u32, height, depth_or_array_layers: 1 },

@@ -231,6 +231,11 @@ impl Variant {
         self
     }
 
+    /// Whether a lightmap is bound: into the G-buffer go its coordinates alone.
+    pub(crate) fn samples_lightmap(&self) -> bool {
+        self.has(Feature::Lightmap) && !self.has(Feature::GBuffer)
+    }
+
     /// How many textures it draws into.
     pub(crate) fn targets(&self) -> usize {
         if self.has(Feature::GBuffer) && self.has(Feature::GBufferDetails) { 2 } else { 1 }
