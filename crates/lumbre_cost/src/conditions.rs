@@ -19,6 +19,8 @@ pub type Listener<'a> = dyn Fn(Option<f64>) -> ControlFlow<()> + Sync + 'a;
 pub struct Conditions<'a> {
     /// The device that draws.
     pub gpu: &'a Gpu,
+    /// Another device, on which shaders are compiled ahead of the frames that need them; where a GPU draws there is none.
+    pub ahead: Option<&'a Gpu>,
     /// Draws all pictures of a study: what it has compiled for one serves the next.
     pub pictures: &'a RefCell<Renderer>,
     /// Bakes that a report has already, for studies that want the same.
@@ -56,11 +58,11 @@ impl Conditions<'_> {
         }
     }
 
-    /// Rounds for about so many seconds, a sixth of them if it has to be quick; none for counts alone.
+    /// Rounds for about so many seconds, a twelfth of them if it has to be quick; none for counts alone.
     pub fn rounds(&self, seconds: f64) -> Rounds {
         match self.quick {
             _ if self.counts_only => Rounds { warm_up: 0, fewest: 0, most: 0, time: Duration::ZERO },
-            true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 6.0) },
+            true => Rounds { warm_up: 1, fewest: 3, most: 15, time: Duration::from_secs_f64(seconds / 12.0) },
             false => Rounds { warm_up: 1, fewest: 5, most: 51, time: Duration::from_secs_f64(seconds) },
         }
     }

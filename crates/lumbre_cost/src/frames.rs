@@ -1,60 +1,25 @@
 //! Frames that are drawn again and again, side by side: their times, their counts, and the picture that each makes. Not the scenes.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use bevy_ecs::world::World;
 use glam::DQuat;
 use lumbre_optics::Light;
-use lumbre_render::{
-    Display, FrameOptions, FrameTarget, Measure, Offscreen, OffscreenFormat, Renderer, Statistics,
-};
+use lumbre_render::{FrameOptions, FrameTarget, Measure, Offscreen, OffscreenFormat, Renderer, Statistics};
 
 use lumbre_scene::Transform;
 
+use crate::compile_ahead::{Begun, Drawing, compile_ahead};
+use crate::frame::{Frame, picture_options};
 use crate::picture::Picture;
-use crate::rounds::{Work, in_rounds, milliseconds_since};
+use crate::rounds::{Work, in_rounds, milliseconds_since, warm_up};
 use crate::{Conditions, CostError, Spread};
-
-/// A scene, and how a frame of it is drawn.
-pub struct Frame {
-    /// The scene, perhaps of several frames.
-    pub world: Rc<RefCell<World>>,
-    /// How it is drawn.
-    pub options: FrameOptions,
-    /// Frames of one name share a renderer, and with it what it has compiled, which takes longer than many a frame. Each is then drawn twice in a row, and the
-    /// second one timed: in the first the renderer reads another World. Without a name a frame has a renderer of its own.
-    pub renderer: Option<&'static str>,
-    /// Before each frame that is timed every lamp that casts shadows moves by [`HAIR`] and back again: no shadow map is as it was.
-    pub moving_lamps: bool,
-}
 
 /// How far lamps move, in metres, and along which axis directional lights turn, by as many radians.
 const HAIR: f64 = 1e-4;
-
-impl Frame {
-    /// A frame with a renderer of its own.
-    pub fn new(world: World, options: FrameOptions) -> Self {
-        Self::of(&Rc::new(RefCell::new(world)), options)
-    }
-
-    /// The same of a scene that other frames show, too.
-    pub fn of(world: &Rc<RefCell<World>>, options: FrameOptions) -> Self {
-        Self { world: Rc::clone(world), options, renderer: None, moving_lamps: false }
-    }
-
-    /// The same with a renderer in common with all that name it so.
-    pub fn sharing(self, renderer: &'static str) -> Self {
-        Self { renderer: Some(renderer), ..self }
-    }
-
-    /// The same with lamps that move.
-    pub fn with_moving_lamps(self) -> Self {
-        Self { moving_lamps: true, ..self }
-    }
-}
 
 /// What was measured of a frame.
 pub struct DrawnFrame {
@@ -98,52 +63,93 @@ pub fn draw_frames(
     conditions: &Conditions<'_>,
     frames: Vec<Frame>,
     seconds: f64,
-    told: [f64; 2],
+    [before, after]: [f64; 2],
 ) -> Result<Vec<DrawnFrame>, CostError> {
-    let (gpu, (width, height)) = (conditions.gpu, conditions.size);
-    let [before, after] = told;
-    let mut drawn = Vec::new();
-    let count = frames.len() as f64;
-    for frame in &frames {
-        conditions.tell(before + 0.3 * (after - before) * drawn.len() as f64 / count)?;
-        drawn.push(picture_of(conditions, &mut frame.world.borrow_mut(), &frame.options)?);
-    }
-    let target = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
+    let shared = shared_renderers(conditions, &frames);
+    let (width, height) = conditions.size;
+    let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::Rgba8)?;
     let target = target.target();
-    let mut shared: Vec<&'static str> = frames.iter().filter_map(|frame| frame.renderer).collect();
-    shared.sort_unstable();
-    shared.dedup();
-    let shared: Vec<_> = shared.into_iter().map(|name| (name, RefCell::new(Renderer::new(gpu)))).collect();
-    let mut work: Vec<Work<'_>> = Vec::new();
-    for Frame { world, options, renderer, moving_lamps } in &frames {
-        let named = shared.iter().find(|(name, _)| Some(*name) == *renderer);
-        let target = &target;
-        let mut side = HAIR;
-        let mut draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
-            if *moving_lamps {
-                move_lamps(&mut world.borrow_mut(), side);
-                side = -side;
-            }
-            timed_frame(renderer, &mut world.borrow_mut(), target, options)
-        };
-        match named {
-            Some((_, renderer)) => work.push(Box::new(move || {
-                let mut renderer = renderer.borrow_mut();
-                draw(&mut renderer)?;
-                draw(&mut renderer)
-            })),
-            None => {
-                let mut renderer = Renderer::new(gpu);
-                work.push(Box::new(move || draw(&mut renderer)));
-            }
+    let mut work: Vec<Work<'_>> =
+        frames.iter().map(|frame| timed_work(conditions, frame, &shared, &target)).collect();
+    let part = |share: f64| before + share * (after - before);
+    let mut drawn = while_compiling_ahead(conditions, &frames, |begun| {
+        let mut drawn = Vec::new();
+        for (number, frame) in frames.iter().enumerate() {
+            conditions.tell(part(0.3 * number as f64 / frames.len() as f64))?;
+            begun.begin(number, Drawing::Picture);
+            drawn.push(picture_of(conditions, &mut frame.world(), &frame.options)?);
         }
-    }
-    let go_on = |share: f64| conditions.tell(before + (0.3 + 0.7 * share) * (after - before));
+        let next = Cell::new(0);
+        warm_up(&mut work, conditions.rounds(seconds), &|| {
+            begun.begin(next.get() % frames.len(), Drawing::Timed);
+            next.set(next.get() + 1);
+            conditions.tell(part(0.3))
+        })?;
+        Ok(drawn)
+    })?;
+    let go_on = |share: f64| conditions.tell(part(0.3 + 0.7 * share));
     let times = in_rounds(&mut work, conditions.rounds(seconds), &go_on)?;
     for (drawn, times) in drawn.iter_mut().zip(times) {
         drawn.times = times;
     }
     Ok(drawn)
+}
+
+/// Does something while shaders of the frames are compiled ahead, if a device is there to do that on; that has ended when this returns.
+fn while_compiling_ahead<T>(
+    conditions: &Conditions<'_>,
+    frames: &[Frame],
+    draw: impl FnOnce(&Begun) -> Result<T, CostError>,
+) -> Result<T, CostError> {
+    let (begun, end) = (Begun::none_of(frames.len()), AtomicBool::new(false));
+    let size = conditions.size;
+    std::thread::scope(|scope| {
+        if let Some(gpu) = conditions.ahead.filter(|_| frames.len() > 1) {
+            let (begun, end) = (&begun, &end);
+            scope.spawn(move || compile_ahead(gpu, size, frames, begun, end));
+        }
+        let drawn = draw(&begun);
+        end.store(true, Ordering::Relaxed);
+        drawn
+    })
+}
+
+/// The renderers that frames name, one for each name.
+fn shared_renderers(
+    conditions: &Conditions<'_>,
+    frames: &[Frame],
+) -> BTreeMap<&'static str, RefCell<Renderer>> {
+    let names = frames.iter().filter_map(|frame| frame.renderer);
+    names.map(|name| (name, RefCell::new(Renderer::new(conditions.gpu)))).collect()
+}
+
+/// What is timed of a frame.
+fn timed_work<'a>(
+    conditions: &Conditions<'_>,
+    frame: &'a Frame,
+    shared: &'a BTreeMap<&'static str, RefCell<Renderer>>,
+    target: &'a FrameTarget,
+) -> Work<'a> {
+    let mut side = HAIR;
+    let mut draw = move |renderer: &mut Renderer| -> Result<f64, CostError> {
+        let mut world = frame.world();
+        if frame.moving_lamps {
+            move_lamps(&mut world, side);
+            side = -side;
+        }
+        timed_frame(renderer, &mut world, target, &frame.options)
+    };
+    match frame.renderer.and_then(|name| shared.get(name)) {
+        Some(renderer) => Box::new(move || {
+            let mut renderer = renderer.borrow_mut();
+            draw(&mut renderer)?;
+            draw(&mut renderer)
+        }),
+        None => {
+            let mut renderer = Renderer::new(conditions.gpu);
+            Box::new(move || draw(&mut renderer))
+        }
+    }
 }
 
 /// Milliseconds of a frame, from the call until the device has finished.
@@ -175,13 +181,8 @@ fn picture_of(
 ) -> Result<DrawnFrame, CostError> {
     let (width, height) = conditions.size;
     let target = Offscreen::new(conditions.gpu, width, height, OffscreenFormat::LinearFloat)?;
-    let options = FrameOptions {
-        display: Display::Linear,
-        exposure: Some(1.0),
-        full_precision: true,
-        measure: if conditions.counts_only { Measure::Nothing } else { Measure::TimeAndInvocations },
-        ..options.clone()
-    };
+    let measure = if conditions.counts_only { Measure::Nothing } else { Measure::TimeAndInvocations };
+    let options = FrameOptions { measure, ..picture_options(options) };
     let mut renderer = conditions.pictures.borrow_mut();
     let report = renderer.render(world, &target.target(), &options)?;
     let measured = renderer.wait()?.cloned().unwrap_or_default();

@@ -29,12 +29,14 @@
 mod baked;
 mod clustered_mesh;
 mod comparison;
+mod compile_ahead;
 mod conditions;
 mod converged;
 mod converged_bake;
 mod error;
 mod findings;
 mod folder;
+mod frame;
 mod frames;
 mod fronts;
 mod lamps_in_pieces;

@@ -20,7 +20,25 @@ pub struct Rounds {
 /// A piece of work, which answers with its milliseconds.
 pub type Work<'a> = Box<dyn FnMut() -> Result<f64, CostError> + 'a>;
 
-/// Does the work in rounds. Every other round goes backwards, so that none always follows the same one. `go_on` is asked between any two
+/// Does the work as often as it takes until it is as quick as it will be. `go_on` is asked before each piece.
+///
+/// # Errors
+/// The first error of the work or of `go_on`.
+pub fn warm_up(
+    work: &mut [Work<'_>],
+    rounds: Rounds,
+    go_on: &dyn Fn() -> Result<(), CostError>,
+) -> Result<(), CostError> {
+    for _ in 0..rounds.warm_up {
+        for piece in work.iter_mut() {
+            go_on()?;
+            piece()?;
+        }
+    }
+    Ok(())
+}
+
+/// Does the work in rounds, after [`warm_up`]. Every other round goes backwards, so that none always follows the same one. `go_on` is asked between any two
 /// pieces, with the share of the rounds that is done, 0 to 1.
 ///
 /// # Errors
@@ -30,12 +48,6 @@ pub fn in_rounds(
     rounds: Rounds,
     go_on: &dyn Fn(f64) -> Result<(), CostError>,
 ) -> Result<Vec<Vec<f64>>, CostError> {
-    for _ in 0..rounds.warm_up {
-        for piece in work.iter_mut() {
-            go_on(0.0)?;
-            piece()?;
-        }
-    }
     let begun = Instant::now();
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); work.len()];
     for round in 0..rounds.most.max(rounds.fewest) {
@@ -75,7 +87,9 @@ mod tests {
             })
         };
         let rounds = Rounds { warm_up: 1, fewest: 2, most: 2, time: Duration::ZERO };
-        let times = in_rounds(&mut [piece(0), piece(1), piece(2)], rounds, &|_| Ok(()));
+        let mut work = [piece(0), piece(1), piece(2)];
+        warm_up(&mut work, rounds, &|| Ok(())).expect("nothing fails");
+        let times = in_rounds(&mut work, rounds, &|_| Ok(()));
         assert_eq!(times.ok(), Some(vec![vec![0.0; 2], vec![1.0; 2], vec![2.0; 2]]));
         assert_eq!(*order.borrow(), [0, 1, 2, 0, 1, 2, 2, 1, 0]);
     }

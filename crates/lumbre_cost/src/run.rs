@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use lumbre_render::{Gpu, Renderer};
 
+use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::folder::{Folder, has_pictures};
 use crate::machine::machine;
@@ -64,6 +65,7 @@ pub fn measure(
     let former = former.filter(|kept| kept.machine == report.machine && kept.settings == report.settings);
     let of = options.studies.len();
     let converged = ConvergedBakes::default();
+    let ahead = device_ahead(gpu).filter(|_| !options.counts_only);
     for (number, kind) in options.studies.iter().enumerate() {
         let kept = former.as_ref().and_then(|former| former.study(kind.name));
         if let Some(kept) = kept.filter(|study| study.points.iter().all(|p| has_pictures(folder.path(), p))) {
@@ -75,6 +77,7 @@ pub fn measure(
         let pictures = RefCell::new(Renderer::new(gpu));
         let conditions = Conditions {
             gpu,
+            ahead: ahead.as_ref(),
             pictures: &pictures,
             converged: &converged,
             quick: options.quick,

@@ -144,6 +144,14 @@ impl Gpu {
         Self::from_adapter(instance, adapter)
     }
 
+    /// Another device of the same adapter.
+    ///
+    /// # Errors
+    /// [`RenderError::Device`], [`RenderError::DeviceTooSmall`].
+    pub fn another(&self) -> Result<Self, RenderError> {
+        Self::from_adapter(self.instance.clone(), self.adapter.clone())
+    }
+
     /// A device of an adapter that is known.
     pub(crate) fn from_adapter(
         instance: wgpu::Instance,

@@ -22,7 +22,7 @@ const FEW_ERRORS: &[f64] = &[0.08, 0.03, 0.015];
 /// Bakes take seconds: each is done twice.
 const ROUNDS: usize = 2;
 /// Of the converged bake in a quick report: as long as in the other studies, so that they share it.
-pub(super) const REFERENCE_SECONDS: f64 = 2.5;
+pub(super) const REFERENCE_SECONDS: f64 = 1.5;
 /// Texels along a patch: the quality's own is 4.
 const PATCHES: &[f32] = &[16.0, 8.0, 4.0, 2.0];
 const FEW_PATCHES: &[f32] = &[16.0, 2.0];
@@ -110,7 +110,7 @@ fn of_scene(
     [before, after]: [f64; 2],
     measured: &mut Measured,
 ) -> Result<(), CostError> {
-    let options = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 1_500.0))?;
+    let options = bake_options(conditions, scene, conditions.unless_quick(4_000.0, 700.0))?;
     let part = |share: f64| before + share * (after - before);
     let options_of_truth =
         converged(conditions, &options, conditions.reference_time(25.0, REFERENCE_SECONDS));

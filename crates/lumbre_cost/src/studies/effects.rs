@@ -5,7 +5,8 @@ use lumbre_scene::Census;
 
 use super::over_scenes;
 use crate::findings::{is_above_one, listed, listed_with, percent, ratio_of, rounded};
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;

@@ -3,7 +3,8 @@
 use lumbre_render::{FrameOptions, LightLists, RenderingPath};
 
 use crate::findings::{cheapest_by_error, is_above_one, listed, percent, ratio_of, rounded, short};
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::fronts::pareto_front;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;

@@ -10,7 +10,8 @@ use lumbre_trace::{Integrator, TraceOptions};
 use super::over_scenes;
 use crate::baked::{bake_arguments, bake_options, bake_scene};
 use crate::findings::{cheapest_by_error, milliseconds, percent, rounded};
-use crate::frames::{Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::draw_frames;
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::rounds::milliseconds_since;
@@ -89,7 +90,7 @@ fn of_scene(
     let uncertain = Some(ErrorOf { uncertainty: open, ..ErrorOf::default() });
     conditions.tell(part(0.5))?;
 
-    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 1_500.0))?;
+    let bake = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 700.0))?;
     let bake = BakeOptions { error: 0.02, ..bake };
     let baked = bake_scene(conditions, scene, &bake, [part(0.5), part(0.6)])?;
     let light = |shadows, multisample| FrameOptions {

@@ -13,7 +13,8 @@ use lumbre_scene::{
 use super::over_scenes;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_scene};
 use crate::findings::{listed, percent, rounded, short};
-use crate::frames::{Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::draw_frames;
 use crate::fronts::pareto_front;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;

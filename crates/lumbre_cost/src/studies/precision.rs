@@ -9,7 +9,8 @@ use lumbre_optics::{decode_srgb, encode_srgb};
 use lumbre_render::FrameOptions;
 
 use crate::findings::{listed, milliseconds, percent, rounded};
-use crate::frames::{Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::draw_frames;
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::rounded_lighting::{FORMATS, rounded_lighting};

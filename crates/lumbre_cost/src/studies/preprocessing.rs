@@ -16,7 +16,8 @@ use super::over_scenes;
 use crate::baked::{Baked, bake_arguments, bake_options, bake_world, maps_of, texel_error};
 use crate::converged_bake::{converged, converged_bake};
 use crate::findings::{error_of, is_above_one, milliseconds, ratio_of, rounded};
-use crate::frames::{DrawnFrame, Frame, draw_frames, draw_picture};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames, draw_picture};
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::scene_file::SceneFile;
@@ -65,7 +66,7 @@ fn of_scene(
     measured: &mut Measured,
 ) -> Result<(), CostError> {
     let part = |share: f64| before + share * (after - before);
-    let options = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 1_500.0))?;
+    let options = bake_options(conditions, scene, conditions.unless_quick(10_000.0, 700.0))?;
     let options = BakeOptions { error: 0.02, ..options };
     let time = conditions.reference_time(10.0, REFERENCE_SECONDS);
     // Of what is asked for, `error` alone does not matter to it.

@@ -5,7 +5,8 @@ use lumbre_optics::{ReflectionModel, Surface, SurfaceSample, specular_reflection
 use lumbre_render::FrameOptions;
 
 use crate::findings::{is_above_one, percent, rounded};
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
 use crate::scenes::{Ball, ball};

@@ -5,7 +5,8 @@ use lumbre_optics::{ReflectionModel, Shading};
 use lumbre_render::FrameOptions;
 
 use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded};
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::picture::Picture;
 use crate::scene_file::SceneFile;

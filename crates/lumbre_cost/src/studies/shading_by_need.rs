@@ -6,7 +6,8 @@ use lumbre_render::{FrameOptions, ShadingNeeds};
 
 use super::over_scenes;
 use crate::findings::{is_above_one, ratio_of, rounded, short};
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
 use crate::scenes::Air;

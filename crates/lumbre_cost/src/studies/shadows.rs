@@ -8,7 +8,8 @@ use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
 use crate::findings::{cheapest_by_error, is_above_one, percent, ratio_of, rounded, short};
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::lamps_in_pieces::take_to_pieces;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;

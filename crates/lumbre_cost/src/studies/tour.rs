@@ -9,7 +9,8 @@ use lumbre_trace::TraceOptions;
 
 use super::over_scenes_made;
 use crate::findings::{milliseconds, percent};
-use crate::frames::{Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::draw_frames;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
 use crate::scenes::mirror_and_glass;

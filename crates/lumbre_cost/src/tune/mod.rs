@@ -7,7 +7,7 @@ mod goal;
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use bevy_ecs::prelude::*;
@@ -20,10 +20,12 @@ pub use self::draw_settings::DrawSettings;
 pub(crate) use self::draw_settings::{Choices, Stage};
 pub use self::goal::Goal;
 pub(crate) use self::goal::choose;
+use crate::compile_ahead::device_ahead;
 use crate::converged::ConvergedBakes;
 use crate::findings::{cost_of, percent, short};
 use crate::folder::Folder;
-use crate::frames::{DrawnFrame, Frame, draw_frames};
+use crate::frame::Frame;
+use crate::frames::{DrawnFrame, draw_frames};
 use crate::machine::machine;
 use crate::measured::Measured;
 use crate::scene_file::SceneFile;
@@ -76,8 +78,10 @@ pub fn tune(
     let begun = Instant::now();
     let files = [options.file.clone()];
     let (pictures, converged) = (RefCell::new(Renderer::new(gpu)), ConvergedBakes::default());
+    let ahead = device_ahead(gpu);
     let conditions = Conditions {
         gpu,
+        ahead: ahead.as_ref(),
         pictures: &pictures,
         converged: &converged,
         quick: options.quick,
@@ -192,7 +196,7 @@ fn draw_at_cameras(
     for settings in ways {
         let mut world = scene.open(conditions.aspect())?;
         settings.set(&mut world);
-        let world = Rc::new(RefCell::new(world));
+        let world = Arc::new(Mutex::new(world));
         for (camera, _) in cameras {
             let options = FrameOptions { camera: Some(*camera), ..settings.options() };
             frames.push(Frame::of(&world, options).sharing("tune"));

@@ -1,0 +1,93 @@
+//! Shaders that are compiled before the frames that need them are drawn. A software rasterizer compiles a shader when it first draws with it, on one thread, for longer than
+//! many frames take; but it keeps the code on disk (Mesa's shader cache) for every device of the machine. So the other core draws the same frames on a device of its own,
+//! from the last to the first, while they are drawn from the first to the last, until both have met. Nothing is timed meanwhile.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use lumbre_render::{Gpu, Offscreen, OffscreenFormat, RenderError, Renderer};
+
+use crate::frame::{Frame, picture_options};
+
+/// What is drawn of each frame: its picture, of full precision, and what is timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawing {
+    Picture,
+    Timed,
+}
+
+/// What has been begun of each frame, by whoever draws it.
+#[derive(Debug)]
+pub struct Begun(Vec<[AtomicBool; 2]>);
+
+impl Begun {
+    /// Nothing yet, of so many frames.
+    pub fn none_of(frames: usize) -> Self {
+        Self((0..frames).map(|_| Default::default()).collect())
+    }
+
+    /// Notes that a drawing of a frame is begun; whether it is the first time.
+    pub fn begin(&self, frame: usize, drawing: Drawing) -> bool {
+        !self.0[frame][drawing as usize].swap(true, Ordering::Relaxed)
+    }
+}
+
+/// A device for it, if the adapter compiles when it draws and there are two cores at least.
+pub fn device_ahead(gpu: &Gpu) -> Option<Gpu> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    if !gpu.is_software() || cores < 2 {
+        return None;
+    }
+    // Without it shaders are compiled when they are needed.
+    gpu.another().inspect_err(|error| tracing::debug!("nothing is compiled ahead: {error}")).ok()
+}
+
+/// Draws what nobody has begun of the frames, from the last to the first, until `end` is set.
+pub fn compile_ahead(gpu: &Gpu, size: (u32, u32), frames: &[Frame], begun: &Begun, end: &AtomicBool) {
+    if let Err(error) = draw(gpu, size, frames, begun, end) {
+        // Whoever draws the frame for its own sake meets it, too, and says so.
+        tracing::debug!("a frame was not drawn ahead: {error}");
+    }
+}
+
+fn draw(
+    gpu: &Gpu,
+    (width, height): (u32, u32),
+    frames: &[Frame],
+    begun: &Begun,
+    end: &AtomicBool,
+) -> Result<(), RenderError> {
+    let mut renderer = Renderer::new(gpu);
+    let picture = Offscreen::new(gpu, width, height, OffscreenFormat::LinearFloat)?;
+    let timed = Offscreen::new(gpu, width, height, OffscreenFormat::Rgba8)?;
+    for (number, frame) in frames.iter().enumerate().rev() {
+        for drawing in [Drawing::Picture, Drawing::Timed] {
+            if end.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            if !begun.begin(number, drawing) {
+                continue;
+            }
+            let (target, options) = match drawing {
+                Drawing::Picture => (&picture, picture_options(&frame.options)),
+                Drawing::Timed => (&timed, frame.options.clone()),
+            };
+            renderer.render(&mut frame.world(), &target.target(), &options)?;
+            // The World is free for others while this is compiled.
+            renderer.wait()?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_drawing_is_begun_once() {
+        let begun = Begun::none_of(2);
+        assert!(begun.begin(1, Drawing::Picture));
+        assert!(!begun.begin(1, Drawing::Picture));
+        assert!(begun.begin(1, Drawing::Timed) && begun.begin(0, Drawing::Picture));
+    }
+}
