@@ -5,9 +5,9 @@ use std::sync::Arc;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
-use lumbre_optics::{Light, Material, Shading};
+use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, Material, Shading};
 use lumbre_render::FrameReport;
-use lumbre_scene::{Camera, Hidden, MaterialTextures, Mesh, SceneSettings, Transform};
+use lumbre_scene::{Camera, FrameSettings, Hidden, MaterialTextures, Mesh, SceneSettings, Transform};
 use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::{Canvas, draw, linear};
@@ -196,6 +196,57 @@ fn despawned_hidden_and_spawned_objects() {
         scene.world.spawn(added);
     });
     assert_eq!(report.statistics.objects, OBJECTS);
+}
+
+/// What a renderer keeps of lights follows every way in which one may come, go, or become another.
+#[test]
+fn lights_that_come_and_go_and_change() {
+    let mut scene = scene();
+    let ranged = |range| Attenuation { range, ..Attenuation::INVERSE_SQUARE };
+    type Step = fn(&mut World, Entity);
+    let steps: [(&str, Step); 12] = [
+        ("moved", |world, light| world.get_mut::<Transform>(light).unwrap().translation.x += 0.7),
+        ("of another colour", |world, light| world.get_mut::<Light>(light).unwrap().diffuse = Vec3::X),
+        ("off", |world, light| world.get_mut::<Light>(light).unwrap().enabled = false),
+        ("on", |world, light| world.get_mut::<Light>(light).unwrap().enabled = true),
+        ("baked", |world, light| world.get_mut::<Light>(light).unwrap().bake = BakeMode::Static),
+        ("out of range", |world, light| world.get_mut::<Light>(light).unwrap().diffuse.y = f32::NAN),
+        ("in range again", |world, light| world.get_mut::<Light>(light).unwrap().diffuse.y = 2.0),
+        ("ambient", |world, light| world.get_mut::<Light>(light).unwrap().kind = LightKind::Ambient),
+        ("of another kind", |world, light| {
+            world.get_mut::<Light>(light).unwrap().kind = LightKind::Directional
+        }),
+        ("no light", |world, light| {
+            world.entity_mut(light).remove::<Light>();
+        }),
+        ("a light", |world, light| {
+            world.entity_mut(light).insert(Light::point(Vec3::Z));
+        }),
+        ("gone, and another there", |world, light| {
+            world.despawn(light);
+            world.spawn((Light::point(Vec3::Y), Transform::from_xyz(0.0, 0.0, 2.0)));
+        }),
+    ];
+    for (name, step) in steps {
+        let light = scene.lights[2];
+        step(&mut scene.world, light);
+        let (kept, report) = scene.canvas.draw(&mut scene.world, &linear());
+        let (fresh, of_fresh) = draw(&mut scene.world, SIZE, SIZE, &linear());
+        assert!(kept == fresh, "{name}");
+        assert_eq!(report.left_out, of_fresh.left_out, "{name}");
+        assert_eq!(report.left_out.len(), usize::from(name == "out of range"), "{name}");
+    }
+    // Settings reach lights that nobody has touched, and three with a range are found by clusters.
+    for light in [0, 1, 3] {
+        scene.world.get_mut::<Light>(scene.lights[light]).unwrap().attenuation = ranged(4.0);
+    }
+    for light_threshold in [0.0, 0.2, 0.0] {
+        let frame = FrameSettings { light_threshold, ..FrameSettings::default() };
+        scene.world.resource_mut::<SceneSettings>().frame = frame;
+        let (kept, _) = scene.canvas.draw(&mut scene.world, &linear());
+        let (fresh, _) = draw(&mut scene.world, SIZE, SIZE, &linear());
+        assert!(kept == fresh, "a threshold of {light_threshold}");
+    }
 }
 
 #[test]

@@ -77,15 +77,21 @@ pub(crate) struct VisibleObjects<'a> {
     depths: Option<[f64; 2]>,
     clustered_depths: Option<[f64; 2]>,
     deferred: Vec<DeferredClass>,
+    /// What the objects are drawn with: each once for a run of objects that are drawn alike.
+    pipelines: Vec<ChosenPipelines>,
 }
 
+/// Of thousands of objects, which are drawn in another order than they stand in: the less there is of each the better.
 struct Visible<'a> {
     pass: LitPass,
-    slot: usize,
+    slot: u32,
     /// Smaller is drawn earlier.
     order: f64,
     object: &'a Object,
-    pipelines: ChosenPipelines,
+    mesh: MeshKey,
+    texture_set: Option<&'a Arc<TextureSet>>,
+    /// Which of the pipelines draw it.
+    pipelines: u32,
     /// Group 2 of what lights it.
     baked_light: Option<&'a Arc<wgpu::BindGroup>>,
     /// 0 is none.
@@ -99,7 +105,7 @@ impl Visible<'_> {
 }
 
 /// What draws a surface, and what lights it: the same, unless that is deferred.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 struct ChosenPipelines {
     drawn: PipelineKey,
     lit: PipelineKey,
@@ -188,8 +194,22 @@ impl<'a> VisibleObjects<'a> {
             if pipelines.lit.variant.has(Feature::Clusters) {
                 seen.clustered_depths = widened(seen.clustered_depths);
             }
-            let order = order(object, view.eye, pass);
-            seen.visible.push(Visible { pass, slot, order, object, pipelines, baked_light, class_number });
+            if seen.pipelines.last() != Some(&pipelines) {
+                seen.pipelines.push(pipelines);
+            }
+            // What a table holds has numbers of 32 bits.
+            let number = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+            seen.visible.push(Visible {
+                pass,
+                slot: number(slot),
+                order: order(object, view.eye, pass),
+                object,
+                mesh: object.mesh,
+                texture_set: object.texture_set.as_ref(),
+                pipelines: number(seen.pipelines.len() - 1),
+                baked_light,
+                class_number,
+            });
         }
         seen
     }
@@ -255,32 +275,31 @@ impl ChosenPipelines {
 impl Draws {
     /// The draws of what is seen, with instances that come after so many of other views.
     pub fn new(seen: VisibleObjects<'_>, lights: &mut ObjectLightLists, first_instance: u32) -> Self {
-        let VisibleObjects { visible, outside, depths, clustered_depths, deferred } = seen;
+        let VisibleObjects { visible, outside, depths, clustered_depths, deferred, pipelines } = seen;
         let mut draws =
             Self { outside, first_instance, depths, clustered_depths, deferred, ..Self::default() };
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
-        // Sorted are numbers alone: what they stand for is large.
-        let key = |(index, seen): (usize, &Visible)| ((!seen.is_deferred(), seen.pass), seen.order, index);
-        let mut order: Vec<((bool, LitPass), f64, usize)> = visible.iter().enumerate().map(key).collect();
-        order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        let mut order: Vec<u128> =
+            visible.iter().zip(0..).map(|(seen, index)| sort_key(seen, index)).collect();
+        order.sort_unstable();
         draws.instances.reserve(visible.len());
-        for (_, _, index) in order {
-            draws.push(&visible[index], lights);
+        for key in order {
+            // What the key ends in.
+            let seen = &visible[key as u32 as usize];
+            draws.push(seen, &pipelines[seen.pipelines as usize], lights);
         }
         draws
     }
 
     /// Adds an instance, to the last batch if it fits.
-    fn push(&mut self, seen: &Visible, lights: &mut ObjectLightLists) {
+    fn push(&mut self, seen: &Visible, pipelines: &ChosenPipelines, lights: &mut ObjectLightLists) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
-        let object = u32::try_from(seen.slot).unwrap_or(u32::MAX);
-        let list = lights.reaching(
-            seen.object.entity,
-            seen.object.center,
-            seen.object.half_size,
-            seen.pipelines.lit.variant.has(Feature::Clusters),
-        );
-        self.instances.push(list.of_object(object, seen.class_number));
+        let clustered = pipelines.lit.variant.has(Feature::Clusters);
+        let list = lights.where_clusters_have_all(clustered).unwrap_or_else(|| {
+            let Object { entity, center, half_size, .. } = seen.object;
+            lights.reaching(*entity, *center, *half_size, clustered)
+        });
+        self.instances.push(list.of_object(seen.slot, seen.class_number));
         let batches = match seen.pass {
             _ if seen.is_deferred() => &mut self.geometry,
             LitPass::Lightmap => &mut self.lightmapped,
@@ -288,14 +307,14 @@ impl Draws {
             LitPass::Refraction => &mut self.refractive,
             LitPass::Transparent => &mut self.transparent,
         };
-        let pipeline = seen.pipelines.drawn;
+        let pipeline = pipelines.drawn;
         // What lights the G-buffer is bound it.
         let baked_light = seen.baked_light.filter(|_| !seen.is_deferred());
         // A pipeline that stands in for another may have no textures.
-        let texture_set = seen.object.texture_set.as_ref().filter(|_| pipeline.texture_mask != 0);
+        let texture_set = seen.texture_set.filter(|_| pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {
             batch.pipeline == pipeline
-                && batch.mesh == seen.object.mesh
+                && batch.mesh == seen.mesh
                 && same(batch.texture_set.as_ref(), texture_set)
                 && same(batch.baked_light.as_ref(), baked_light)
                 && batch.class_number == seen.class_number
@@ -305,7 +324,7 @@ impl Draws {
             Some(last) if fits(last) => last.instances.end += 1,
             _ => batches.push(Batch {
                 pipeline,
-                mesh: seen.object.mesh,
+                mesh: seen.mesh,
                 texture_set: texture_set.cloned(),
                 baked_light: baked_light.cloned(),
                 class_number: seen.class_number,
@@ -364,6 +383,15 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
         (Some(a), Some(b)) => Arc::ptr_eq(a, b),
         _ => false,
     }
+}
+
+/// Deferred ones first, then by pass, by order, and by number, in which it ends: what is sorted are numbers alone, as what they stand for is large.
+fn sort_key(seen: &Visible<'_>, number: u32) -> u128 {
+    let kind = u128::from(!seen.is_deferred()) << 8 | seen.pass as u128;
+    // The bits of a float as a number that is greater for a greater one.
+    let bits = seen.order.to_bits();
+    let order = if bits >> 63 == 0 { bits | 1 << 63 } else { !bits };
+    kind << 96 | u128::from(order) << 32 | u128::from(number)
 }
 
 /// By what the objects of a pass are sorted: how far the farthest point of the bounding sphere is from the eye where they are opaque, as a

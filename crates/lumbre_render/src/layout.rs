@@ -244,8 +244,8 @@ pub(crate) struct LightData {
 }
 
 impl LightData {
-    /// A light in frame space, with the flags of its shadow.
-    pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3, shadow: u32) -> Self {
+    /// A light in frame space, without a shadow.
+    pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
         let cone = light.spot.filter(|cone| !cone.is_everywhere());
         let cosines = cone.map(|cone| cone.cosines());
         Self {
@@ -256,7 +256,7 @@ impl LightData {
                 LightKind::Point => 2,
             },
             diffuse: light.diffuse,
-            flags: u32::from(light.attenuation.clamp) | shadow,
+            flags: u32::from(light.attenuation.clamp),
             specular: light.specular,
             range: light.attenuation.shader_range(),
             position: (transform.translation() - origin).as_vec3(),
@@ -274,6 +274,11 @@ impl LightData {
 }
 
 impl LightData {
+    /// The same with the flags of its shadow.
+    pub fn with_shadow(self, shadow: u32) -> Self {
+        Self { flags: self.flags | shadow, ..self }
+    }
+
     /// A polygon light in frame space: its edges stand where other kinds have their axis and their attenuation.
     pub fn polygon(light: &PolygonLight, origin: DVec3) -> Self {
         let radiance = finite(light.radiance.as_vec3());

@@ -14,6 +14,8 @@ const TILE_SIDES: [u32; 7] = [32, 64, 128, 256, 512, 1024, 16384];
 /// Most clusters, and most entries of lists, as far as they can be told beforehand, before a coarser grid is taken.
 const MANY_CLUSTERS: f64 = 131_072.0;
 const MANY_ENTRIES: f64 = 3e6;
+/// Lights from which the entries are told beforehand.
+const TOLD_FROM: usize = 1000;
 /// Most slices of depth.
 const MOST_SLICES: f64 = 96.0;
 /// By how much of itself a light's range grows, and by how much of the distance from the origin of frame space: the roundings of
@@ -169,10 +171,11 @@ impl LightClusters {
         })
     }
 
-    /// Clusters of the boxes around all balls.
+    /// Clusters of the boxes around all balls, told from a thousand of them.
     fn cells(&self, axes: &[Axis; 2], depths: &Depths) -> f64 {
+        let every = (self.spheres.len() / TOLD_FROM).max(1);
         let length = |span: Option<[u32; 2]>| span.map_or(0.0, |[first, last]| f64::from(last - first + 1));
-        let cells = self.spheres.iter().map(|sphere| {
+        let cells = self.spheres.iter().step_by(every).map(|sphere| {
             let slices = length(depths.span(sphere.depth, sphere.radius));
             if slices == 0.0 {
                 return 0.0;
@@ -180,7 +183,7 @@ impl LightClusters {
             let columns = length(axes[0].span(sphere.x, sphere.depth, sphere.radius));
             slices * columns * length(axes[1].span(sphere.y, sphere.depth, sphere.radius))
         });
-        cells.sum()
+        cells.sum::<f64>() * every as f64
     }
 
     /// Appends the lists of one class, whose offsets stand at `table`: in pairs, or one by one with `any` of the class behind them, for a list that is empty.
@@ -359,11 +362,10 @@ impl Axis {
             true => tangents(place, depth, radius),
             false => (place - radius, place + radius),
         };
-        let first = ((least - self.first) / self.step).floor();
-        let last = ((most - self.first) / self.step).floor();
-        let end = f64::from(self.count - 1);
-        // The casts saturate.
-        (last >= 0.0 && first <= end).then(|| [first.max(0.0) as u32, last.min(end) as u32])
+        let [first, last] = [least, most].map(|place| (place - self.first) / self.step);
+        let count = f64::from(self.count);
+        // Casts round down and saturate.
+        (last >= 0.0 && first < count).then(|| [first.max(0.0) as u32, last.min(count - 1.0) as u32])
     }
 }
 
@@ -417,9 +419,10 @@ impl Depths {
             return None;
         }
         let end = f64::from(self.count - 1);
-        let first = (self.slice(depth - radius) - SLICE_MARGIN).floor().clamp(0.0, end);
-        let last = (self.slice(depth + radius) + SLICE_MARGIN).floor().clamp(0.0, end);
-        Some([first as u32, last as u32])
+        let first = self.slice(depth - radius) - SLICE_MARGIN;
+        let last = self.slice(depth + radius) + SLICE_MARGIN;
+        // Casts round down.
+        Some([first, last].map(|slice| slice.clamp(0.0, end) as u32))
     }
 
     /// Where a slice begins and ends.

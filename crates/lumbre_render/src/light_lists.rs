@@ -55,6 +55,14 @@ impl<'a> ObjectLightLists<'a> {
         }
     }
 
+    /// The list of an object whose fragments have lists of their own (`clustered`), if those have every light; whatever the object is.
+    pub fn where_clusters_have_all(&mut self, clustered: bool) -> Option<InstanceData> {
+        (clustered && self.unbounded.is_empty()).then(|| {
+            self.lengths.1 += 1;
+            InstanceData::default()
+        })
+    }
+
     /// The list of an object with this bounding box in the world (its `object` is 0). Where the object's fragments have lists of their
     /// own (`clustered`), only of the lights that those do not have.
     pub fn reaching(
@@ -64,10 +72,6 @@ impl<'a> ObjectLightLists<'a> {
         half_size: DVec3,
         clustered: bool,
     ) -> InstanceData {
-        if clustered && self.unbounded.is_empty() {
-            self.lengths.1 += 1;
-            return InstanceData::default();
-        }
         let list: Vec<u32> = if clustered {
             let touches = |index: &u32| self.reaches[*index as usize].touches(entity, center, half_size);
             self.unbounded.iter().copied().filter(touches).collect()

@@ -15,8 +15,8 @@ use crate::draws::{Draws, VisibleObjects};
 use crate::effect_shares::EffectShares;
 use crate::effects::{self, BuiltIn, Effect, Stage};
 use crate::extract::{
-    CameraView, Emitters, KnownLights, LightPlace, Object, Objects, RefractorData, RefractorSurface,
-    extract_lights, find_camera,
+    CameraView, Emitters, KnownLights, LightPlace, LightRecords, Object, Objects, RefractorData,
+    RefractorSurface, extract_lights, find_camera,
 };
 use crate::facts::SceneFacts;
 use crate::features::FrameFeatures;
@@ -58,6 +58,7 @@ pub struct Renderer {
     objects: Objects,
     emitters: Emitters,
     volumes: IrradianceVolumes,
+    light_records: LightRecords,
     lights: GrowableBuffer<LightData>,
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
@@ -134,6 +135,7 @@ impl Renderer {
             executor: Executor::new(),
             objects: Objects::new(),
             emitters: Emitters::default(),
+            light_records: LightRecords::default(),
             volumes: IrradianceVolumes::default(),
             lights: GrowableBuffer::table("lights"),
             instances: GrowableBuffer::table("instances"),
@@ -393,7 +395,13 @@ impl Renderer {
         let by_need = is_shaded_by_need(&self.objects.census, options, settings);
         let place =
             LightPlace { origin: self.objects.origin, known, lamps: by_need, settings: settings.frame };
-        let mut lights = extract_lights(world, &mut self.emitters, &mut self.lights, place, left_out)?;
+        let mut lights = extract_lights(
+            world,
+            (&mut self.emitters, &mut self.light_records),
+            &mut self.lights,
+            place,
+            left_out,
+        )?;
         if !options.lightmaps {
             lights.set = lights.set.without_lightmaps();
             lights.reaches.iter_mut().for_each(|reach| reach.baked = false);

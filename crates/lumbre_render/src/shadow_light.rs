@@ -66,7 +66,7 @@ impl ShadowLight {
         transform: &GlobalTransform,
         first_view: usize,
     ) -> Option<Self> {
-        let kind = ShadowKind::of(light).filter(|_| light.shadow)?;
+        let kind = light.shadow.then(|| ShadowKind::of(light))??;
         if first_view + kind.views() > MOST_VIEWS {
             return None;
         }

@@ -3,6 +3,8 @@
 mod camera;
 mod emissive_faces;
 mod emitters;
+mod light_reach;
+mod light_records;
 mod lights;
 mod lit_pass;
 mod objects;
@@ -13,10 +15,11 @@ mod shown_light;
 pub(crate) use camera::{CameraView, ViewVolume, Window, find_camera};
 pub(crate) use emitters::Emitters;
 #[cfg(test)]
-pub(crate) use lights::PolygonReach;
+pub(crate) use light_reach::PolygonReach;
+pub(crate) use light_reach::{LightClass, LightReach};
+pub(crate) use light_records::LightRecords;
 pub(crate) use lights::{
-    KnownLights, Lamp, LightClass, LightCounts, LightPlace, LightReach, LightSet, SceneLights,
-    UNIFORM_LIGHTS, extract_lights,
+    KnownLights, Lamp, LightCounts, LightPlace, LightSet, SceneLights, UNIFORM_LIGHTS, extract_lights,
 };
 pub(crate) use lit_pass::LitPass;
 pub(crate) use objects::{Object, Objects, Reflectance, world_box};

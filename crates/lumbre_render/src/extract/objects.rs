@@ -1,9 +1,9 @@
 //! Objects of a frame: entities with a mesh, one slot each in the GPU's buffers. A slot is written again only when a component
 //! of its entity changed.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
+use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
@@ -112,7 +112,7 @@ type Extraction = SystemState<(
 /// All objects, and their GPU buffers.
 pub(crate) struct Objects {
     state: Option<(WorldId, Extraction)>,
-    slots: HashMap<Entity, usize>,
+    slots: EntityHashMap<usize>,
     /// By slot; `None` is free.
     pub objects: Vec<Option<Object>>,
     free: Vec<usize>,
@@ -134,7 +134,7 @@ impl Objects {
     pub fn new() -> Self {
         Self {
             state: None,
-            slots: HashMap::new(),
+            slots: EntityHashMap::default(),
             objects: Vec::new(),
             free: Vec::new(),
             census: ObjectCensus::default(),
@@ -216,14 +216,13 @@ impl Objects {
                         0 => TextureCoordinateSet::First,
                         _ => TextureCoordinateSet::Second,
                     });
-                let mut object = match self.objects[slot].take() {
-                    Some(object) => object,
-                    None => Object::new(
+                let object = self.objects[slot].get_or_insert_with(|| {
+                    Object::new(
                         entity,
                         meshes.insert(&mesh.0, normal_map),
                         ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks)),
-                    ),
-                };
+                    )
+                });
                 // A component that was removed leaves no change behind.
                 let rematerialized =
                     new || material.is_changed() || maps_changed || object.optional.maps != optional.maps;
@@ -270,7 +269,6 @@ impl Objects {
                     object.count(&mut self.census, traits, mesh.0.triangle_count());
                     object.optional = optional;
                 }
-                self.objects[slot] = Some(object);
             }
         }
         self.state = Some((id, state));
@@ -295,16 +293,20 @@ impl Objects {
         let (frame, objects, free) = (self.frame, &mut self.objects, &mut self.free);
         let census = &mut self.census;
         let before = self.slots.len();
-        self.slots.retain(|_, slot| {
-            let alive = objects[*slot].as_ref().is_some_and(|object| object.seen == frame);
-            if !alive {
-                if let Some(mut object) = objects[*slot].take() {
-                    object.leave(census);
+        // As a rule all are there.
+        let gone = |slot: &Option<Object>| slot.as_ref().is_some_and(|object| object.seen != frame);
+        if objects.iter().any(gone) {
+            self.slots.retain(|_, slot| {
+                let alive = objects[*slot].as_ref().is_some_and(|object| object.seen == frame);
+                if !alive {
+                    if let Some(mut object) = objects[*slot].take() {
+                        object.leave(census);
+                    }
+                    free.push(*slot);
                 }
-                free.push(*slot);
-            }
-            alive
-        });
+                alive
+            });
+        }
         if self.slots.len() != before || std::mem::take(&mut self.stale) {
             sets.sweep();
             textures.sweep();

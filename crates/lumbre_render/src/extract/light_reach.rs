@@ -1,0 +1,182 @@
+//! How far a light goes, and by what it can be found: its class, and the ball or the plane that holds all it lights. Not what it sends there.
+
+use bevy_ecs::entity::Entity;
+use glam::{DVec3, Vec3};
+use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, SpotCone};
+use lumbre_scene::GlobalTransform;
+
+use super::emitters::EmissivePolygon;
+
+/// By what a light can be found, and what has to be asked of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LightClass {
+    /// It has no range, or is directional, or a polygon: it is in the lists of objects.
+    Unbounded,
+    /// A point light without a shadow, with a smooth cone or without one, of one colour, with the inverse square within a range, with or without a constant term
+    /// beside it: what most lights of a game are.
+    InverseSquare,
+    /// Any other point light with a range: with a shadow, OpenGL's cone, a linear attenuation, or colours that differ.
+    Ranged,
+}
+
+impl LightClass {
+    /// Of a light that is not ambient.
+    pub(super) fn of(light: &Light) -> Self {
+        let Attenuation { range, constant, linear, quadratic, clamp } = light.attenuation;
+        if light.kind != LightKind::Point || !range.is_finite() {
+            return Self::Unbounded;
+        }
+        // Numbers whose quotients are as good as they are.
+        let inverse_square =
+            linear == 0.0 && !clamp && (1e-3..=1e3).contains(&quadratic) && (0.0..=1e3).contains(&constant);
+        let one_color = light.ambient == Vec3::ZERO && light.specular == light.diffuse;
+        let narrowed = cone(light).is_some_and(|cone| !matches!(cone, SpotCone::Smooth { .. }));
+        // What `attenuate_quadratic` takes.
+        let usual_range = (1e-9..=1e15).contains(&range);
+        match inverse_square && one_color && !narrowed && usual_range && !light.shadow {
+            true => Self::InverseSquare,
+            false => Self::Ranged,
+        }
+    }
+}
+
+/// The cone of a light, if it narrows it.
+pub(super) fn cone(light: &Light) -> Option<SpotCone> {
+    light.spot.filter(|cone| !cone.is_everywhere())
+}
+
+/// How far a light of the buffer goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LightReach {
+    pub class: LightClass,
+    /// Of the ball that holds all it reaches, in the world; of a polygon light, its corner.
+    pub center: DVec3,
+    /// Of that ball, in metres; infinite for a light without a range.
+    pub radius: f64,
+    /// Baked into the lightmaps in use.
+    pub baked: bool,
+    /// Of a polygon light: the plane that it shines from.
+    pub polygon: Option<PolygonReach>,
+}
+
+/// Where a polygon light shines: before its plane, on everything but the object whose face it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PolygonReach {
+    /// Of any length, to the front.
+    pub front: DVec3,
+    pub emitter: Entity,
+}
+
+impl LightReach {
+    pub(super) fn new(light: &Light, transform: &GlobalTransform, class: LightClass) -> Self {
+        let (center, radius) = match light.kind {
+            LightKind::Point => bounding_sphere(light, transform),
+            LightKind::Ambient | LightKind::Directional => (transform.translation(), f64::INFINITY),
+        };
+        Self { class, center, radius, baked: light.bake == BakeMode::Static, polygon: None }
+    }
+
+    pub(super) fn of_polygon(EmissivePolygon { light, emitter, baked }: &EmissivePolygon) -> Self {
+        let reach = PolygonReach { front: light.area_vector(), emitter: *emitter };
+        let (class, center) = (LightClass::Unbounded, light.corner);
+        Self { class, center, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
+    }
+
+    /// Whether it may light anything of an object with this bounding box in the world.
+    pub fn touches(&self, entity: Entity, center: DVec3, half_size: DVec3) -> bool {
+        if let Some(polygon) = self.polygon {
+            return polygon.shines_on(self.center, entity, center, half_size);
+        }
+        let outside = ((self.center - center).abs() - half_size).max(DVec3::ZERO);
+        self.radius.is_infinite() || outside.length() < self.radius
+    }
+}
+
+impl PolygonReach {
+    /// Whether anything of an object with this bounding box lies before the polygon with this corner, and the object is not its own.
+    pub fn shines_on(&self, corner: DVec3, entity: Entity, center: DVec3, half_size: DVec3) -> bool {
+        let farthest = (center - corner).dot(self.front) + half_size.dot(self.front.abs());
+        self.emitter != entity && farthest > 0.0
+    }
+}
+
+/// Middle and radius of the smallest ball around all that a point light reaches: the ball of its range, or around a spotlight's part of it.
+fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64) {
+    let (place, range) = (transform.translation(), f64::from(light.attenuation.range));
+    let Some(cone) = cone(light).filter(|_| range.is_finite()) else { return (place, range) };
+    // Rounded to f32 on the device, and strictly inside is lit: a little wider is enough.
+    let cosine = (cone.cosines().outer - 1e-6).max(0.0);
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let axis = transform.forward();
+    match cosine > sine {
+        // Through the apex and the rim of the cap.
+        true => (place + axis * (0.5 * range / cosine), 0.5 * range / cosine),
+        // Around the rim.
+        false => (place + axis * (range * cosine), range * sine),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_scene::Transform;
+
+    use super::*;
+
+    #[test]
+    fn the_ball_around_a_cone_holds_what_it_lights_and_no_more() {
+        let transform = Transform::from_xyz(1.0, 2.0, 3.0).looking_at(DVec3::new(-1.0, 0.5, 2.0), DVec3::Y);
+        let place = GlobalTransform(transform.affine());
+        let axis = place.forward();
+        let side = axis.any_orthonormal_vector();
+        for outer in [0.01_f32, 0.5, 0.785, 0.786, 1.2, 1.57] {
+            let attenuation = Attenuation { range: 4.0, ..Attenuation::INVERSE_SQUARE };
+            let cone = SpotCone::Smooth { inner: 0.0, outer };
+            let (center, radius) =
+                bounding_sphere(&Light { attenuation, ..Light::spot(Vec3::ONE, cone) }, &place);
+            // Its farthest points: the apex, the middle and the rim of the cap.
+            let rim = |angle: f64| axis * angle.cos() + side * angle.sin();
+            let outer = f64::from(outer);
+            let mut farthest: f64 = if outer < 0.786 { center.distance(place.translation()) } else { 0.0 };
+            for step in 0..=100 {
+                let at = place.translation() + rim(outer * (f64::from(step) / 50.0 - 1.0)) * 4.0;
+                farthest = farthest.max(center.distance(at));
+            }
+            assert!(center.distance(place.translation()) <= radius * (1.0 + 1e-12), "{outer}");
+            assert!(farthest <= radius + 1e-9, "{outer}: {farthest} is outside of {radius}");
+            assert!(radius < farthest * (1.0 + 1e-4), "{outer}: {radius} is wider than {farthest}");
+        }
+    }
+
+    #[test]
+    fn lights_are_classed_by_what_has_to_be_asked_of_them() {
+        let ranged = Attenuation { range: 3.0, ..Attenuation::INVERSE_SQUARE };
+        let lamp = Light { attenuation: ranged, ..Light::point(Vec3::ONE) };
+        assert_eq!(LightClass::of(&lamp), LightClass::InverseSquare);
+        let smooth = Some(SpotCone::Smooth { inner: 0.1, outer: 0.2 });
+        let softened = Attenuation { constant: 0.1, quadratic: 1.2, ..ranged };
+        for other in [Light { spot: smooth, ..lamp.clone() }, Light { attenuation: softened, ..lamp.clone() }]
+        {
+            assert_eq!(LightClass::of(&other), LightClass::InverseSquare, "{other:?}");
+        }
+        let cone = Some(SpotCone::Exponent { cutoff: 0.2, exponent: 3.0 });
+        let linear = Attenuation { linear: 0.1, ..ranged };
+        let faint = Attenuation { quadratic: 1e-6, ..ranged };
+        let clamped = Attenuation { clamp: true, ..ranged };
+        let tiny = Attenuation { range: 1e-12, ..ranged };
+        for other in [
+            Light { spot: cone, ..lamp.clone() },
+            Light { ambient: Vec3::X, ..lamp.clone() },
+            Light { specular: Vec3::ZERO, ..lamp.clone() },
+            Light { shadow: true, ..lamp.clone() },
+            Light { attenuation: linear, ..lamp.clone() },
+            Light { attenuation: faint, ..lamp.clone() },
+            Light { attenuation: clamped, ..lamp.clone() },
+            Light { attenuation: tiny, ..lamp.clone() },
+        ] {
+            assert_eq!(LightClass::of(&other), LightClass::Ranged, "{other:?}");
+        }
+        for other in [Light::point(Vec3::ONE), Light { kind: LightKind::Directional, ..lamp }] {
+            assert_eq!(LightClass::of(&other), LightClass::Unbounded, "{other:?}");
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! What is kept of each light from frame to frame: what the device reads of it and how far it goes, worked out again only when its entity, the origin of frame space or the
+//! scene's settings changed. Which lights a frame has, and how they count, is decided in `lights`.
+
+use bevy_ecs::entity::EntityHashMap;
+use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::WorldId;
+use glam::DVec3;
+use lumbre_optics::{BakeMode, Light};
+use lumbre_scene::{FrameSettings, GlobalTransform, Name, light_place, shines};
+
+use super::light_reach::{LightClass, LightReach};
+use super::shown_light::shown_light;
+use crate::layout::{InverseSquareLightData, LightData};
+
+/// A light that shines.
+#[derive(Clone, Debug)]
+pub(super) struct LightRecord {
+    pub entity: Entity,
+    /// As frames show it.
+    pub light: Light,
+    pub place: GlobalTransform,
+    /// With the class that it has as long as numbers do not run out.
+    pub reach: LightReach,
+    /// Without what its shadow adds.
+    pub data: LightData,
+    /// Of a light of that class.
+    pub inverse_square: Option<InverseSquareLightData>,
+}
+
+impl LightRecord {
+    pub fn new(entity: Entity, light: Light, place: GlobalTransform, origin: DVec3) -> Self {
+        let class = LightClass::of(&light);
+        let inverse_square =
+            (class == LightClass::InverseSquare).then(|| InverseSquareLightData::new(&light, &place, origin));
+        let reach = LightReach::new(&light, &place, class);
+        Self { entity, data: LightData::new(&light, &place, origin), reach, inverse_square, light, place }
+    }
+
+    fn is_baked(&self) -> bool {
+        self.light.bake == BakeMode::Static
+    }
+}
+
+/// A light, whether it shines or not.
+#[derive(Debug, Default)]
+struct Kept {
+    /// If it shines.
+    record: Option<LightRecord>,
+    /// What is wrong with it.
+    fault: Option<String>,
+    has_place: bool,
+    /// The last update that found it.
+    seen: u64,
+}
+
+type Lights<'w, 's> = Query<'w, 's, (Entity, Ref<'static, Light>, Option<Ref<'static, GlobalTransform>>)>;
+type Names<'w, 's> = Query<'w, 's, &'static Name>;
+type Extraction = SystemState<(Lights<'static, 'static>, Names<'static, 'static>)>;
+
+/// The lights of one World at a time.
+#[derive(Default)]
+pub(crate) struct LightRecords {
+    state: Option<(WorldId, Extraction)>,
+    slots: EntityHashMap<usize>,
+    /// By slot; `None` is free.
+    kept: Vec<Option<Kept>>,
+    free: Vec<usize>,
+    /// Origin of frame space and settings that the records were made for.
+    made_for: Option<(DVec3, FrameSettings)>,
+    updates: u64,
+    /// Slots of those that shine: dynamic ones first, entities in order, so that sums are the same every time.
+    order: Vec<(bool, u32, usize)>,
+}
+
+impl LightRecords {
+    /// Brings the records up to date. Lights whose numbers are out of range are `left_out`, each with a sentence.
+    pub fn update(
+        &mut self,
+        world: &mut World,
+        origin: DVec3,
+        settings: &FrameSettings,
+        left_out: &mut Vec<String>,
+    ) {
+        if self.state.as_ref().is_none_or(|(id, _)| *id != world.id()) {
+            *self = Self { state: Some((world.id(), SystemState::new(world))), ..Self::default() };
+        }
+        self.updates += 1;
+        let remade = self.made_for.replace((origin, *settings)) != Some((origin, *settings));
+        self.order.clear();
+        let Some((id, mut state)) = self.state.take() else { return };
+        if let Ok((lights, names)) = state.get(world) {
+            for (entity, light, place) in &lights {
+                let slot = self.slot(entity);
+                let kept = self.kept[slot].get_or_insert_default();
+                let moved = place.as_ref().is_some_and(Ref::is_changed) || place.is_some() != kept.has_place;
+                // What is wrong is said by name, which may change.
+                if remade || kept.seen == 0 || moved || light.is_changed() || kept.fault.is_some() {
+                    let transform = place.as_deref();
+                    kept.has_place = transform.is_some();
+                    kept.fault = fault(&names, entity, &light, transform);
+                    let place = light_place(&light, transform).filter(|_| shines(&light, transform));
+                    let shown = || shown_light(&light, settings).into_owned();
+                    kept.record = place.map(|place| LightRecord::new(entity, shown(), place, origin));
+                }
+                kept.seen = self.updates;
+                left_out.extend(kept.fault.clone());
+                if let Some(record) = &kept.record {
+                    self.order.push((record.is_baked(), entity.index_u32(), slot));
+                }
+            }
+        }
+        self.state = Some((id, state));
+        self.order.sort_unstable();
+        self.release();
+    }
+
+    /// Lights that shine, dynamic ones or those that are baked, entities in order.
+    pub(super) fn shining(&self, baked: bool) -> impl Iterator<Item = &LightRecord> {
+        let begin = if baked { self.order.partition_point(|(baked, ..)| !baked) } else { 0 };
+        let of_kind = self.order[begin..].iter().take_while(move |(of, ..)| *of == baked);
+        of_kind.filter_map(|(_, _, slot)| self.kept[*slot].as_ref()?.record.as_ref())
+    }
+
+    /// How many shine, and how many do not.
+    pub fn counts(&self) -> (usize, usize) {
+        (self.order.len(), self.slots.len() - self.order.len())
+    }
+
+    fn slot(&mut self, entity: Entity) -> usize {
+        *self.slots.entry(entity).or_insert_with(|| {
+            self.free.pop().unwrap_or_else(|| {
+                self.kept.push(None);
+                self.kept.len() - 1
+            })
+        })
+    }
+
+    /// Frees the slots of entities that are gone.
+    fn release(&mut self) {
+        let (kept, free, updates) = (&mut self.kept, &mut self.free, self.updates);
+        // All that were found are alive.
+        if kept.iter().flatten().all(|kept| kept.seen == updates) {
+            return;
+        }
+        self.slots.retain(|_, slot| {
+            let alive = kept[*slot].as_ref().is_some_and(|kept| kept.seen == updates);
+            if !alive {
+                kept[*slot] = None;
+                free.push(*slot);
+            }
+            alive
+        });
+    }
+}
+
+/// What is wrong with a light that is on, by name; nothing as a rule.
+fn fault(
+    names: &Names<'_, '_>,
+    entity: Entity,
+    light: &Light,
+    place: Option<&GlobalTransform>,
+) -> Option<String> {
+    let place = light_place(light, place);
+    if !light.enabled || place.is_some_and(|place| place.0.is_finite()) && light.validate("").is_ok() {
+        return None;
+    }
+    let name = names.get(entity).map_or_else(|_| entity.to_string(), ToString::to_string);
+    Some(match (light.validate(&name), place) {
+        (Err(error), _) => error.to_string(),
+        (Ok(()), None) => {
+            format!("light \"{name}\": it has no Transform, so that it stands nowhere; spawn it with one")
+        }
+        (Ok(()), Some(_)) => format!("light \"{name}\": its transform is not finite"),
+    })
+}
