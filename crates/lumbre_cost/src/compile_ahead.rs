@@ -31,10 +31,10 @@ impl Begun {
     }
 }
 
-/// A device for it, if the adapter compiles when it draws and there are two cores at least.
+/// A device for it, if the adapter compiles when it draws, there are two cores at least, and devices do not take turns, as those of OpenGL do.
 pub fn device_ahead(gpu: &Gpu) -> Option<Gpu> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    if !gpu.is_software() || cores < 2 {
+    if !gpu.is_software() || !gpu.has_independent_devices() || cores < 2 {
         return None;
     }
     // Without it shaders are compiled when they are needed.
@@ -45,7 +45,7 @@ pub fn device_ahead(gpu: &Gpu) -> Option<Gpu> {
 pub fn compile_ahead(gpu: &Gpu, size: (u32, u32), frames: &[Frame], begun: &Begun, end: &AtomicBool) {
     if let Err(error) = draw(gpu, size, frames, begun, end) {
         // Whoever draws the frame for its own sake meets it, too, and says so.
-        tracing::debug!("a frame was not drawn ahead: {error}");
+        tracing::debug!("nothing more is compiled ahead: {error}");
     }
 }
 

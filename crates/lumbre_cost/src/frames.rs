@@ -95,6 +95,15 @@ pub fn draw_frames(
     Ok(drawn)
 }
 
+/// Sets it when it goes, whichever way.
+struct EndsWhenDropped<'a>(&'a AtomicBool);
+
+impl Drop for EndsWhenDropped<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Does something while shaders of the frames are compiled ahead, if a device is there to do that on; that has ended when this returns.
 fn while_compiling_ahead<T>(
     conditions: &Conditions<'_>,
@@ -104,12 +113,17 @@ fn while_compiling_ahead<T>(
     let (begun, end) = (Begun::none_of(frames.len()), AtomicBool::new(false));
     let size = conditions.size;
     std::thread::scope(|scope| {
-        if let Some(gpu) = conditions.ahead.filter(|_| frames.len() > 1) {
+        let ahead = conditions.ahead.filter(|_| frames.len() > 1).map(|gpu| {
             let (begun, end) = (&begun, &end);
-            scope.spawn(move || compile_ahead(gpu, size, frames, begun, end));
-        }
+            scope.spawn(move || compile_ahead(gpu, size, frames, begun, end))
+        });
+        let ending = EndsWhenDropped(&end);
         let drawn = draw(&begun);
-        end.store(true, Ordering::Relaxed);
+        drop(ending);
+        if ahead.is_some_and(|ahead| ahead.join().is_err()) {
+            // The panic has said why. Shaders are compiled when they are needed.
+            tracing::debug!("what compiled ahead has panicked");
+        }
         drawn
     })
 }

@@ -20,7 +20,7 @@ pub struct Rounds {
 /// A piece of work, which answers with its milliseconds.
 pub type Work<'a> = Box<dyn FnMut() -> Result<f64, CostError> + 'a>;
 
-/// Does the work as often as it takes until it is as quick as it will be. `go_on` is asked before each piece.
+/// Does the work as often as [`Rounds::warm_up`] says, untimed. `go_on` is asked before each piece.
 ///
 /// # Errors
 /// The first error of the work or of `go_on`.

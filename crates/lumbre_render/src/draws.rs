@@ -81,7 +81,7 @@ pub(crate) struct VisibleObjects<'a> {
     pipelines: Vec<ChosenPipelines>,
 }
 
-/// Of thousands of objects, which are drawn in another order than they stand in: the less there is of each the better.
+/// An object in view. Kept small, as thousands are read in the order of their draws: what a batch asks of the object stands beside it.
 struct Visible<'a> {
     pass: LitPass,
     slot: u32,

@@ -144,6 +144,11 @@ impl Gpu {
         Self::from_adapter(instance, adapter)
     }
 
+    /// Whether several devices of the adapter may work at once. Those of OpenGL take turns, and give up when one of them takes seconds.
+    pub fn has_independent_devices(&self) -> bool {
+        self.adapter.get_info().backend != wgpu::Backend::Gl
+    }
+
     /// Another device of the same adapter.
     ///
     /// # Errors

@@ -14,8 +14,8 @@ const TILE_SIDES: [u32; 7] = [32, 64, 128, 256, 512, 1024, 16384];
 /// Most clusters, and most entries of lists, as far as they can be told beforehand, before a coarser grid is taken.
 const MANY_CLUSTERS: f64 = 131_072.0;
 const MANY_ENTRIES: f64 = 3e6;
-/// Lights from which the entries are told beforehand.
-const TOLD_FROM: usize = 1000;
+/// Lights from which the entries are estimated beforehand, where there are more.
+const SAMPLED_LIGHTS: usize = 1000;
 /// Most slices of depth.
 const MOST_SLICES: f64 = 96.0;
 /// By how much of itself a light's range grows, and by how much of the distance from the origin of frame space: the roundings of
@@ -171,11 +171,20 @@ impl LightClusters {
         })
     }
 
-    /// Clusters of the boxes around all balls, told from a thousand of them.
+    /// Clusters of the boxes around all balls, estimated from a thousand of them where there are more.
     fn cells(&self, axes: &[Axis; 2], depths: &Depths) -> f64 {
-        let every = (self.spheres.len() / TOLD_FROM).max(1);
+        let count = self.spheres.len();
+        let sampled = count.min(SAMPLED_LIGHTS);
+        // By the golden ratio: evenly over all, and out of step with lamps that come in groups.
+        let sample = (0..sampled).map(|number| match sampled < count {
+            true => {
+                let scattered = (number as u64).wrapping_mul(0x9E37_79B9) & 0xffff_ffff;
+                &self.spheres[((scattered * count as u64) >> 32) as usize]
+            }
+            false => &self.spheres[number],
+        });
         let length = |span: Option<[u32; 2]>| span.map_or(0.0, |[first, last]| f64::from(last - first + 1));
-        let cells = self.spheres.iter().step_by(every).map(|sphere| {
+        let cells = sample.map(|sphere| {
             let slices = length(depths.span(sphere.depth, sphere.radius));
             if slices == 0.0 {
                 return 0.0;
@@ -183,7 +192,7 @@ impl LightClusters {
             let columns = length(axes[0].span(sphere.x, sphere.depth, sphere.radius));
             slices * columns * length(axes[1].span(sphere.y, sphere.depth, sphere.radius))
         });
-        cells.sum::<f64>() * every as f64
+        cells.sum::<f64>() * count as f64 / sampled.max(1) as f64
     }
 
     /// Appends the lists of one class, whose offsets stand at `table`: in pairs, or one by one with `any` of the class behind them, for a list that is empty.
@@ -573,6 +582,19 @@ mod tests {
             clusters.tile_side > 32 && clusters.entries as f64 <= 2.0 * MANY_ENTRIES,
             "{}",
             clusters.entries
+        );
+        // One large lamp for seven small ones, in turn: the estimate sees both.
+        let mixed = |large: f64, small: f64| -> Vec<BoundingSphere> {
+            let radius = |light: u32| if light % 8 == 0 { large } else { small };
+            (0..16_000).map(|light| BoundingSphere { radius: radius(light), ..sphere(light) }).collect()
+        };
+        clusters.build(&view, [&mixed(6.0, 6.0), &[]], 0);
+        let coarse = clusters.tile_side;
+        clusters.build(&view, [&mixed(6.0, 0.05), &[]], 0);
+        let few = (clusters.tile_side, clusters.entries as f64);
+        assert!(
+            few.0 < coarse && few.1 > 0.1 * MANY_ENTRIES && few.1 < 2.0 * MANY_ENTRIES,
+            "{few:?}, {coarse}"
         );
         // None at all: every list is empty, and there is a word to read.
         clusters.build(&view, [&[], &[]], 0);

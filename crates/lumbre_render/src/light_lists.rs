@@ -132,7 +132,7 @@ impl<'a> ObjectLightLists<'a> {
         Err(RenderError::BufferTooLarge { what, bytes, limit })
     }
 
-    /// Lights per object, on average over the calls of `reaching`.
+    /// Lights per object, on average over all objects that were asked of.
     pub fn mean_length(&self) -> f32 {
         self.lengths.0 as f32 / self.lengths.1.max(1) as f32
     }

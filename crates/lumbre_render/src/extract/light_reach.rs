@@ -20,7 +20,7 @@ pub(crate) enum LightClass {
 }
 
 impl LightClass {
-    /// Of a light that is not ambient.
+    /// Of a light; an ambient one has no range either.
     pub(super) fn of(light: &Light) -> Self {
         let Attenuation { range, constant, linear, quadratic, clamp } = light.attenuation;
         if light.kind != LightKind::Point || !range.is_finite() {

@@ -7,7 +7,7 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
 use glam::DVec3;
 use lumbre_optics::{BakeMode, Light};
-use lumbre_scene::{FrameSettings, GlobalTransform, Name, light_place, shines};
+use lumbre_scene::{FrameSettings, GlobalTransform, Name, ShadowFilter, light_place, shines};
 
 use super::light_reach::{LightClass, LightReach};
 use super::shown_light::shown_light;
@@ -66,8 +66,8 @@ pub(crate) struct LightRecords {
     /// By slot; `None` is free.
     kept: Vec<Option<Kept>>,
     free: Vec<usize>,
-    /// Origin of frame space and settings that the records were made for.
-    made_for: Option<(DVec3, FrameSettings)>,
+    /// Origin of frame space, and what settings say of lights, that the records were made for.
+    made_for: Option<(DVec3, f32, ShadowFilter)>,
     updates: u64,
     /// Slots of those that shine: dynamic ones first, entities in order, so that sums are the same every time.
     order: Vec<(bool, u32, usize)>,
@@ -86,7 +86,8 @@ impl LightRecords {
             *self = Self { state: Some((world.id(), SystemState::new(world))), ..Self::default() };
         }
         self.updates += 1;
-        let remade = self.made_for.replace((origin, *settings)) != Some((origin, *settings));
+        let made_for = Some((origin, settings.light_threshold, settings.shadow_filter));
+        let remade = std::mem::replace(&mut self.made_for, made_for) != made_for;
         self.order.clear();
         let Some((id, mut state)) = self.state.take() else { return };
         if let Ok((lights, names)) = state.get(world) {

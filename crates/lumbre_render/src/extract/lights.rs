@@ -247,9 +247,12 @@ impl KnownLights<'_> {
         if record.light.kind == LightKind::Ambient {
             return Some(Cow::Borrowed(record));
         }
-        let plain = Light { shadow: false, ..record.light.clone() };
-        let plain = LightRecord::new(record.entity, plain, record.place, origin);
-        [Cow::Borrowed(record), Cow::Owned(plain)].into_iter().find(|record| {
+        let without_shadow = || {
+            let light = Light { shadow: false, ..record.light.clone() };
+            Cow::Owned(LightRecord::new(record.entity, light, record.place, origin))
+        };
+        let plain = std::iter::once_with(without_shadow).filter(|_| record.light.shadow);
+        std::iter::once(Cow::Borrowed(record)).chain(plain).find(|record| {
             let light = &record.light;
             let mut own = LightCounts::default();
             own.add(light);
