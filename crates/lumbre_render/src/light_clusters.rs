@@ -585,7 +585,7 @@ mod tests {
         );
         // One large lamp for seven small ones, in turn: the estimate sees both.
         let mixed = |large: f64, small: f64| -> Vec<BoundingSphere> {
-            let radius = |light: u32| if light % 8 == 0 { large } else { small };
+            let radius = |light: u32| if light.is_multiple_of(8) { large } else { small };
             (0..16_000).map(|light| BoundingSphere { radius: radius(light), ..sphere(light) }).collect()
         };
         clusters.build(&view, [&mixed(6.0, 6.0), &[]], 0);
