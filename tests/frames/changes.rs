@@ -7,7 +7,10 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_optics::{Attenuation, BakeMode, Light, LightKind, Material, Shading};
 use lumbre_render::FrameReport;
-use lumbre_scene::{Camera, FrameSettings, Hidden, MaterialTextures, Mesh, SceneSettings, Transform};
+use lumbre_scene::{
+    Camera, FrameSettings, GlobalTransform, Hidden, MaterialTextures, Mesh, Projection, SceneSettings,
+    Transform,
+};
 use lumbre_tests::panes::{image, sharp};
 
 use crate::adapter::{Canvas, draw, linear};
@@ -204,7 +207,7 @@ fn lights_that_come_and_go_and_change() {
     let mut scene = scene();
     let ranged = |range| Attenuation { range, ..Attenuation::INVERSE_SQUARE };
     type Step = fn(&mut World, Entity);
-    let steps: [(&str, Step); 12] = [
+    let steps: [(&str, Step); 16] = [
         ("moved", |world, light| world.get_mut::<Transform>(light).unwrap().translation.x += 0.7),
         ("of another colour", |world, light| world.get_mut::<Light>(light).unwrap().diffuse = Vec3::X),
         ("off", |world, light| world.get_mut::<Light>(light).unwrap().enabled = false),
@@ -216,6 +219,14 @@ fn lights_that_come_and_go_and_change() {
         ("of another kind", |world, light| {
             world.get_mut::<Light>(light).unwrap().kind = LightKind::Directional
         }),
+        ("nowhere", |world, light| {
+            world.entity_mut(light).remove::<(Transform, GlobalTransform)>();
+        }),
+        ("somewhere", |world, light| {
+            world.entity_mut(light).insert(Transform::from_xyz(0.0, 1.0, 2.0));
+        }),
+        ("not finite", |world, light| world.get_mut::<Transform>(light).unwrap().translation.x = f64::NAN),
+        ("finite", |world, light| world.get_mut::<Transform>(light).unwrap().translation.x = 0.5),
         ("no light", |world, light| {
             world.entity_mut(light).remove::<Light>();
         }),
@@ -234,7 +245,8 @@ fn lights_that_come_and_go_and_change() {
         let (fresh, of_fresh) = draw(&mut scene.world, SIZE, SIZE, &linear());
         assert!(kept == fresh, "{name}");
         assert_eq!(report.left_out, of_fresh.left_out, "{name}");
-        assert_eq!(report.left_out.len(), usize::from(name == "out of range"), "{name}");
+        let at_fault = ["out of range", "nowhere", "not finite"].contains(&name);
+        assert_eq!(report.left_out.len(), usize::from(at_fault), "{name}");
     }
     // Settings reach lights that nobody has touched, and three with a range are found by clusters.
     for light in [0, 1, 3] {
@@ -247,6 +259,15 @@ fn lights_that_come_and_go_and_change() {
         let (fresh, _) = draw(&mut scene.world, SIZE, SIZE, &linear());
         assert!(kept == fresh, "a threshold of {light_threshold}");
     }
+    // So far away that frame space has its origin at the camera.
+    let camera = scene.world.query_filtered::<Entity, With<Camera>>().single(&scene.world).unwrap();
+    *scene.world.get_mut::<Transform>(camera).unwrap() =
+        Transform::from_xyz(50.0, 40.0, 700.0).looking_at(DVec3::ZERO, DVec3::Y);
+    scene.world.get_mut::<Camera>(camera).unwrap().projection =
+        Projection::Perspective { vertical_fov: 0.007, aspect: None, near: 1.0, far: None };
+    let (kept, _) = scene.canvas.draw(&mut scene.world, &linear());
+    let (fresh, _) = draw(&mut scene.world, SIZE, SIZE, &linear());
+    assert!(kept == fresh && kept.iter().any(|pixel| pixel.x > 0.2), "from far away");
 }
 
 #[test]

@@ -81,7 +81,33 @@ fn draw(
 
 #[cfg(test)]
 mod tests {
+    use lumbre_render::FrameOptions;
+    use lumbre_scene::update_transforms;
+
     use super::*;
+    use crate::scenes::{Air, room};
+
+    #[test]
+    fn everything_that_nobody_draws_is_drawn_until_the_end() {
+        let gpu = Gpu::headless().unwrap();
+        let frames = [Air::Clear, Air::Hazy].map(|air| {
+            let mut world = room(air);
+            update_transforms(&mut world);
+            Frame::new(world, FrameOptions::default())
+        });
+        let what_is_left = |begun: &Begun| {
+            let drawings =
+                [(0, Drawing::Picture), (0, Drawing::Timed), (1, Drawing::Picture), (1, Drawing::Timed)];
+            drawings.into_iter().filter(|(frame, drawing)| begun.begin(*frame, *drawing)).count()
+        };
+        let draw = |end: bool| {
+            let begun = Begun::none_of(2);
+            begun.begin(0, Drawing::Timed);
+            draw(&gpu, (32, 18), &frames, &begun, &AtomicBool::new(end)).unwrap();
+            what_is_left(&begun)
+        };
+        assert_eq!((draw(false), draw(true)), (0, 3));
+    }
 
     #[test]
     fn each_drawing_is_begun_once() {

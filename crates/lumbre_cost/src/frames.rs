@@ -229,11 +229,51 @@ pub fn draw_picture(
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+    use std::sync::{Arc, Mutex};
+
     use lumbre_render::Gpu;
     use lumbre_scene::update_transforms;
 
     use super::*;
+    use crate::converged::ConvergedBakes;
     use crate::scenes::{Air, room};
+
+    #[test]
+    fn what_is_compiled_ahead_changes_no_picture_and_no_count() -> Result<(), CostError> {
+        let (gpu, folder) = (Gpu::headless()?, std::env::temp_dir());
+        let other = gpu.another()?;
+        let drawn = |ahead| -> Result<Vec<DrawnFrame>, CostError> {
+            let (pictures, converged) = (RefCell::new(Renderer::new(&gpu)), ConvergedBakes::default());
+            let conditions = Conditions {
+                gpu: &gpu,
+                ahead,
+                pictures: &pictures,
+                converged: &converged,
+                quick: true,
+                counts_only: false,
+                size: (64, 36),
+                seed: 0,
+                folder: &folder,
+                files: &[],
+                listener: &|_| ControlFlow::Continue(()),
+            };
+            let world = Arc::new(Mutex::new(room(Air::Clear)));
+            let lit = FrameOptions { shadows: false, ..FrameOptions::default() };
+            let frames = vec![
+                Frame::of(&world, FrameOptions::default()).sharing("both"),
+                Frame::of(&world, lit).sharing("both"),
+                Frame::new(room(Air::Hazy), FrameOptions::default()).with_moving_lamps(),
+            ];
+            draw_frames(&conditions, frames, 0.0, [0.0, 1.0])
+        };
+        for (alone, together) in drawn(None)?.iter().zip(drawn(Some(&other))?) {
+            assert!(alone.picture.radiance == together.picture.radiance);
+            assert_eq!(alone.counts(), together.counts());
+            assert_eq!(together.times.len(), 3);
+        }
+        Ok(())
+    }
 
     /// Both clocks run over the same frames, so that what else the machine does meets both.
     #[test]

@@ -279,8 +279,11 @@ impl Draws {
         let mut draws =
             Self { outside, first_instance, depths, clustered_depths, deferred, ..Self::default() };
         // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
-        let mut order: Vec<u128> =
-            visible.iter().zip(0..).map(|(seen, index)| sort_key(seen, index)).collect();
+        let mut order: Vec<u128> = visible
+            .iter()
+            .zip(0..)
+            .map(|(seen, number)| sort_key(seen.is_deferred(), seen.pass, seen.order, number))
+            .collect();
         order.sort_unstable();
         draws.instances.reserve(visible.len());
         for key in order {
@@ -295,7 +298,7 @@ impl Draws {
     fn push(&mut self, seen: &Visible, pipelines: &ChosenPipelines, lights: &mut ObjectLightLists) {
         let instance = u32::try_from(self.instances.len()).unwrap_or(u32::MAX);
         let clustered = pipelines.lit.variant.has(Feature::Clusters);
-        let list = lights.where_clusters_have_all(clustered).unwrap_or_else(|| {
+        let list = lights.empty_if_clustered(clustered).unwrap_or_else(|| {
             let Object { entity, center, half_size, .. } = seen.object;
             lights.reaching(*entity, *center, *half_size, clustered)
         });
@@ -386,10 +389,10 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
 }
 
 /// Deferred ones first, then by pass, by order, and by number, in which it ends: what is sorted are numbers alone, as what they stand for is large.
-fn sort_key(seen: &Visible<'_>, number: u32) -> u128 {
-    let kind = u128::from(!seen.is_deferred()) << 8 | seen.pass as u128;
+fn sort_key(deferred: bool, pass: LitPass, order: f64, number: u32) -> u128 {
+    let kind = u128::from(!deferred) << 8 | pass as u128;
     // The bits of a float as a number that is greater for a greater one.
-    let bits = seen.order.to_bits();
+    let bits = order.to_bits();
     let order = if bits >> 63 == 0 { bits | 1 << 63 } else { !bits };
     kind << 96 | u128::from(order) << 32 | u128::from(number)
 }
@@ -401,5 +404,30 @@ fn order(object: &Object, eye: DVec3, pass: LitPass) -> f64 {
     match pass {
         LitPass::Transparent => -(center - object.radius).max(0.0),
         LitPass::Lightmap | LitPass::Forward | LitPass::Refraction => center + object.radius,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_sort_by_what_they_are_made_of() {
+        let orders =
+            [f64::NEG_INFINITY, -3.5, -1e-300, -0.0, 0.0, 1e-300, 2.0, 2.0 + 1e-15, f64::INFINITY, f64::NAN];
+        let mut expected = Vec::new();
+        for deferred in [true, false] {
+            for pass in LitPass::ALL {
+                for order in orders {
+                    expected.extend([0, 7, u32::MAX].map(|number| (deferred, pass, order, number)));
+                }
+            }
+        }
+        let keys: Vec<u128> = expected
+            .iter()
+            .map(|(deferred, pass, order, number)| sort_key(*deferred, *pass, *order, *number))
+            .collect();
+        assert!(keys.is_sorted_by(|a, b| a < b));
+        assert!(keys.iter().zip(&expected).all(|(key, (.., number))| *key as u32 == *number));
     }
 }

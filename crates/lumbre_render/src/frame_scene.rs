@@ -70,7 +70,7 @@ impl<'a> FrameScene<'a> {
         let clip_from_world = self.view.clip_from_frame(DVec3::ZERO);
         let (objects, meshes) = (self.objects, self.meshes);
         self.draws.instances.iter().filter_map(move |instance| {
-            let object = objects.objects.get(instance.object() as usize)?.as_ref()?;
+            let object = objects.get(instance.object() as usize)?;
             let mesh = meshes.get(object.mesh).filter(|mesh| mesh.has_positions())?;
             let world_from_mesh = object.world_from_mesh;
             let clip_from_mesh = (clip_from_world * DMat4::from(world_from_mesh)).as_mat4();
@@ -118,7 +118,7 @@ impl<'a> FrameScene<'a> {
         slot: usize,
         attributes: &[Attribute],
     ) {
-        let object = self.objects.objects.get(slot).and_then(Option::as_ref);
+        let object = self.objects.get(slot);
         let Some(mesh) = object.and_then(|object| self.meshes.get(object.mesh)) else { return };
         let slices = mesh.slices(attributes, None);
         let (Some(indices), Ok(instance)) = (slices.indices, u32::try_from(slot)) else { return };

@@ -55,8 +55,8 @@ impl<'a> ObjectLightLists<'a> {
         }
     }
 
-    /// The list of an object whose fragments have lists of their own (`clustered`), if those have every light; whatever the object is.
-    pub fn where_clusters_have_all(&mut self, clustered: bool) -> Option<InstanceData> {
+    /// The list of an object whose fragments have lists of their own (`clustered`), where it is empty because those have every light: then the object need not be looked at.
+    pub fn empty_if_clustered(&mut self, clustered: bool) -> Option<InstanceData> {
         (clustered && self.unbounded.is_empty()).then(|| {
             self.lengths.1 += 1;
             InstanceData::default()

@@ -659,7 +659,7 @@ impl Renderer {
             }
         }
         for surface in mirrors.iter().flat_map(|mirror| &mirror.mirrors) {
-            let object = self.objects.objects.get(surface.slot).and_then(Option::as_ref);
+            let object = self.objects.get(surface.slot);
             if let Some(mesh) = object.and_then(|object| self.meshes.get_mut(object.mesh)) {
                 uploads.meshes += mesh.prepare(&self.gpu, &[Attribute::Position], None);
             }
@@ -812,7 +812,7 @@ impl Renderer {
         let instances = draws.refractive.iter().flat_map(|batch| batch.instances.clone());
         let surfaces = instances.filter_map(|instance| {
             let slot = draws.instances.get(instance as usize)?.object() as usize;
-            let object = self.objects.objects.get(slot)?.as_ref()?;
+            let object = self.objects.get(slot)?;
             let refractor = object.refractor.as_ref()?;
             let flat = object.planar_mirror.is_some();
             let data = RefractorData::new(refractor, (object.radius, flat), parallel, background);

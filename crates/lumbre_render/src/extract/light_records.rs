@@ -1,7 +1,6 @@
 //! What is kept of each light from frame to frame: what the device reads of it and how far it goes, worked out again only when its entity, the origin of frame space or the
 //! scene's settings changed. Which lights a frame has, and how they count, is decided in `lights`.
 
-use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
@@ -9,6 +8,7 @@ use glam::DVec3;
 use lumbre_optics::{BakeMode, Light};
 use lumbre_scene::{FrameSettings, GlobalTransform, Name, ShadowFilter, light_place, shines};
 
+use super::entity_slots::EntitySlots;
 use super::light_reach::{LightClass, LightReach};
 use super::shown_light::shown_light;
 use crate::layout::{InverseSquareLightData, LightData};
@@ -62,10 +62,7 @@ type Extraction = SystemState<(Lights<'static, 'static>, Names<'static, 'static>
 #[derive(Default)]
 pub(crate) struct LightRecords {
     state: Option<(WorldId, Extraction)>,
-    slots: EntityHashMap<usize>,
-    /// By slot; `None` is free.
-    kept: Vec<Option<Kept>>,
-    free: Vec<usize>,
+    kept: EntitySlots<Kept>,
     /// Origin of frame space, and what settings say of lights, that the records were made for.
     made_for: Option<(DVec3, f32, ShadowFilter)>,
     updates: u64,
@@ -92,8 +89,8 @@ impl LightRecords {
         let Some((id, mut state)) = self.state.take() else { return };
         if let Ok((lights, names)) = state.get(world) {
             for (entity, light, place) in &lights {
-                let slot = self.slot(entity);
-                let kept = self.kept[slot].get_or_insert_default();
+                let slot = self.kept.of(entity);
+                let kept = self.kept.values[slot].get_or_insert_default();
                 let moved = place.as_ref().is_some_and(Ref::is_changed) || place.is_some() != kept.has_place;
                 // What is wrong is said by name, which may change.
                 if remade || kept.seen == 0 || moved || light.is_changed() || kept.fault.is_some() {
@@ -113,45 +110,20 @@ impl LightRecords {
         }
         self.state = Some((id, state));
         self.order.sort_unstable();
-        self.release();
+        let updates = self.updates;
+        self.kept.release(|kept| kept.seen == updates, drop);
     }
 
     /// Lights that shine, dynamic ones or those that are baked, entities in order.
     pub(super) fn shining(&self, baked: bool) -> impl Iterator<Item = &LightRecord> {
         let begin = if baked { self.order.partition_point(|(baked, ..)| !baked) } else { 0 };
         let of_kind = self.order[begin..].iter().take_while(move |(of, ..)| *of == baked);
-        of_kind.filter_map(|(_, _, slot)| self.kept[*slot].as_ref()?.record.as_ref())
+        of_kind.filter_map(|(_, _, slot)| self.kept.values[*slot].as_ref()?.record.as_ref())
     }
 
     /// How many shine, and how many do not.
     pub fn counts(&self) -> (usize, usize) {
-        (self.order.len(), self.slots.len() - self.order.len())
-    }
-
-    fn slot(&mut self, entity: Entity) -> usize {
-        *self.slots.entry(entity).or_insert_with(|| {
-            self.free.pop().unwrap_or_else(|| {
-                self.kept.push(None);
-                self.kept.len() - 1
-            })
-        })
-    }
-
-    /// Frees the slots of entities that are gone.
-    fn release(&mut self) {
-        let (kept, free, updates) = (&mut self.kept, &mut self.free, self.updates);
-        // All that were found are alive.
-        if kept.iter().flatten().all(|kept| kept.seen == updates) {
-            return;
-        }
-        self.slots.retain(|_, slot| {
-            let alive = kept[*slot].as_ref().is_some_and(|kept| kept.seen == updates);
-            if !alive {
-                kept[*slot] = None;
-                free.push(*slot);
-            }
-            alive
-        });
+        (self.order.len(), self.kept.len() - self.order.len())
     }
 }
 

@@ -3,6 +3,7 @@
 mod camera;
 mod emissive_faces;
 mod emitters;
+mod entity_slots;
 mod light_reach;
 mod light_records;
 mod lights;

@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::WorldId;
@@ -15,6 +14,7 @@ use lumbre_scene::{
     Mesh, Name, ObjectCensus, ObjectTraits, StaticObject, planar_mirror, with_descendants,
 };
 
+use super::entity_slots::EntitySlots;
 use super::planar_mirror::PlanarMirror;
 use super::refractor::Refractor;
 use crate::growable_buffer::GrowableBuffer;
@@ -112,10 +112,7 @@ type Extraction = SystemState<(
 /// All objects, and their GPU buffers.
 pub(crate) struct Objects {
     state: Option<(WorldId, Extraction)>,
-    slots: EntityHashMap<usize>,
-    /// By slot; `None` is free.
-    pub objects: Vec<Option<Object>>,
-    free: Vec<usize>,
+    slots: EntitySlots<Object>,
     /// Of the objects that can be drawn.
     pub census: ObjectCensus,
     pub transforms: GrowableBuffer<ObjectData>,
@@ -134,9 +131,7 @@ impl Objects {
     pub fn new() -> Self {
         Self {
             state: None,
-            slots: EntityHashMap::default(),
-            objects: Vec::new(),
-            free: Vec::new(),
+            slots: EntitySlots::default(),
             census: ObjectCensus::default(),
             transforms: GrowableBuffer::table_and_buffer("objects"),
             materials: GrowableBuffer::table("materials"),
@@ -197,7 +192,8 @@ impl Objects {
                     left_out.push(named(entity, "its transform is not finite"));
                     continue;
                 }
-                let (slot, new) = self.slot(entity);
+                let slot = self.slots.of(entity);
+                let new = self.slots.values[slot].is_none();
                 let remeshed = new || mesh.is_changed();
                 let transformed = new || moved || transform.is_changed();
                 let maps_changed = maps.as_ref().is_some_and(Ref::is_changed);
@@ -216,7 +212,7 @@ impl Objects {
                         0 => TextureCoordinateSet::First,
                         _ => TextureCoordinateSet::Second,
                     });
-                let object = self.objects[slot].get_or_insert_with(|| {
+                let object = self.slots.values[slot].get_or_insert_with(|| {
                     Object::new(
                         entity,
                         meshes.insert(&mesh.0, normal_map),
@@ -276,48 +272,27 @@ impl Objects {
         Ok(())
     }
 
-    fn slot(&mut self, entity: Entity) -> (usize, bool) {
-        if let Some(&slot) = self.slots.get(&entity) {
-            return (slot, false);
-        }
-        let slot = self.free.pop().unwrap_or_else(|| {
-            self.objects.push(None);
-            self.objects.len() - 1
-        });
-        self.slots.insert(entity, slot);
-        (slot, true)
-    }
-
     /// Frees the slots of entities that are gone, and what only they used.
     fn release(&mut self, meshes: &mut MeshBuffers, textures: &mut Textures, sets: &mut TextureSets) {
-        let (frame, objects, free) = (self.frame, &mut self.objects, &mut self.free);
-        let census = &mut self.census;
-        let before = self.slots.len();
-        // As a rule all are there.
-        let gone = |slot: &Option<Object>| slot.as_ref().is_some_and(|object| object.seen != frame);
-        if objects.iter().any(gone) {
-            self.slots.retain(|_, slot| {
-                let alive = objects[*slot].as_ref().is_some_and(|object| object.seen == frame);
-                if !alive {
-                    if let Some(mut object) = objects[*slot].take() {
-                        object.leave(census);
-                    }
-                    free.push(*slot);
-                }
-                alive
-            });
-        }
-        if self.slots.len() != before || std::mem::take(&mut self.stale) {
+        let (frame, census) = (self.frame, &mut self.census);
+        let released = self.slots.release(|object| object.seen == frame, |mut object| object.leave(census));
+        if std::mem::take(&mut self.stale) || released {
             sets.sweep();
             textures.sweep();
             meshes.sweep();
         }
     }
 
+    /// What stands in a slot.
+    pub fn get(&self, slot: usize) -> Option<&Object> {
+        self.slots.values.get(slot)?.as_ref()
+    }
+
     /// Objects that can be drawn, with their slots.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Object)> {
         let drawn = |object: &&Object| object.fault.is_none();
-        self.objects
+        self.slots
+            .values
             .iter()
             .enumerate()
             .filter_map(move |(slot, object)| Some((slot, object.as_ref().filter(drawn)?)))
