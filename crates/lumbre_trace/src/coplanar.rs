@@ -14,27 +14,28 @@ const MOST_TOGETHER: usize = 8;
 /// Cosine between normals of one plane.
 const PARALLEL: f64 = 0.999_999;
 
-/// The nearest surface for which `accept` holds, or what is opaque and lies in it.
+/// The nearest surface for which `accept` holds, or an opaque one that lies in it, and its point where the ray meets it.
 pub(crate) fn nearest_surface(
     scene: &Scene,
     ray: &SpaceRay,
     farthest: f64,
     accept: impl Fn(&Crossing) -> bool,
-) -> Option<Meeting> {
+) -> Option<(Meeting, SurfacePoint)> {
     let found = scene.geometry.closest(ray, farthest, &accept)?;
-    if !scene.is_open(found.crossing.object, true) {
-        return Some(found);
-    }
     let point = SurfacePoint::new(scene, ray, &found);
+    if !scene.is_open(found.crossing.object, true) {
+        return Some((found, point));
+    }
     let place = Place::of(ray, &point);
     let opaque = scene.geometry.closest(&place.around, 2.0 * place.reach, |crossing| {
         scene.passage(crossing.object) == Passage::Closed && accept(crossing)
     });
-    let together = opaque.filter(|opaque| place.holds(scene, opaque));
-    Some(together.map_or(found, |opaque| {
-        let distance = (point.distance - place.reach + opaque.distance).max(0.0);
-        Meeting { distance, ..opaque }
-    }))
+    let Some(opaque) = opaque.filter(|opaque| place.holds(scene, opaque)) else {
+        return Some((found, point));
+    };
+    let distance = (point.distance - place.reach + opaque.distance).max(0.0);
+    let meeting = Meeting { distance, ..opaque };
+    Some((meeting, SurfacePoint::new(scene, ray, &meeting)))
 }
 
 /// The other solids whose surface lies where one is met, each with the side that is met and its largest coordinate: glass that touches glass

@@ -90,6 +90,5 @@ impl FirstHits {
 fn first_point(view: &View, place: DVec2) -> Option<SurfacePoint> {
     let (camera, scene) = (view.camera.through(place), &view.scene);
     let seen = |crossing: &Crossing| scene.is_seen(crossing);
-    let meeting = nearest_surface(scene, &camera.ray, camera.farthest, seen)?;
-    Some(SurfacePoint::new(scene, &camera.ray, &meeting))
+    nearest_surface(scene, &camera.ray, camera.farthest, seen).map(|(_, point)| point)
 }

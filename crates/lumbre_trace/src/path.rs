@@ -5,7 +5,7 @@
 //! What no path finds: lamps without a size, and those of a size, through glass that refracts. Such light is a caustic of a point, and needs
 //! rays from the lamp. Emissive triangles and the sky are found through glass.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use lumbre_optics::{apply_fog, fog_weight};
 
 use crate::camera_ray::{CameraRay, CameraRays};
@@ -46,6 +46,8 @@ struct Walk {
     farthest: f64,
     media: MediumStack,
     throughput: DVec3,
+    /// The part of `throughput` that is the change of solid angles by refraction, and goes when the path leaves the glass.
+    squeezed: f64,
     /// What it brings.
     radiance: DVec3,
     /// What that is the sum of, if it is wanted.
@@ -83,6 +85,7 @@ impl<'a> Paths<'a> {
             farthest: camera.farthest,
             media,
             throughput: DVec3::ONE,
+            squeezed: 1.0,
             radiance: DVec3::ZERO,
             terms,
             last: None,
@@ -113,11 +116,10 @@ impl<'a> Paths<'a> {
         let found = nearest_surface(scene, &walk.ray, walk.farthest, |crossing| {
             if looks { scene.is_seen(crossing) } else { scene.blocks(crossing) }
         });
-        let Some(meeting) = found else {
+        let Some((meeting, point)) = found else {
             walk.escapes(scene);
             return Next::Ends;
         };
-        let point = SurfacePoint::new(scene, &walk.ray, &meeting);
         let object = &scene.objects[point.object];
         walk.throughput *= walk.media.transmittance(point.distance);
         let since = walk.last.map_or(0.0, |(_, before)| before) + point.distance;
@@ -203,7 +205,9 @@ impl<'a> Paths<'a> {
                     return walk.goes_straight(point, since);
                 }
                 // Radiance is squeezed with the solid angle.
-                walk.throughput /= division.eta * division.eta;
+                let squeezed = 1.0 / (division.eta * division.eta);
+                walk.throughput *= squeezed;
+                walk.squeezed *= squeezed;
                 walk.media = division.behind.clone();
                 walk.turns(division.transmitted_ray(point), None, numbers)
             };
@@ -228,7 +232,8 @@ impl<'a> Paths<'a> {
         last: bool,
         numbers: &mut Numbers,
     ) {
-        let (choice, place) = (numbers.next(), numbers.pair());
+        let (choice, place) =
+            if self.scene.lights.is_empty() { (0.0, DVec2::ZERO) } else { (numbers.next(), numbers.pair()) };
         if let Some(lamp) = self.lights.lamp(self.scene, point, choice, place) {
             let reflected = lobes.reflected(&lamp.light) / lamp.chance;
             let bulbs = &self.scene.lights[lamp.number].bulbs;
@@ -316,12 +321,53 @@ impl Walk {
             return Next::Ends;
         }
         if self.reflections > SAFE_DEPTH {
-            let chance = self.throughput.max_element().min(LIKELIEST);
+            // By the power that it carries: radiance in glass is squeezed, and a path is worth no less there.
+            let chance = (self.throughput.max_element() / self.squeezed).min(LIKELIEST);
             if numbers.next() >= chance {
                 return Next::Ends;
             }
             self.throughput /= chance;
         }
         Next::Goes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A path in glass that has lost no power goes on as likely as one outside, though radiance is less there.
+    #[test]
+    fn chance_ends_paths_by_their_power_whatever_they_are_in() {
+        let goes_on = |throughput: f64, squeezed: f64| {
+            let ray = SpaceRay::new(DVec3::ZERO, DVec3::Z);
+            let count = 4096;
+            let ends = |sample| {
+                let mut walk = Walk {
+                    ray,
+                    farthest: f64::INFINITY,
+                    media: MediumStack::default(),
+                    throughput: DVec3::splat(throughput),
+                    squeezed,
+                    radiance: DVec3::ZERO,
+                    terms: LightTerms::new(false),
+                    last: None,
+                    reflections: SAFE_DEPTH,
+                    rays: 0,
+                    first: false,
+                };
+                let next = walk.turns(ray, None, &mut Numbers::new(1, 0, sample));
+                assert!(next == Next::Ends || walk.throughput.x >= throughput);
+                next == Next::Goes
+            };
+            (0..count).filter(|&sample| ends(sample)).count() as f64 / f64::from(count)
+        };
+        let squeezed = 1.0 / (1.5 * 1.5);
+        for (power, chance) in [(1.0, LIKELIEST), (0.5, 0.5), (0.1, 0.1)] {
+            for squeezed in [1.0, squeezed, 1.0 / squeezed] {
+                let found = goes_on(power * squeezed, squeezed);
+                assert!((found - chance).abs() < 2e-3, "{power} in {squeezed}: {found} for {chance}");
+            }
+        }
     }
 }

@@ -107,7 +107,7 @@ impl RayTree<'_> {
         let own_terms = seen.terms.len();
         let scene = self.scene;
         let found = nearest_surface(scene, &twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
-        let Some(meeting) = found else {
+        let Some((_, point)) = found else {
             // Nothing absorbs on the way to infinity but what has no end, and that leaves nothing.
             let background = scene.settings.shown_background().as_dvec3();
             let radiance = match twig.media.transmittance(f64::INFINITY) {
@@ -122,7 +122,6 @@ impl RayTree<'_> {
             seen.terms.add(Source::Background, twig.turns, radiance);
             return radiance;
         };
-        let point = SurfacePoint::new(scene, &twig.ray, &meeting);
         let object = &scene.objects[point.object];
         let clear = twig.media.transmittance(point.distance);
         if let Some(branch) = record.as_deref_mut() {

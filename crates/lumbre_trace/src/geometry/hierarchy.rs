@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use lumbre_rays::{Bvh, Ray};
 use lumbre_scene::Quadric;
 
+use super::bounding_ball::BoundingBall;
 use super::quadric::{QuadricHit, QuadricSurface};
 use super::ray::SpaceRay;
 
@@ -29,6 +30,8 @@ struct Facet {
 struct PlacedQuadric {
     object: u32,
     surface: QuadricSurface,
+    /// A ball in the tracer's space that holds all of it, if it has an end.
+    ball: Option<BoundingBall>,
     /// From the tracer's space to its own.
     to_own: DAffine3,
     from_own: DAffine3,
@@ -80,6 +83,7 @@ impl Geometry {
         let placed = |(object, quadric, place, normals): &(usize, Quadric, DAffine3, DMat3)| PlacedQuadric {
             object: *object as u32,
             surface: QuadricSurface::new(quadric),
+            ball: BoundingBall::of(quadric, place),
             to_own: place.inverse(),
             from_own: *place,
             normals: *normals,
@@ -186,8 +190,12 @@ fn short_of_end(ray: &SpaceRay, distance: f64) -> Ray {
 
 impl PlacedQuadric {
     fn closest(&self, ray: &SpaceRay, farthest: f64, accept: &impl Fn(&Crossing) -> bool) -> Option<Meeting> {
+        let origin = ray.exact_origin();
+        if self.ball.is_some_and(|ball| ball.is_missed(origin, ray.direction, farthest)) {
+            return None;
+        }
         // Distances are in units of the direction, which is not made unit, so that they are the same in both spaces.
-        let origin = self.to_own.transform_point3(ray.exact_origin());
+        let origin = self.to_own.transform_point3(origin);
         let direction = self.to_own.transform_vector3(ray.direction);
         let crossing = |hit: &QuadricHit| {
             let normal = (self.normals * hit.normal).normalize_or_zero();

@@ -89,16 +89,25 @@ impl QuadricSurface {
         if !self.may_meet(origin, direction, farthest) {
             return None;
         }
-        let on_side = self.roots(origin, direction).into_iter().flatten();
-        let on_side = on_side.filter(|(_, point)| self.holds(*point));
-        let on_side =
-            on_side.map(|(distance, point)| QuadricHit { distance, point, normal: self.gradient(point) });
+        let in_reach = |distance: f64| (0.0..=farthest).contains(&distance);
         let on_caps = self.caps.iter().filter_map(|cap| cap.meet(origin, direction, self.bounds));
-        on_side
-            .chain(on_caps)
-            .filter(|hit| (0.0..=farthest).contains(&hit.distance) && hit.normal != DVec3::ZERO)
-            .filter(|hit| accept(hit))
-            .min_by(|a, b| a.distance.total_cmp(&b.distance))
+        let on_caps = on_caps.filter(|hit| in_reach(hit.distance) && accept(hit));
+        let nearest = on_caps.min_by(|a, b| a.distance.total_cmp(&b.distance));
+        let ordered = match self.roots(origin, direction) {
+            [Some(one), Some(other)] if other.0 < one.0 => [Some(other), Some(one)],
+            roots => roots,
+        };
+        for (distance, point) in ordered.into_iter().flatten().filter(|(distance, _)| in_reach(*distance)) {
+            if nearest.is_some_and(|nearest| nearest.distance <= distance) {
+                break;
+            }
+            let point = self.onto_surface(point);
+            let hit = QuadricHit { distance, point, normal: self.gradient(point) };
+            if self.holds(point) && hit.normal != DVec3::ZERO && accept(&hit) {
+                return Some(hit);
+            }
+        }
+        nearest
     }
 
     fn value(&self, point: DVec3) -> f64 {
@@ -109,7 +118,7 @@ impl QuadricSurface {
         2.0 * (self.second * point) + self.first
     }
 
-    /// Distances along the ray of the two points of the equation, each with its point.
+    /// Distances along the ray of the two points of the equation, in no order, each with its point to within rounding.
     fn roots(&self, origin: DVec3, direction: DVec3) -> [Option<(f64, DVec3)>; 2] {
         let squared = direction.length_squared();
         if !(squared > 0.0 && squared.is_finite() && origin.is_finite()) {
@@ -134,9 +143,8 @@ impl QuadricSurface {
         }
         let q = -0.5 * (b + discriminant.sqrt().copysign(b));
         let root = |step: f64| {
-            let point = start + direction * step;
             let distance = moved + step;
-            distance.is_finite().then(|| (distance, self.onto_surface(point)))
+            distance.is_finite().then(|| (distance, start + direction * step))
         };
         let near = if a != 0.0 { root(q / a) } else { None };
         // A double root is one point, and q is 0 only there.
