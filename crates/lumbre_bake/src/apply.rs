@@ -8,9 +8,10 @@ use lumbre_scene::{
     Children, IrradianceVolume, Lightmap, Mesh, Name, SeparateLight, Transform, update_transforms,
 };
 
-use crate::baked_scene::{BakedScene, TexelErrors};
+use crate::UnwrappedFrom;
+use crate::finish::baked_scene::BakedObject;
+use crate::finish::baked_scene::{BakedScene, TexelErrors};
 use crate::scene::{Entities, StaticScene};
-use crate::{UnwrappedFrom, baked_scene::BakedObject};
 
 /// Gives every object its map. Where there was nothing to bake, what a former bake has left goes.
 pub(crate) fn apply(world: &mut World, scene: &StaticScene, entities: &Entities, baked: &mut BakedScene) {

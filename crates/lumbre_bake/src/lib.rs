@@ -38,38 +38,44 @@
 //! # Ok::<(), lumbre_bake::BakeError>(())
 //! ```
 
+mod allocation;
 mod apply;
 mod bake;
-mod baked_scene;
 mod cancel_token;
 mod checkpoint;
 mod chunks;
 mod conjugate_gradients;
 mod content_hash;
+mod coverage;
+mod denoise;
+mod direct_light;
 mod disjoint_sets;
 mod error;
+mod final_gather;
+mod finish;
 mod memory;
 mod notes;
 mod options;
-mod pages;
 mod preparing;
 mod probes;
 mod progress;
+mod radiosity;
 mod rebake;
 mod report;
 mod sampling;
 mod scene;
+mod sources;
+mod squared_errors;
 mod texel_index;
-mod texels;
-mod transport;
 mod unwrapped_from;
+mod visibility;
 
 pub use bake::Bake;
-pub use baked_scene::{BakedMap, BakedObject, BakedScene, TexelErrors};
 pub use cancel_token::CancelToken;
 pub use checkpoint::Checkpoint;
 pub use content_hash::{ContentHash, content_hash};
 pub use error::{BakeError, CheckpointError};
+pub use finish::baked_scene::{BakedMap, BakedObject, BakedScene, TexelErrors};
 pub use options::{BakeOptions, Density, FormFactorMethod, Probes, Quality, Solver};
 pub use progress::Progress;
 pub use rebake::{Samples, SamplesError};

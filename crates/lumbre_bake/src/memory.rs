@@ -3,17 +3,17 @@
 
 use std::mem::size_of;
 
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
+use crate::denoise::lanes::BESIDE_A_ROW;
+use crate::denoise::replicates::Estimates;
 use crate::error::mebibytes;
+use crate::final_gather::gather::Gathered;
+use crate::radiosity::exchange::Resolution;
+use crate::radiosity::patches::{Patch, Patches};
 use crate::rebake::TexelSamples;
 use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
-use crate::texels::covered_texels::CoveredTexels;
-use crate::texels::footprint::{Footprint, FootprintPoint, Texel};
-use crate::texels::gather::Gathered;
-use crate::texels::lanes::BESIDE_A_ROW;
-use crate::texels::smooth::Estimates;
-use crate::transport::direct::Direct;
-use crate::transport::exchange::Resolution;
-use crate::transport::patches::{Patch, Patches};
+use crate::sources::direct::Direct;
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Of a triangle: itself, its corners for the hierarchy and with its index while it is built, two nodes of the binary tree that is built first,

@@ -1,9 +1,9 @@
 //! What a bake writes into its report on the way. Not what it computes.
 
+use crate::coverage::footprint::Texel;
+use crate::direct_light::DirectLight;
+use crate::final_gather::error_ledger::{ErrorLedger, open_sum, relative_to, root};
 use crate::progress::Watch;
-use crate::texels::direct_light::DirectLight;
-use crate::texels::error_ledger::{ErrorLedger, open_sum, relative_to, root};
-use crate::texels::footprint::Texel;
 use crate::{BakeOptions, BakeReport, ErrorAtTime};
 use glam::Vec3;
 

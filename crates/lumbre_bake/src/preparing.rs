@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use crate::progress::Watch;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, StaticScene, lay_out};
-use crate::transport::direct::{Sources, shines_inside_only};
-use crate::transport::emitters::{Emitter, coarse_textures, emitters};
+use crate::sources::emitters::{Emitter, coarse_textures, emitters};
+use crate::sources::light_sources::{Sources, shines_inside_only};
 use crate::{BakeError, BakeOptions, BakeReport};
 
 /// Lays out every object, with so many texels per canonical unit.

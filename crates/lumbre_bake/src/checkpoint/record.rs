@@ -27,9 +27,9 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::transport::direct::{Direct, Seen};
-    use crate::transport::form_factors::Cast;
-    use crate::transport::patch_index::PatchIndex;
+    use crate::radiosity::form_factors::Cast;
+    use crate::radiosity::patch_index::PatchIndex;
+    use crate::sources::direct::{Direct, Seen};
 
     #[test]
     fn what_is_written_is_read_to_the_last_bit() {

@@ -7,10 +7,13 @@ use glam::Vec3;
 use lumbre_scene::AmbientCube;
 
 use super::ProbeEffort;
+use crate::denoise::replicates::REPLICATES;
+use crate::final_gather::gather::RadianceCache;
 use crate::sampling::{Sequence, Stream, sphere_direction};
+use crate::scene::Receiver;
 use crate::scene::{BakeScene, SurfaceHit};
-use crate::texels::gather::{REPLICATES, RadianceCache};
-use crate::transport::direct::{Direct, Receiver, Sources};
+use crate::sources::direct::Direct;
+use crate::sources::light_sources::Sources;
 
 /// Normals of the sides, in the order of [`AmbientCube`].
 const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];

@@ -18,10 +18,10 @@ pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
 use crate::chunks::in_chunks_anew;
+use crate::final_gather::gather::RadianceCache;
 use crate::progress::{Stage, Watch};
 use crate::scene::{BakeScene, StaticScene};
-use crate::texels::gather::RadianceCache;
-use crate::transport::direct::Sources;
+use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, BakeReport, ProbeReport, Quality};
 
 /// A volume and where it is.

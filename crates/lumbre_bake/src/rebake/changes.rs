@@ -8,11 +8,12 @@ use glam::Vec3;
 use super::relit::shadowed;
 use super::samples::{Content, ObjectSamples, Samples, TexelSamples, fingerprint, first_triangles};
 use crate::content_hash::{ContentHash, Hashes};
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::footprint::Texel;
 use crate::sampling::hash;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject, StaticScene, density_of};
-use crate::texels::covered_texels::CoveredTexels;
-use crate::texels::footprint::Texel;
-use crate::transport::direct::{Direct, Sources};
+use crate::sources::direct::Direct;
+use crate::sources::light_sources::Sources;
 use crate::{BakeOptions, BakeReport, RebakeReport};
 
 /// More changed objects than this are as good as a new scene.

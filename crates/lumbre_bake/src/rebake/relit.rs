@@ -8,12 +8,12 @@ use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
 use super::changes::ChangedBox;
+use crate::coverage::blocks::Blocks;
+use crate::coverage::footprint::{Texel, receiver};
+use crate::coverage::tiles::positions_of;
 use crate::scene::{Canonical, PlacedLight};
-use crate::texels::blocks::Blocks;
-use crate::texels::footprint::{Texel, receiver};
-use crate::texels::tiles::positions_of;
-use crate::transport::direct::Sources;
-use crate::transport::emitters::lamps;
+use crate::sources::emitters::lamps;
+use crate::sources::light_sources::Sources;
 
 /// A ball, canonical units.
 #[derive(Clone, Copy, Debug, PartialEq)]

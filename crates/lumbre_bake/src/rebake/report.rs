@@ -1,9 +1,9 @@
 //! What was kept of a former bake, for people and programs. Not the keeping.
 
 use super::changes::Changes;
+use crate::coverage::footprint::Texel;
+use crate::final_gather::kept::Kept;
 use crate::report::{BakeReport, RebakeReport};
-use crate::texels::footprint::Texel;
-use crate::texels::kept::Kept;
 
 /// Of a bake that kept something, or tried to. `report` has the mean irradiance already.
 pub(crate) fn rebake_report(

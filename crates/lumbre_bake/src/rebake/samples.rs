@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 use super::changes::{bounds, emission, fold, layouts};
 use super::settled;
 use crate::content_hash::{ContentHash, Hashes};
+use crate::coverage::footprint::{Footprint, Texel};
+use crate::final_gather::gather::{Gathered, Weights};
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
-use crate::texels::footprint::{Footprint, Texel};
-use crate::texels::gather::{Gathered, Weights};
-use crate::transport::direct::{Direct, Sources};
+use crate::sources::direct::Direct;
+use crate::sources::light_sources::Sources;
 
 /// The samples of a finished bake, to be given to [`Bake::former`](crate::Bake::former) when the scene has changed.
 #[derive(Clone, Debug)]

@@ -3,7 +3,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::texels::gather::{Gathered, REPLICATES, Weights};
+use crate::denoise::replicates::REPLICATES;
+use crate::final_gather::gather::{Gathered, Weights};
 
 /// Of serde's `with`: the fields that are kept, in the order in which [`deserialize`] takes them.
 pub(super) fn serialize<S: Serializer>(own: &Gathered, serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,0 +1,269 @@
+//! What each texel shows of the scene: the pieces of triangles inside its square, conservatively. Points stay on their own
+//! triangle. Not whether they are hidden inside other geometry: that is `hidden`.
+
+use glam::Vec2;
+use rayon::prelude::*;
+
+use crate::scene::Receiver;
+use crate::scene::material::Side;
+use crate::scene::{BakeScene, LightmapLayout, SceneTriangle};
+use crate::texel_index::MapTexel;
+
+/// A point of a triangle, seen by a texel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FootprintPoint {
+    pub triangle: u32,
+    /// Barycentric weights of the second and third vertex.
+    pub at: (f32, f32),
+    /// In the texel's unit square.
+    pub offset: Vec2,
+}
+
+/// What a texel shows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Footprint {
+    /// All of its square lies on one triangle.
+    Whole(u32),
+    /// Evenly spread points, at least one.
+    Points(Vec<FootprintPoint>),
+    /// Only what other geometry hides.
+    Hidden,
+}
+
+/// A texel that some triangle covers.
+#[derive(Clone, Debug)]
+pub(crate) struct Texel {
+    pub index: MapTexel,
+    pub object: u32,
+    /// Column and row in its map.
+    pub x: u32,
+    pub y: u32,
+    /// One of its triangles.
+    pub triangle: u32,
+    pub footprint: Footprint,
+}
+
+/// Points along a side of a texel that several triangles share, and of one that geometry hides in part.
+const COARSE: u32 = 4;
+pub(crate) const FINE: u32 = 8;
+/// Points of a texel that several triangles fill.
+pub(crate) const GRID: usize = (COARSE * COARSE) as usize;
+
+/// The covered texels of all maps, map by map, row by row.
+pub(crate) fn footprints(scene: &BakeScene, layout: &LightmapLayout) -> Vec<Texel> {
+    let mut by_object: Vec<Vec<u32>> = vec![Vec::new(); layout.maps.len()];
+    for (index, triangle) in scene.triangles.iter().enumerate() {
+        by_object[triangle.object as usize].push(index as u32);
+    }
+    let maps: Vec<Vec<Texel>> = by_object
+        .par_iter()
+        .enumerate()
+        .map(|(object, triangles)| {
+            let map = &layout.maps[object];
+            let mut covers: Vec<(u32, u32)> = Vec::new();
+            for &index in triangles {
+                if scene.stop.is_cancelled() {
+                    return Vec::new();
+                }
+                covered_texels(&scene.triangles[index as usize], map.width, map.height, |x, y| {
+                    covers.push((y * map.width + x, index));
+                });
+            }
+            covers.sort_unstable();
+            covers
+                .par_chunk_by(|a, b| a.0 == b.0)
+                .filter_map(|chunk| {
+                    if scene.stop.is_cancelled() {
+                        return None;
+                    }
+                    let cell = chunk[0].0;
+                    let (x, y) = (cell % map.width, cell / map.width);
+                    let triangles = || chunk.iter().map(|&(_, triangle)| triangle);
+                    let footprint = footprint(scene, triangles(), x, y, COARSE)?;
+                    let triangle = match &footprint {
+                        Footprint::Points(points) => points[points.len() / 2].triangle,
+                        _ => triangles().next()?,
+                    };
+                    let index = map.texel(x, y);
+                    Some(Texel { index, object: object as u32, x, y, triangle, footprint })
+                })
+                .collect()
+        })
+        .collect();
+    maps.into_iter().flatten().collect()
+}
+
+/// What a texel shows of some triangles; `None` if nothing with area.
+pub(crate) fn footprint(
+    scene: &BakeScene,
+    triangles: impl Iterator<Item = u32> + Clone,
+    x: u32,
+    y: u32,
+    resolution: u32,
+) -> Option<Footprint> {
+    let corner = Vec2::new(x as f32, y as f32);
+    let inside = |index: u32, offset: Vec2| {
+        barycentric(&scene.triangles[index as usize], corner + offset)
+            .filter(|&(u, v)| u >= 0.0 && v >= 0.0 && u + v <= 1.0)
+    };
+    let corners = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE];
+    if resolution == COARSE
+        && let Some(whole) = triangles.clone().find(|&t| corners.iter().all(|&c| inside(t, c).is_some()))
+    {
+        return Some(Footprint::Whole(whole));
+    }
+    let mut points = Vec::new();
+    for cell in 0..resolution * resolution {
+        let offset =
+            (Vec2::new((cell % resolution) as f32, (cell / resolution) as f32) + 0.5) / resolution as f32;
+        let found = triangles.clone().find_map(|triangle| Some((triangle, inside(triangle, offset)?)));
+        if let Some((triangle, at)) = found {
+            points.push(FootprintPoint { triangle, at, offset });
+        }
+    }
+    if points.is_empty() {
+        // Less than a point of the grid: the middle of each piece.
+        for triangle in triangles {
+            if let Some(offset) = middle_of_piece(&scene.triangles[triangle as usize], corner)
+                && let Some((u, v)) = barycentric(&scene.triangles[triangle as usize], corner + offset)
+            {
+                let u = u.clamp(0.0, 1.0);
+                points.push(FootprintPoint { triangle, at: (u, v.clamp(0.0, 1.0 - u)), offset });
+            }
+        }
+    }
+    (!points.is_empty()).then_some(Footprint::Points(points))
+}
+
+/// Calls `visit` for texels whose square a triangle touches, and perhaps a few beside it.
+fn covered_texels(triangle: &SceneTriangle, width: u32, height: u32, mut visit: impl FnMut(u32, u32)) {
+    let [a, mut b, mut c] = triangle.uv;
+    let area = (b - a).perp_dot(c - a);
+    if !(area.is_finite() && area != 0.0) {
+        return;
+    }
+    if area < 0.0 {
+        (b, c) = (c, b);
+    }
+    let edges = [(a, b - a), (b, c - b), (c, a - c)];
+    let low = a.min(b).min(c).floor().max(Vec2::ZERO);
+    let high = a.max(b).max(c).ceil().min(Vec2::new(width as f32, height as f32));
+    // `as` saturates: what is negative becomes 0.
+    for y in low.y as u32..(high.y as u32).max(low.y as u32 + 1).min(height) {
+        for x in low.x as u32..(high.x as u32).max(low.x as u32 + 1).min(width) {
+            let center = Vec2::new(x as f32, y as f32) + 0.5;
+            // Half a texel's reach along each edge's normal.
+            let outside = edges.iter().any(|(start, along)| {
+                along.perp_dot(center - *start) < -0.5 * (along.x.abs() + along.y.abs())
+            });
+            if !outside {
+                visit(x, y);
+            }
+        }
+    }
+}
+
+/// Barycentric weights (second, third vertex) of a texel position; `None` where the map flattens the triangle.
+pub(crate) fn barycentric(triangle: &SceneTriangle, position: Vec2) -> Option<(f32, f32)> {
+    let [a, b, c] = triangle.uv;
+    let area = (b - a).perp_dot(c - a);
+    let (u, v) = ((position - a).perp_dot(c - a) / area, (b - a).perp_dot(position - a) / area);
+    (u.is_finite() && v.is_finite()).then_some((u, v))
+}
+
+/// The centroid of the triangle's part in a texel's square, in the square; Sutherland and Hodgman's clipping.
+fn middle_of_piece(triangle: &SceneTriangle, corner: Vec2) -> Option<Vec2> {
+    let mut polygon: Vec<Vec2> = triangle.uv.iter().map(|&uv| uv - corner).collect();
+    for (axis, sign, limit) in [(0, 1.0, 0.0), (0, -1.0, -1.0), (1, 1.0, 0.0), (1, -1.0, -1.0)] {
+        let height = |p: Vec2| sign * p[axis] - limit;
+        let mut clipped = Vec::with_capacity(polygon.len() + 1);
+        for (i, &p) in polygon.iter().enumerate() {
+            let q = polygon[(i + 1) % polygon.len()];
+            if height(p) >= 0.0 {
+                clipped.push(p);
+            }
+            if (height(p) >= 0.0) != (height(q) >= 0.0) {
+                clipped.push(p.lerp(q, height(p) / (height(p) - height(q))));
+            }
+        }
+        polygon = clipped;
+    }
+    let &first = polygon.first()?;
+    let (mut sum, mut area) = (Vec2::ZERO, 0.0);
+    for pair in polygon.windows(2).skip(1) {
+        let own = (pair[0] - first).perp_dot(pair[1] - first);
+        sum += (first + pair[0] + pair[1]) / 3.0 * own;
+        area += own;
+    }
+    let middle = sum / area;
+    middle.is_finite().then(|| middle.clamp(Vec2::ZERO, Vec2::ONE))
+}
+
+impl Texel {
+    /// The point of the footprint at a place of the unit square.
+    #[inline]
+    pub fn point(&self, scene: &BakeScene, x: f32, y: f32) -> Option<FootprintPoint> {
+        match &self.footprint {
+            Footprint::Whole(triangle) => {
+                let offset = Vec2::new(x, y);
+                let corner = Vec2::new(self.x as f32, self.y as f32);
+                let (u, v) = barycentric(&scene.triangles[*triangle as usize], corner + offset)?;
+                let u = u.clamp(0.0, 1.0);
+                Some(FootprintPoint { triangle: *triangle, at: (u, v.clamp(0.0, 1.0 - u)), offset })
+            }
+            Footprint::Points(points) => {
+                let index = ((x * points.len() as f32) as usize).min(points.len().saturating_sub(1));
+                points.get(index).copied()
+            }
+            Footprint::Hidden => None,
+        }
+    }
+
+    /// The middle of what it shows, in its unit square.
+    pub fn middle(&self) -> Vec2 {
+        match &self.footprint {
+            Footprint::Points(points) if !points.is_empty() => {
+                points.iter().map(|point| point.offset).sum::<Vec2>() / points.len() as f32
+            }
+            _ => Vec2::splat(0.5),
+        }
+    }
+
+    /// Length of its side on its surface, canonical units.
+    pub fn side(&self, scene: &BakeScene) -> f32 {
+        let triangle = &scene.triangles[self.triangle as usize];
+        let [a, b, c] = triangle.uv;
+        (2.0 * triangle.area / (b - a).perp_dot(c - a).abs()).sqrt()
+    }
+
+    /// Whether it shows nothing that light reaches.
+    pub fn is_hidden(&self) -> bool {
+        self.footprint == Footprint::Hidden
+    }
+}
+
+/// The receiver at a point of a triangle's front.
+#[inline]
+pub(crate) fn receiver(scene: &BakeScene, point: &FootprintPoint) -> Receiver {
+    let triangle = &scene.triangles[point.triangle as usize];
+    let (u, v) = point.at;
+    let mut position = triangle.position(u, v);
+    let normal = triangle.shading_normal(u, v);
+    if !triangle.flat {
+        position = on_curved_surface(triangle, position, u, v);
+    }
+    let origin = scene.off_surface(point.triangle, Side::Front, position);
+    Receiver { position, origin, geometric_normal: triangle.normal, normal }
+}
+
+/// Lifts a point of a flat triangle to the curved surface that its normals tell of, so that the facets do not shade each
+/// other (Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4).
+fn on_curved_surface(triangle: &SceneTriangle, position: glam::Vec3, u: f32, v: f32) -> glam::Vec3 {
+    let weights = [1.0 - u - v, u, v];
+    (0..3)
+        .map(|i| {
+            let (corner, normal) = (triangle.corners[i], triangle.normals[i]);
+            (position - normal * (position - corner).dot(normal).min(0.0)) * weights[i]
+        })
+        .sum()
+}

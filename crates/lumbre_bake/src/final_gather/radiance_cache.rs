@@ -1,0 +1,123 @@
+//! The light that leaves surfaces, as the gather reads it: direct light by texel, bounces by patch or, once a round has gathered them, by texel. Not where it is asked for: that is `gather`.
+
+use glam::{Vec2, Vec3};
+
+use super::texel_radiance::{GatheredLight, mean_reflectances};
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::denoise::replicates::REPLICATES;
+use crate::direct_light::DirectLight;
+use crate::progress::Watch;
+use crate::radiosity::exchange::Exchange;
+use crate::radiosity::patches::Patches;
+use crate::radiosity::sampling_guide::SamplingGuide;
+use crate::scene::material::Side;
+use crate::scene::{BakeScene, LightmapLayout};
+use crate::sources::light_sources::Sources;
+use crate::texel_index::MapTexel;
+use crate::{BakeError, BakeOptions};
+
+/// The light that leaves surfaces, as the gather reads it.
+pub(crate) struct RadianceCache<'a> {
+    pub scene: &'a BakeScene,
+    pub layout: &'a LightmapLayout,
+    pub patches: &'a Patches,
+    /// Per texel of all maps, direct irradiance (mixed lights included); NaN where there is none, and where a wall divides the texel.
+    pub direct: Vec<Vec3>,
+    /// Irradiance that a surface gets of an unhidden sky.
+    pub sky: Vec3,
+    /// Per patch, direct irradiance: where a texel has none.
+    pub patch_direct: &'a [Vec3],
+    /// Per patch, irradiance by bounces and by the sky.
+    pub patch_indirect: &'a [Vec3],
+    /// Per patch, the errors of that, with their signs: by the form factors' noise, and by the patches' size.
+    pub patch_error: &'a [Vec2],
+    /// Per patch, what is nearer to it than this gets a real bounce more, canonical units.
+    pub near: &'a [f32],
+    /// What the rounds so far have found of the bounces; nothing in the first.
+    pub gathered: GatheredLight,
+    /// Within this distance on a surface the errors of `gathered` are correlated, canonical units.
+    pub correlated: f32,
+    /// Per texel of all maps, mean reflectance, where it is not the same all over the triangle; NaN elsewhere, or empty.
+    pub reflectance: Vec<Vec3>,
+    /// Where each patch's light comes from.
+    pub guide: &'a SamplingGuide,
+    /// Samples of each replicate in the first round.
+    pub run: u32,
+}
+
+/// Radius, in texels, of the disc over which the errors that smoothing leaves are correlated: 4.1 after the first round of the demo level, 5.4 after the
+/// second.
+const CORRELATED_TEXELS: f32 = 4.5;
+
+impl<'a> RadianceCache<'a> {
+    /// As it is before the first round: direct light of texels, bounces of patches.
+    ///
+    /// # Errors
+    /// [`BakeError::Cancelled`].
+    pub fn new(
+        sources: &'a Sources<'a>,
+        texels: &CoveredTexels<'a>,
+        direct: &DirectLight,
+        exchange: &'a Exchange,
+        options: &BakeOptions,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, BakeError> {
+        let (scene, effort) = (sources.scene, options.effort());
+        let mut direct = direct.by_place(texels);
+        // One value of both sides would be read on the wrong one.
+        for texel in &texels.straddling {
+            direct[texels.list[texel.place()].index.place()] = Vec3::NAN;
+        }
+        let reflectance =
+            watch.during(0.0, || mean_reflectances(scene, texels.layout, &exchange.patches, &texels.list))?;
+        Ok(Self {
+            gathered: GatheredLight::default(),
+            correlated: CORRELATED_TEXELS * texels.side,
+            reflectance,
+            scene,
+            layout: texels.layout,
+            patches: &exchange.patches,
+            direct,
+            sky: sources.sky,
+            patch_direct: &exchange.direct,
+            patch_indirect: &exchange.indirect,
+            patch_error: &exchange.indirect_error,
+            near: &exchange.near,
+            guide: &exchange.guide,
+            run: effort.gather[0] / REPLICATES as u32,
+        })
+    }
+}
+
+impl RadianceCache<'_> {
+    /// What a point of a surface reflects in all (its exitance without emission, W/m²), as far as it is known.
+    pub fn leaving(&self, triangle: u32, side: Side, at: (f32, f32)) -> Vec3 {
+        let Some(patch) = self.patches.at(triangle, side, at) else { return Vec3::ZERO };
+        let texel = self.texel_at(triangle, side, at);
+        let gathered = self.gathered.at(texel).map(|texel| texel.irradiance);
+        let indirect = gathered.unwrap_or_else(|| self.patch_indirect[patch.place()]);
+        let direct = self.direct_of(texel);
+        let direct = direct.unwrap_or_else(|| self.patch_direct[patch.place()]);
+        let irradiance = direct + indirect;
+        self.reflectance_at(triangle, side, at) * irradiance
+    }
+
+    pub(crate) fn reflectance_at(&self, triangle: u32, side: Side, (u, v): (f32, f32)) -> Vec3 {
+        self.patches.reflectance(triangle, side).unwrap_or_else(|| {
+            let triangle = &self.scene.triangles[triangle as usize];
+            let surface = &self.scene.surfaces[triangle.surface as usize];
+            surface.reflectance(side, triangle.vertices, [1.0 - u - v, u, v])
+        })
+    }
+
+    /// The texel that shows a point; [`MapTexel::NONE`] where none does.
+    pub(crate) fn texel_at(&self, triangle: u32, side: Side, at: (f32, f32)) -> MapTexel {
+        let texel = self.layout.texel_at(&self.scene.triangles[triangle as usize], at);
+        texel.filter(|_| side == Side::Front).unwrap_or(MapTexel::NONE)
+    }
+
+    /// Of a texel, if it has one for all of it.
+    pub(crate) fn direct_of(&self, texel: MapTexel) -> Option<Vec3> {
+        self.direct.get(texel.place()).copied().filter(|direct| !direct.x.is_nan())
+    }
+}

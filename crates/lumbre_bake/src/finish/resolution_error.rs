@@ -1,0 +1,219 @@
+//! The error of the map's own resolution: what a bilinear look-up shows at points of the surfaces against what arrives there. Points spread
+//! evenly over all lit area are baked on their own, by the same direct light and the same gather as texels. Two independent halves of their
+//! samples make the square of the difference free of their noise (the product of both differences); what sampling has left in the map
+//! itself, by its own estimate, is taken away. Not the sampling error: that is `error_ledger`.
+
+use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::chunks::in_chunks;
+use crate::coverage::footprint::{Footprint, FootprintPoint, Texel, receiver};
+use crate::denoise::replicates::REPLICATES;
+use crate::final_gather::gather::{Gathered, RadianceCache};
+use crate::progress::{Stage, Watch};
+use crate::report::ResolutionReport;
+use crate::sampling::{Sequence, Stream, cosine_about, hash, triangle_point};
+use crate::scene::Receiver;
+use crate::scene::{BakeScene, LightmapLayout, SurfaceHit};
+use crate::sources::light_sources::Sources;
+use crate::texel_index::MapTexel;
+use crate::{BakeError, BakeOptions, BakeReport};
+
+/// Of the rays of a bake, one part in so many; and what takes no time that anyone would notice.
+const SHARE: u64 = 20;
+const LEAST_RAYS: u64 = 1 << 16;
+/// Fewest and most points.
+const POINTS: (u64, u64) = (256, 4096);
+/// Shadow rays of a point to each source and gather rays of each replicate; two replicates are a half.
+const SHADOW_RAYS: u32 = 16;
+const GATHER_RAYS: u32 = 32;
+/// Rays that tell whether a point lies inside other geometry.
+const JUDGES: u32 = 8;
+
+/// A point, baked on its own.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct DensePoint {
+    pub triangle: u32,
+    pub at: (f32, f32),
+    /// In the open, in the map.
+    pub counts: bool,
+    /// Irradiance by direct light, and by bounces, by each half of the samples.
+    pub direct: [Vec3; 2],
+    pub indirect: [Vec3; 2],
+    /// Checks of patches against real bounces, and the sum of their differences.
+    pub checks: u32,
+    pub differences: Vec3,
+    pub rays: u64,
+}
+
+/// Points that the finished map is compared with; none if that is not asked for, or the time is up. `cache` is `None` where nothing bounces.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn dense_points(
+    sources: &Sources<'_>,
+    cache: Option<&RadianceCache<'_>>,
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<Vec<DensePoint>, BakeError> {
+    if !options.resolution_error || watch.clock().late() {
+        let why = if options.resolution_error { "the time is up" } else { "switched off" };
+        report.skipped.push(format!("resolution error: {why}"));
+        return Ok(Vec::new());
+    }
+    watch.stage(Stage::Resolution, report)?;
+    let light = Light { scene: sources.scene, sources, cache };
+    let points = light.at_points(report.rays, options, watch)?;
+    report.rays += points.iter().map(|point| point.rays).sum::<u64>();
+    Ok(points)
+}
+
+/// What light is asked for at points.
+struct Light<'a> {
+    scene: &'a BakeScene,
+    sources: &'a Sources<'a>,
+    /// None where nothing bounces.
+    cache: Option<&'a RadianceCache<'a>>,
+}
+
+impl Light<'_> {
+    /// Points in proportion to area, as many as a twentieth of `rays` pays for.
+    fn at_points(
+        &self,
+        rays: u64,
+        options: &BakeOptions,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<DensePoint>, BakeError> {
+        let mut running = 0.0;
+        let ends: Vec<f64> = self
+            .scene
+            .triangles
+            .iter()
+            .map(|triangle| {
+                running += if triangle.superseded { 0.0 } else { f64::from(triangle.area) };
+                running
+            })
+            .collect();
+        let of_gather = if self.cache.is_some() { GATHER_RAYS * REPLICATES as u32 } else { 0 };
+        let cost = u64::from(JUDGES + 2 * SHADOW_RAYS + of_gather);
+        let count = ((rays / SHARE).max(LEAST_RAYS) / cost).clamp(POINTS.0, POINTS.1) as usize;
+        let sequence = Sequence::new(options.seed, Stream::ResolutionPoints, 0);
+        let points = in_chunks(count, watch, |index| {
+            let [choice, u, v, _] = sequence.point(index as u32, 0);
+            let place = f64::from(choice) * running;
+            let triangle = ends.partition_point(|&end| end <= place).min(ends.len().saturating_sub(1));
+            self.at_point(triangle as u32, triangle_point(u, v), index as u32, options.seed)
+        })?;
+        Ok(points)
+    }
+
+    fn at_point(&self, triangle: u32, at: (f32, f32), index: u32, seed: u32) -> DensePoint {
+        let mut point = DensePoint { triangle, at, ..DensePoint::default() };
+        let footprint = FootprintPoint { triangle, at, offset: Vec2::splat(0.5) };
+        let receiver = receiver(self.scene, &footprint);
+        let own = Sequence::new(seed, Stream::ResolutionLight, index);
+        point.rays += u64::from(JUDGES);
+        point.counts = self.is_open(&receiver, own);
+        if !point.counts {
+            return point;
+        }
+        for (half, direct) in point.direct.iter_mut().enumerate() {
+            let found = self.sources.irradiance(own.of(half as u32), SHADOW_RAYS, &|_, _| Some(receiver));
+            *direct = found.baked;
+            point.rays += u64::from(found.rays);
+        }
+        let Some(cache) = self.cache else { return point };
+        // A texel of one point, in a tile and of an object of its own: so its samples are no texel's.
+        let footprint = Footprint::Points(vec![footprint]);
+        let texel = Texel { index: MapTexel(index), object: index, x: 0, y: 0, triangle, footprint };
+        let mut gathered = Gathered::default();
+        cache.gather(&texel, &mut gathered, GATHER_RAYS, hash(seed ^ Stream::ResolutionPoints.number()));
+        let [a, b, c, d] = gathered.sums.map(|sum| sum / GATHER_RAYS as f32);
+        point.indirect = [0.5 * (a + b), 0.5 * (c + d)];
+        (point.checks, point.differences) = (gathered.checks, gathered.differences);
+        point.rays += gathered.rays;
+        point
+    }
+
+    /// Not inside other geometry, nor where it is dark outside, which show nothing of it.
+    fn is_open(&self, receiver: &Receiver, sequence: Sequence) -> bool {
+        let meets_inside = |ray: &u32| {
+            let [u, v, ..] = sequence.point(*ray, 0);
+            let direction = cosine_about(receiver.geometric_normal, u, v);
+            let hit = self.scene.classify_hit(receiver.origin, direction);
+            matches!(hit, SurfaceHit::Inside | SurfaceHit::Back)
+        };
+        2 * (0..JUDGES).filter(meets_inside).count() < JUDGES as usize
+    }
+}
+
+/// The finished map against the points. `variances` is the map's own estimate of what sampling left in it, per texel; NaN where nothing
+/// is known.
+pub(crate) fn compare(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    filled: &[Vec3],
+    variances: &[f32],
+    points: &[DensePoint],
+) -> ResolutionReport {
+    let counting = || points.iter().filter(|point| point.counts);
+    // What the patches bring too much, per unit of light by bounces, has been taken out of the map.
+    let (mut difference, mut checked) = (Vec3::ZERO, Vec3::ZERO);
+    for point in counting() {
+        difference += point.differences;
+        checked += 0.5 * (point.indirect[0] + point.indirect[1]) * point.checks as f32;
+    }
+    let excess = difference / checked.max(Vec3::splat(f32::MIN_POSITIVE));
+    let excess = if excess.is_finite() { excess } else { Vec3::ZERO };
+    let (mut mean, mut squares) = (0.0, Vec::with_capacity(points.len()));
+    for point in counting() {
+        let Some((shown, variance)) = look_up(scene, layout, filled, variances, point) else { continue };
+        let light = [0, 1].map(|half| point.direct[half] + point.indirect[half] * (Vec3::ONE - excess));
+        let [a, b] = light.map(|light| (light - shown).as_dvec3());
+        squares.push((a * b).element_sum() / 3.0 - f64::from(variance));
+        mean += f64::from((light[0] + light[1]).element_sum()) / 6.0;
+    }
+    let count = squares.len() as f64;
+    mean /= count.max(1.0);
+    if squares.len() < 2 || mean <= 0.0 {
+        return ResolutionReport::default();
+    }
+    let square = squares.iter().sum::<f64>() / count;
+    let spread = squares.iter().map(|own| (own - square).powi(2)).sum::<f64>() / (count - 1.0);
+    let of_square = (spread / count).sqrt();
+    let error = square.max(0.0).sqrt();
+    // Of a root, by its derivative; next to 0 by the root of what the square may be.
+    let standard_error = of_square / (2.0 * error).max(of_square.sqrt()).max(f64::MIN_POSITIVE);
+    ResolutionReport { points: squares.len(), error: error / mean, standard_error: standard_error / mean }
+}
+
+/// What the map shows at a point, bilinearly, and the variance that sampling left in it, as if texels were independent.
+fn look_up(
+    scene: &BakeScene,
+    layout: &LightmapLayout,
+    filled: &[Vec3],
+    variances: &[f32],
+    point: &DensePoint,
+) -> Option<(Vec3, f32)> {
+    let triangle = &scene.triangles[point.triangle as usize];
+    let map = &layout.maps[triangle.object as usize];
+    let [a, b, c] = triangle.uv;
+    let at = a + (b - a) * point.at.0 + (c - a) * point.at.1 - 0.5;
+    if !at.is_finite() {
+        return None;
+    }
+    let low = at.floor();
+    let part = at - low;
+    let (mut light, mut variance) = (Vec3::ZERO, 0.0);
+    for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+        let weight = (1.0 - (part.x - dx).abs()) * (1.0 - (part.y - dy).abs());
+        let x = (low.x + dx).clamp(0.0, (map.width - 1) as f32) as u32;
+        let y = (low.y + dy).clamp(0.0, (map.height - 1) as f32) as u32;
+        let texel = map.first + (y * map.width + x) as usize;
+        // Nothing known is shown as black.
+        light += weight * if filled[texel].is_finite() { filled[texel] } else { Vec3::ZERO };
+        variance += weight * weight * if variances[texel].is_finite() { variances[texel] } else { 0.0 };
+    }
+    Some((light, variance))
+}

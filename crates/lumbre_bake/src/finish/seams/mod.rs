@@ -1,0 +1,104 @@
+//! Seams closed by least squares: where two borders of charts lie in one place and their surfaces join smoothly, the texels
+//! that bilinear filtering reads there are moved, by no more than they may be wrong, until both sides show the same light.
+//! Within a map, across maps and across objects. Not the filling beside charts: that is `fill`.
+//!
+//! ```text
+//!   borders of charts ─► pairs in one place ─► samples, two per texel ─────────────► least squares ─► texels
+//!                        (also parts of edges)  (normals agree, nothing in between)   (conjugate gradients)
+//! ```
+//!
+//! After Iwanicki, "Lighting Technology of The Last of Us", SIGGRAPH 2013 (the equations), and Sloan and Silvennoinen,
+//! "Directional Lightmap Encoding Insights", SIGGRAPH Asia 2018; the weights and limits by the texels' errors are our own.
+
+mod edge_grid;
+mod edges;
+mod least_squares;
+mod samples;
+
+use glam::Vec3;
+
+use crate::coverage::footprint::Texel;
+use crate::progress::Watch;
+use crate::report::SeamReport;
+use crate::scene::{BakeScene, LightmapLayout};
+use crate::{BakeError, BakeOptions, BakeReport};
+use least_squares::{Patience, Unknowns};
+
+/// The maps as they are before the seams are closed.
+pub(crate) struct Maps<'a> {
+    pub scene: &'a BakeScene,
+    pub layout: &'a LightmapLayout,
+    pub texels: &'a [Texel],
+    pub charts: &'a [u32],
+    /// Mean irradiance of the open texels, mean of the channels.
+    pub mean: f64,
+}
+
+/// What the maps show, per texel of all.
+pub(crate) struct Shown<'a> {
+    /// Irradiance, W/m²; NaN where nothing is known.
+    pub light: &'a mut [Vec3],
+    /// Squared errors, mean of the channels; NaN where no surface is shown.
+    pub variances: &'a mut [f32],
+}
+
+/// Chart of a texel that no surface covers in the open.
+const NO_CHART: u32 = u32::MAX;
+
+/// What closing came to.
+struct Closed {
+    /// What was done, or why there was nothing to do.
+    pub report: Result<SeamReport, &'static str>,
+    pub rays: u64,
+    /// What was left out, in words.
+    pub warning: Option<String>,
+}
+
+/// Closes the seams of what is shown, if that is asked for, and notes in the report what came of it. A texel that is moved states by how much, too.
+///
+/// # Errors
+/// [`BakeError::Cancelled`].
+pub(crate) fn close_seams(
+    maps: &Maps<'_>,
+    shown: Shown<'_>,
+    options: &BakeOptions,
+    watch: &mut Watch<'_>,
+    report: &mut BakeReport,
+) -> Result<(), BakeError> {
+    if !options.seams {
+        report.skipped.push("seams: switched off".into());
+        return Ok(());
+    }
+    let patience = if watch.clock().late() { Patience::LATE } else { Patience::WHOLE };
+    let closed = watch.during(0.0, || close(maps, shown, patience))?;
+    report.rays += closed.rays;
+    report.warnings.extend(closed.warning);
+    match closed.report {
+        Ok(closed) => report.seams = closed,
+        Err(reason) => report.skipped.push(format!("seams: {reason}")),
+    }
+    Ok(())
+}
+
+fn close(maps: &Maps<'_>, shown: Shown<'_>, patience: Patience) -> Closed {
+    if maps.mean.is_nan() || maps.mean <= 0.0 {
+        return Closed { report: Err("the maps are black"), rays: 0, warning: None };
+    }
+    let edges = edges::borders(maps.scene);
+    let mut charts = vec![NO_CHART; maps.layout.texels];
+    for texel in maps.texels.iter().filter(|texel| !texel.is_hidden()) {
+        charts[texel.index.place()] = maps.charts[texel.triangle as usize];
+    }
+    let found = samples::Sampling { maps, charts: &charts, filled: shown.light, edges: &edges }.all();
+    let (rays, crowded) = (found.rays, found.crowded);
+    let warning = (crowded > 0).then(|| {
+        format!("so many borders of charts lie in one place that {crowded} of them were not compared with all others; seams may show there")
+    });
+    if found.samples.is_empty() {
+        return Closed { report: Err("no two borders of charts join smoothly in one place"), rays, warning };
+    }
+    let unknowns = Unknowns::new(maps, &charts, &shown, &found.samples);
+    let mut report = unknowns.solve(&found.samples, shown, maps.mean, patience, &maps.scene.stop);
+    report.edges = found.pairs;
+    Closed { report: Ok(report), rays, warning }
+}

@@ -1,0 +1,73 @@
+//! Where in a level the stated error is largest, so that an artist finds the room and the objects. Not the error: that is `error_ledger`.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, IVec3, Vec3};
+
+use crate::WorstPlace;
+use crate::coverage::footprint::{Texel, receiver};
+use crate::scene::{BakeScene, SceneObject};
+
+/// Places are cubes of this share of the level's longest side.
+const PLACE: f32 = 1.0 / 8.0;
+/// Places with fewer of the open texels are not told.
+const LEAST_TEXELS: f64 = 0.01;
+const MOST_PLACES: usize = 3;
+const MOST_OBJECTS: usize = 2;
+
+/// What is found in one place.
+#[derive(Default)]
+struct Place {
+    texels: u32,
+    position: DVec3,
+    squares: f64,
+    of_objects: BTreeMap<u32, f64>,
+}
+
+/// Where the error is largest, the worst first. `squares` are squared errors of the covered texels, relative to the light around them; `whole` is
+/// what is stated for all of them together.
+pub(crate) fn worst_places(
+    scene: &BakeScene,
+    objects: &[SceneObject],
+    texels: &[Texel],
+    squares: &[f32],
+    whole: f64,
+) -> Vec<WorstPlace> {
+    let corners = || scene.triangles.iter().flat_map(|triangle| triangle.corners);
+    let (low, high) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let side = PLACE * (high - low).max_element();
+    let mut places: BTreeMap<[i32; 3], Place> = BTreeMap::new();
+    let mut open = 0u32;
+    for (texel, &square) in texels.iter().zip(squares).filter(|(texel, _)| !texel.is_hidden()) {
+        let Some(point) = texel.point(scene, 0.5, 0.5) else { continue };
+        let position = receiver(scene, &point).position;
+        let cell: IVec3 = ((position - low) / side).floor().as_ivec3();
+        let place = places.entry(cell.to_array()).or_default();
+        place.texels += 1;
+        place.position += position.as_dvec3();
+        place.squares += f64::from(square);
+        *place.of_objects.entry(texel.object).or_default() += f64::from(square);
+        open += 1;
+    }
+    // What chance leaves in single texels falls out of the whole: the places' errors add up to that.
+    let all: f64 = places.values().map(|place| place.squares).sum();
+    let scale = f64::from(open) * whole.powi(2) / all.max(f64::MIN_POSITIVE);
+    let told = |place: Place| {
+        let count = f64::from(place.texels);
+        let error = (scale * place.squares / count).sqrt();
+        let texels = count / f64::from(open);
+        if texels < LEAST_TEXELS || error <= whole {
+            return None;
+        }
+        let mut worst: Vec<(u32, f64)> = place.of_objects.into_iter().collect();
+        worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let name = |&(object, _): &(u32, f64)| objects.get(object as usize).map(|object| object.name.clone());
+        let objects = worst.iter().take(MOST_OBJECTS).filter_map(name).collect();
+        let center = scene.space.world((place.position / count).as_vec3()).to_array();
+        Some(WorstPlace { center, error, texels, objects })
+    };
+    let mut worst: Vec<WorstPlace> = places.into_values().filter_map(told).collect();
+    worst.sort_by(|a, b| b.error.total_cmp(&a.error));
+    worst.truncate(MOST_PLACES);
+    worst
+}

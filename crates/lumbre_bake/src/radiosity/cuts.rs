@@ -1,0 +1,378 @@
+//! Cuts a cell of a triangle along contact lines into smaller triangles, and finds the one that a point lies in: a tree of lines
+//! (Fuchs, Kedem, Naylor, "On Visible Surface Generation by A Priori Tree Structures", 1980). A cell that a wall crosses would else
+//! carry light from one side of it to the other. Not where the lines are: that is `contacts`.
+
+use glam::{DMat2, DVec2};
+
+use crate::visibility::clipping::{clip, clip_segment};
+
+/// One line and what lies on its sides.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// a u + b v + c, in barycentric weights of the second and third vertex, is at least 0 on the first side.
+    line: [f32; 3],
+    sides: [Side; 2],
+}
+
+/// A node or, marked by the highest bit, the slot of a piece.
+#[derive(Clone, Copy, Debug)]
+struct Side(u32);
+
+const PIECE: u32 = 1 << 31;
+
+/// Corners of a piece as barycentric weights of its triangle's second and third vertex.
+pub(crate) type Corners = [(f32, f32); 3];
+
+/// The cut cells of all triangles.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Cuts {
+    nodes: Vec<Node>,
+    /// The pieces, cell by cell.
+    pub pieces: Vec<Corners>,
+    /// Cells that more lines cross than cut them.
+    pub full: usize,
+}
+
+/// A cell that was cut.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CutCell {
+    /// Of its tree.
+    pub root: u32,
+    /// Its pieces: so many from the first in the list of all.
+    pub first: u32,
+    pub count: u32,
+}
+
+/// Lines that cut one cell, at most.
+const MOST_LINES: u32 = 12;
+/// Smallest part of a cell that is worth a piece of its own.
+const SMALLEST: f64 = 1.0 / 256.0;
+/// Contact lines as long as this share of a piece's size cut it.
+const LENGTH: f64 = 0.1;
+/// What lies so near to a line, as a share of a piece's size, lies on it.
+const ON_LINE: f64 = 0.02;
+
+/// A corner that takes less than this share of a piece is none: contacts are told to some 1e-7 of a triangle, and so are the pieces' corners.
+const SLIVER: f64 = 1e-4;
+
+/// A cell while it is being cut.
+struct Cell<'a> {
+    cuts: &'a mut Cuts,
+    /// What a unit right and up in the plane's frame adds to the barycentric weights, which are 0 at its origin.
+    weights: DMat2,
+    /// The first piece, and the slots of that and of those after it.
+    first: u32,
+    slots: (u32, u32),
+    /// Square canonical units.
+    smallest: f64,
+    left: u32,
+    /// A line was left over.
+    full: bool,
+}
+
+impl Cuts {
+    /// Cuts a cell, counter-clockwise in its plane's frame, along segments. `weights` turns places of the frame into barycentric weights.
+    /// The first piece takes the slot `own`, the others those from `free` on. `None` if nothing cuts it.
+    pub fn cut(
+        &mut self,
+        corners: [DVec2; 3],
+        segments: &[[DVec2; 2]],
+        weights: DMat2,
+        (own, free): (u32, u32),
+    ) -> Option<CutCell> {
+        let smallest = SMALLEST * area(&corners);
+        let (root, first) = (self.nodes.len() as u32, self.pieces.len() as u32);
+        let (slots, left) = ((own, free), MOST_LINES);
+        let mut cell = Cell { cuts: self, weights, first, slots, smallest, left, full: false };
+        let line = cell.best_line(&corners, segments)?;
+        cell.divide(&corners, segments, Some(line));
+        let full = cell.full;
+        self.full += usize::from(full);
+        Some(CutCell { root, first, count: self.pieces.len() as u32 - first })
+    }
+
+    /// The slot of the piece of a cell in which a point lies.
+    pub fn find(&self, root: u32, u: f32, v: f32) -> u32 {
+        let mut at = Side(root);
+        while at.0 & PIECE == 0 {
+            let node = &self.nodes[at.0 as usize];
+            let [a, b, c] = node.line;
+            at = node.sides[usize::from(a * u + b * v + c < 0.0)];
+        }
+        at.0 & !PIECE
+    }
+}
+
+impl Cell<'_> {
+    /// Divides a convex polygon by a line, if there is one, or else along contacts, or else into triangles.
+    fn divide(&mut self, polygon: &[DVec2], segments: &[[DVec2; 2]], line: Option<Line>) -> Side {
+        let Some(line) = line.or_else(|| self.best_line(polygon, segments)) else {
+            return self.triangles(polygon);
+        };
+        let near = ON_LINE * area(polygon).sqrt();
+        let node = self.node(line);
+        self.left = self.left.saturating_sub(1);
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let line = Line { normal: line.normal * sign, offset: line.offset * sign };
+            let part = clipped(polygon, line);
+            let rest: Vec<[DVec2; 2]> = segments
+                .iter()
+                .filter(|segment| segment.iter().any(|&p| line.height(p) > near))
+                .copied()
+                .collect();
+            let child = self.divide(&part, &rest, None);
+            self.cuts.nodes[node as usize].sides[side] = child;
+        }
+        Side(node)
+    }
+
+    /// A node without sides yet.
+    fn node(&mut self, line: Line) -> u32 {
+        // Through the images of two of its points.
+        let foot = line.normal * line.offset;
+        let (p, q) = (self.weights * foot, self.weights * (foot - line.normal.perp()));
+        let normal = (q - p).perp();
+        let normal = normal / normal.length().max(f64::MIN_POSITIVE);
+        // What was on the first side stays there.
+        let normal = if normal.dot(self.weights * line.normal) < 0.0 { -normal } else { normal };
+        let line = [normal.x as f32, normal.y as f32, -normal.dot(p) as f32];
+        let node = self.cuts.nodes.len() as u32;
+        self.cuts.nodes.push(Node { line, sides: [Side(PIECE); 2] });
+        node
+    }
+
+    /// A convex polygon as a fan of triangles, about the corner that makes the smallest of them largest.
+    fn triangles(&mut self, polygon: &[DVec2]) -> Side {
+        let polygon = without_slivers(polygon);
+        let count = polygon.len();
+        let corner = |i: usize| polygon[i % count];
+        let fan =
+            |apex: usize| (1..count - 1).map(move |i| [corner(apex), corner(apex + i), corner(apex + i + 1)]);
+        let smallest = |apex: usize| fan(apex).map(|t| area(&t)).fold(f64::INFINITY, f64::min);
+        let better = |a: &usize, b: &usize| smallest(*a).total_cmp(&smallest(*b)).then(b.cmp(a));
+        let apex = (0..count).max_by(better).unwrap_or(0);
+        let triangles: Vec<[DVec2; 3]> = fan(apex).collect();
+        self.fan(&triangles)
+    }
+
+    fn fan(&mut self, triangles: &[[DVec2; 3]]) -> Side {
+        let [own, rest @ ..] = triangles else { return Side(PIECE) };
+        if rest.is_empty() {
+            let piece = own.map(|p| self.weights * p).map(|w| (w.x as f32, w.y as f32));
+            let place = self.cuts.pieces.len() as u32 - self.first;
+            self.cuts.pieces.push(piece);
+            let slot = if place == 0 { self.slots.0 } else { self.slots.1 + place - 1 };
+            return Side(PIECE | slot);
+        }
+        // The diagonal from the apex has this triangle on its right.
+        let node = self.node(Line::through(own[2], own[0]));
+        let first = self.fan(std::slice::from_ref(own));
+        let second = self.fan(rest);
+        self.cuts.nodes[node as usize].sides = [first, second];
+        Side(node)
+    }
+
+    /// The line along which most contacts lie, if they are long enough and leave a piece on each side.
+    fn best_line(&mut self, polygon: &[DVec2], segments: &[[DVec2; 2]]) -> Option<Line> {
+        // Of a cell that is full already, nothing more is to be known.
+        if segments.is_empty() || self.full {
+            return None;
+        }
+        let size = area(polygon).sqrt();
+        let inside: Vec<[DVec2; 2]> =
+            segments.iter().filter_map(|segment| clip_segment(polygon, *segment)).collect();
+        let mut best: Option<(f64, Line)> = None;
+        for segment in &inside {
+            let [p, q] = *segment;
+            let line = Line::through(p, q);
+            if !line.normal.is_finite() {
+                continue;
+            }
+            let along = |other: &&[DVec2; 2]| other.iter().all(|&p| line.height(p).abs() <= ON_LINE * size);
+            let support: f64 = inside.iter().filter(along).map(|[p, q]| p.distance(*q)).sum();
+            if support < LENGTH * size || best.is_some_and(|(most, _)| support <= most * (1.0 + 1e-6)) {
+                continue;
+            }
+            let pieces = [1.0, -1.0].map(|sign| {
+                area(&clipped(polygon, Line { normal: line.normal * sign, offset: line.offset * sign }))
+            });
+            if pieces.iter().all(|&piece| piece >= self.smallest) {
+                best = Some((support, line));
+            }
+        }
+        self.full = best.is_some() && self.left == 0;
+        best.filter(|_| self.left > 0).map(|(_, line)| line)
+    }
+}
+
+/// Points p with normal · p = offset.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    normal: DVec2,
+    offset: f64,
+}
+
+impl Line {
+    /// Its first side is on the left of the way from `p` to `q`.
+    fn through(p: DVec2, q: DVec2) -> Self {
+        let normal = (q - p).perp() / (q - p).length();
+        Self { normal, offset: normal.dot(p) }
+    }
+
+    fn height(&self, p: DVec2) -> f64 {
+        self.normal.dot(p) - self.offset
+    }
+}
+
+/// Of a counter-clockwise polygon.
+fn area(polygon: &[DVec2]) -> f64 {
+    let Some(&origin) = polygon.first() else { return 0.0 };
+    polygon.windows(2).map(|pair| 0.5 * (pair[0] - origin).perp_dot(pair[1] - origin)).sum()
+}
+
+/// Without the corners that take next to nothing of a polygon. One after the other: of two in one place, one stays.
+fn without_slivers(polygon: &[DVec2]) -> Vec<DVec2> {
+    let least = SLIVER * area(polygon);
+    let mut polygon = polygon.to_vec();
+    while polygon.len() > 3 {
+        let count = polygon.len();
+        let taken =
+            |i: usize| area(&[polygon[(i + count - 1) % count], polygon[i], polygon[(i + 1) % count]]);
+        let Some(corner) = (0..count).min_by(|&a, &b| taken(a).total_cmp(&taken(b))) else { break };
+        if taken(corner) > least {
+            break;
+        }
+        polygon.remove(corner);
+    }
+    polygon
+}
+
+/// The part of a convex polygon on a line's first side.
+fn clipped(polygon: &[DVec2], line: Line) -> Vec<DVec2> {
+    let mut part = Vec::with_capacity(polygon.len() + 1);
+    clip(polygon, |corner| line.height(corner), |corner| part.push(corner));
+    part
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Sequence, Stream, triangle_point};
+
+    const CELL: [DVec2; 3] = [DVec2::ZERO, DVec2::new(2.0, 0.0), DVec2::new(0.0, 2.0)];
+
+    /// Area of a piece, in shares of the triangle's.
+    fn share([a, b, c]: Corners) -> f64 {
+        f64::from((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1))
+    }
+
+    fn cut(segments: &[[DVec2; 2]]) -> (Cuts, Option<CutCell>) {
+        let mut cuts = Cuts::default();
+        let weights = DMat2::from_diagonal(DVec2::splat(0.5));
+        let cell = cuts.cut(CELL, segments, weights, (7, 100));
+        (cuts, cell)
+    }
+
+    fn segment(a: [f64; 2], b: [f64; 2]) -> [DVec2; 2] {
+        [a.into(), b.into()]
+    }
+
+    #[test]
+    fn pieces_make_up_the_cell_and_no_piece_lies_across_a_line() {
+        // A wall, a corner of a crate, and bits of a bent wall.
+        let wall = vec![segment([-1.0, 0.3], [3.0, 0.5])];
+        let crate_corner = vec![segment([0.6, 0.5], [0.6, 3.0]), segment([0.6, 0.5], [3.0, 0.5])];
+        let bits: Vec<[DVec2; 2]> = (0..40)
+            .map(|i| f64::from(i) / 20.0)
+            .map(|x| segment([x, 0.2 + 0.01 * x], [x + 0.05, 0.2 + 0.01 * (x + 0.05)]))
+            .collect();
+        for segments in [wall, crate_corner, bits] {
+            let (cuts, cell) = cut(&segments);
+            let cell = cell.expect("it is cut");
+            assert!(cell.count >= 3 && cuts.pieces.len() == cell.count as usize);
+            let sum: f64 = cuts.pieces.iter().map(|&piece| share(piece)).sum();
+            assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+            let sequence = Sequence::new(1, Stream::Test(2), 3);
+            for sample in 0..2000 {
+                let [x, y, ..] = sequence.point(sample, 0);
+                let (u, v) = triangle_point(x, y);
+                let slot = cuts.find(cell.root, u, v);
+                let place = if slot == 7 { 0 } else { slot - 99 };
+                let [a, b, c] = cuts.pieces[place as usize];
+                let inside =
+                    |p: (f32, f32), q: (f32, f32)| (q.0 - p.0) * (v - p.1) - (q.1 - p.1) * (u - p.0) > -1e-5;
+                assert!(inside(a, b) && inside(b, c) && inside(c, a), "{u} {v} in {slot}");
+            }
+            for [p, q] in &segments {
+                let line = Line::through(*p, *q);
+                for piece in &cuts.pieces {
+                    let corners = piece.map(|(u, v)| DVec2::new(f64::from(u), f64::from(v)) * 2.0);
+                    let parts = [1.0, -1.0].map(|sign| {
+                        area(&clipped(
+                            &corners,
+                            Line { normal: line.normal * sign, offset: line.offset * sign },
+                        ))
+                    });
+                    let across = clip_segment(&corners, [*p, *q]).map_or(0.0, |[p, q]| p.distance(q));
+                    let crossed = parts.iter().all(|&part| part > 0.01) && across > 0.1;
+                    assert!(!crossed, "{piece:?} across {p} {q}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_that_ends_on_the_border_leaves_no_piece_without_area() {
+        // The lowest facets of a ball that stands on a floor, as its tile lies in the frame; found in a file.
+        let corners = [
+            DVec2::new(0.013020833721384406, 0.013020833721384406),
+            DVec2::new(0.026041667442768812, 0.013020833721384406),
+            DVec2::new(0.013020833721384406, 0.026041667442768812),
+        ];
+        let foot = segment([0.015625, 0.0234375], [0.005634784698486328, 0.014785677194595337]);
+        let other = segment([0.005634784698486328, 0.03208932280540466], [0.015625, 0.0234375]);
+        let weights = DMat2::from_diagonal(DVec2::splat(25.6));
+        for segments in [vec![foot, other], vec![other, foot], vec![foot], vec![other]] {
+            let mut cuts = Cuts::default();
+            if cuts.cut(corners, &segments, weights, (0, 1)).is_none() {
+                continue;
+            }
+            let shares: Vec<f64> = cuts.pieces.iter().map(|&piece| share(piece)).collect();
+            let sum: f64 = shares.iter().sum();
+            assert!(shares.iter().all(|&share| share > 1e-4 * sum), "{shares:?}");
+            assert!((9.0 * sum - 1.0).abs() < 1e-4, "{sum}");
+        }
+    }
+
+    #[test]
+    fn a_cell_that_more_lines_cross_than_cut_it_is_counted() {
+        let lines = |count: u32| -> Vec<[DVec2; 2]> {
+            (1..=count)
+                .map(|i| 1.2 * f64::from(i) / f64::from(count + 1))
+                .map(|x| segment([x, -1.0], [x, 3.0]))
+                .collect()
+        };
+        for (count, full) in [(MOST_LINES, 0), (MOST_LINES + 1, 1)] {
+            let (cuts, cell) = cut(&lines(count));
+            assert!(
+                cell.is_some_and(|cell| cell.count > MOST_LINES) && cuts.full == full,
+                "{count}: {}",
+                cuts.full
+            );
+        }
+    }
+
+    #[test]
+    fn borders_and_short_contacts_cut_nothing() {
+        for segments in [
+            vec![segment([0.0, 0.0], [2.0, 0.0])],
+            vec![segment([2.0, 0.0], [0.0, 2.0])],
+            vec![segment([0.5, 0.5], [0.6, 0.5])],
+            vec![segment([5.0, 0.0], [5.0, 2.0])],
+            Vec::new(),
+        ] {
+            let (cuts, cell) = cut(&segments);
+            assert!(cell.is_none() && cuts.pieces.is_empty(), "{segments:?}");
+        }
+    }
+}

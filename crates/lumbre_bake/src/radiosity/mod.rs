@@ -1,0 +1,26 @@
+//! Patches, the form factors between them, and the linear system that says how much light each one sends. Not the light of texels, which
+//! `final_gather` computes from it.
+
+pub(crate) mod components;
+pub(crate) mod cosine_rays;
+pub(crate) mod cuts;
+pub(crate) mod exchange;
+#[cfg(test)]
+mod exchange_tests;
+#[cfg(test)]
+mod form_factor_tests;
+pub(crate) mod form_factors;
+pub(crate) mod global_lines;
+pub(crate) mod larger_patches;
+#[cfg(test)]
+mod method_study_tests;
+pub(crate) mod patch_index;
+pub(crate) mod patch_light;
+#[cfg(test)]
+mod patch_tests;
+pub(crate) mod patches;
+pub(crate) mod sampling_guide;
+pub(crate) mod size_error;
+pub(crate) mod solution;
+pub(crate) mod solver;
+pub(crate) mod stationary;

@@ -1,0 +1,132 @@
+//! Direct light of the patches by that of the texels that lie on them: those have it already, and more exactly than a few rays of the
+//! patch's own would find it. Not of patches that too few texels tell of: those cast rays (`exchange`).
+
+use glam::{DVec3, Vec2, Vec3};
+
+use super::patches::Patches;
+use crate::coverage::covered_texels::CoveredTexels;
+use crate::coverage::footprint::{Footprint, Texel, barycentric};
+use crate::direct_light::DirectLight;
+use crate::scene::BakeScene;
+use crate::scene::material::Side;
+
+/// Fewest texels that tell a patch's light, in each half of them: of fewer, too much lies across its border.
+const FEWEST: f64 = 2.0;
+
+/// Mean direct irradiance of each patch, mixed lights included, by either half of its texels: the fields of a chessboard. `None` where there
+/// are too few of them. Texels that walls divide hold the light of both sides, and so tell of neither.
+pub(crate) fn patch_light(
+    scene: &BakeScene,
+    texels: &CoveredTexels<'_>,
+    direct: &DirectLight,
+    patches: &Patches,
+) -> Vec<Option<[Vec3; 2]>> {
+    let mut divided = vec![false; texels.list.len()];
+    texels.straddling.iter().for_each(|texel| divided[texel.place()] = true);
+    let mut sums = vec![[(DVec3::ZERO, 0.0f64); 2]; patches.list.len()];
+    let told = texels.list.iter().zip(&direct.texels).zip(divided).filter(|(_, divided)| !divided);
+    for ((texel, direct), _) in told {
+        let (half, light) = (((texel.x + texel.y) & 1) as usize, direct.total().as_dvec3());
+        for_each_point(scene, texel, |triangle, at, share| {
+            if let Some(patch) = patches.at(triangle, Side::Front, at) {
+                let (sum, weight) = &mut sums[patch.place()][half];
+                *sum += light * share;
+                *weight += share;
+            }
+        });
+    }
+    let mean = |halves: [(DVec3, f64); 2]| {
+        let enough = halves.iter().all(|(_, weight)| *weight >= FEWEST);
+        enough.then(|| halves.map(|(sum, weight)| (sum / weight).as_vec3()))
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// Evenly spread points of what a texel shows: the triangle, barycentric weights, and the share of the texel that it stands for.
+fn for_each_point(scene: &BakeScene, texel: &Texel, mut visit: impl FnMut(u32, (f32, f32), f64)) {
+    match &texel.footprint {
+        Footprint::Whole(triangle) => {
+            let corner = Vec2::new(texel.x as f32, texel.y as f32);
+            for offset in [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)] {
+                if let Some(at) =
+                    barycentric(&scene.triangles[*triangle as usize], corner + Vec2::from(offset))
+                {
+                    visit(*triangle, at, 0.25);
+                }
+            }
+        }
+        // At most a texel together: of few points each is less.
+        Footprint::Points(points) => {
+            let share = 1.0 / points.len().max(16) as f64;
+            points.iter().for_each(|point| visit(point.triangle, point.at, share));
+        }
+        Footprint::Hidden => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::sync::Arc;
+
+    use glam::{DAffine3, DVec3};
+    use lumbre_mesh::shapes;
+    use lumbre_optics::{BakeMode, Light};
+
+    use super::*;
+    use crate::coverage::footprint::{FootprintPoint, receiver};
+    use crate::direct_light::direct_light;
+    use crate::progress::Watch;
+    use crate::sampling::{Sequence, Stream, triangle_point};
+    use crate::scene::laid_out::laid_out;
+    use crate::scene::{PlacedLight, PlacedPrimitive, SceneObject, StaticScene};
+    use crate::sources::light_sources::Sources;
+    use crate::{BakeOptions, BakeReport, Density};
+
+    /// A block stands in a room under a lamp: what texels tell of its patches is what 1,024 rays to the lamp find from each.
+    #[test]
+    fn texels_tell_what_rays_from_the_patch_find() {
+        let mut room = shapes::cuboid(Vec3::new(4.0, 3.0, 4.0), 2);
+        room.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
+        room.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        let object = |mesh, x: f64, y: f64, z: f64| {
+            let transform = DAffine3::from_translation(DVec3::new(x, y, z));
+            let placed = PlacedPrimitive { mesh: Arc::new(mesh), transform, ..PlacedPrimitive::default() };
+            SceneObject::new("", vec![placed])
+        };
+        let objects = vec![object(room, 0.0, 0.0, 0.0), object(shapes::cuboid(Vec3::ONE, 1), 0.3, -1.0, 0.4)];
+        let lamp = Light { radius: 0.1, bake: BakeMode::Static, ..Light::point(Vec3::ONE) };
+        let lights =
+            vec![PlacedLight { light: lamp, position: DVec3::new(-0.5, 1.0, 0.2), axis: DVec3::NEG_Y }];
+        let input = StaticScene { objects, lights, ..StaticScene::default() }.checked().unwrap();
+        let options = BakeOptions { density: Density::TexelsPerMeter(14.0), ..BakeOptions::default() };
+        let (layout, scene) = laid_out(&input.objects, input.space(), &options);
+        let sources = Sources::new(&scene, Vec::new(), input.lights.clone(), Vec3::ZERO);
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let (mut watch, mut report) = (Watch::new(&mut carry_on, None), BakeReport::default());
+        let texels = CoveredTexels::new(&scene, &layout, &mut watch, &mut report).unwrap();
+        let direct = direct_light(&sources, &texels, &[], &options, &mut watch, &mut report).unwrap();
+        let patches = Patches::new(&scene, 6.0 * texels.side);
+        let told = patch_light(&scene, &texels, &direct, &patches);
+
+        let (mut known, mut squares, mut sum) = (0.0, 0.0, 0.0);
+        for (index, (patch, told)) in patches.list.iter().zip(&told).enumerate() {
+            let Some(halves) = told else { continue };
+            let point = |x: f32, y: f32| {
+                let (triangle, at) = (patch.triangle, patches.point(patch, triangle_point(x, y)));
+                Some(receiver(&scene, &FootprintPoint { triangle, at, offset: Vec2::ZERO }))
+            };
+            let sequence = Sequence::new(1, Stream::Test(92), index as u32);
+            let expected = sources.irradiance(sequence, 1024, &point).total().x;
+            let found = 0.5 * (halves[0].x + halves[1].x);
+            known += 1.0;
+            squares += (found - expected).powi(2);
+            sum += expected;
+        }
+        let relative = (squares / known).sqrt() / (sum / known);
+        println!("{known} of {} patches, {:.2} % apart", told.len(), 100.0 * relative);
+        assert!(known > 0.8 * told.len() as f32, "{known} of {}", told.len());
+        // What the border's texels have of the patch beside it: a shadow's edge that lies there.
+        assert!(relative < 0.03, "{relative}");
+    }
+}

@@ -1,0 +1,51 @@
+//! The direct light of a receiver from all sources together: those that have samples of their own, each by itself, and the others by samples that
+//! they share. Not which are which: that is `light_cut`.
+
+use super::direct::Direct;
+use super::light_cut::LightCut;
+use super::light_sources::Sources;
+use crate::sampling::Sequence;
+use crate::scene::Receiver;
+use crate::visibility::occluders::Visibility;
+
+/// Samples of the sources that share them, for each of a source that has samples of its own.
+const SAMPLES_OF_REST: u32 = 4;
+
+impl Sources<'_> {
+    /// Mean irradiance of a receiver by `samples` shadow rays to each source that matters and some to the others together; `point` maps the
+    /// unit square onto its surface.
+    pub fn irradiance(
+        &self,
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+    ) -> Direct {
+        let Some(anchor) = point(0.5, 0.5) else { return Direct::default() };
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let corners = corners.iter().filter_map(|&(x, y)| point(x, y));
+        let reach = corners.map(|corner| corner.position.distance(anchor.position)).fold(0.0, f32::max);
+        let cut = self.cut(&anchor, reach, &[]);
+        let mut direct = self.own(&cut, &Visibility::UNKNOWN, sequence, samples, point);
+        self.rest(&cut.rest, sequence, SAMPLES_OF_REST * samples, point, &mut direct);
+        direct
+    }
+
+    /// Mean irradiance by the sources that have samples of their own; without shadow rays where it is known what may stand `between`: those
+    /// are as exact as the receiver's points.
+    pub fn own(
+        &self,
+        cut: &LightCut,
+        visibility: &Visibility<'_>,
+        sequence: Sequence,
+        samples: u32,
+        point: &impl Fn(f32, f32) -> Option<Receiver>,
+    ) -> Direct {
+        let mut direct = Direct::default();
+        if !cut.lamps.is_empty() {
+            let light = self.emitted(&cut.lamps, visibility, sequence, samples, point, &mut direct);
+            direct.baked += light;
+        }
+        self.punctual(&cut.lights, visibility, sequence, samples, point, &mut direct);
+        direct
+    }
+}

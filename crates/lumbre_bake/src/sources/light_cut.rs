@@ -1,0 +1,252 @@
+//! Which sources have samples of their own at a piece of surface, and the parts of the trees that the others are drawn from: a cut through the
+//! trees of emitters and lights, the brightest parts opened first (adaptive splitting: Conty Estevez and Kulla, "Importance Sampling of
+//! Many Lights with Adaptive Tree Splitting", 2018; Walter et al., "Lightcuts", 2005). What a receiver spends so follows from what matters
+//! there, and not from how many sources there are. Not their light: that is `direct` and `punctual`.
+
+use std::collections::BinaryHeap;
+
+use super::emitter_bounds::BoundsLanes;
+use crate::scene::Receiver;
+use crate::sources::light_sources::Sources;
+
+/// How the sources are divided at a piece of surface: what is in none of the lists brings nothing there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct LightCut {
+    /// Parts of the emissive surfaces that have samples of their own: lamps.
+    pub lamps: Vec<u32>,
+    /// Whether those are all lamps that there are.
+    pub all_apart: bool,
+    /// Lights that have, by number, ascending.
+    pub lights: Vec<u32>,
+    /// The others.
+    pub rest: Rest,
+}
+
+/// Sources that share samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Rest {
+    /// Parts of the trees, each with the running sum of their probabilities: the last is 1.
+    branches: Vec<(Branch, f32)>,
+    /// Whether some are so near that each receiver has probabilities of its own.
+    near: bool,
+    /// Of those that are near, the first branches: the parts of the emissive surfaces.
+    bounds: BoundsLanes,
+}
+
+/// A part of one of the trees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Branch {
+    Emitters(u32),
+    Lights(u32),
+}
+
+impl Rest {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.branches.is_empty()
+    }
+}
+
+impl Sources<'_> {
+    /// Of sources that share samples, the part at `u` in [0, 1), the place within its interval stretched to [0, 1), and its probability.
+    pub(crate) fn pick_branch(&self, rest: &Rest, receiver: &Receiver, u: f32) -> Option<(Branch, f32, f32)> {
+        let last = rest.branches.len().checked_sub(1)?;
+        if rest.near {
+            let mut weights = [0.0f32; MOST_NEAR_BRANCHES];
+            rest.bounds.weights(receiver, &mut weights);
+            for (weight, (branch, _)) in weights.iter_mut().zip(&rest.branches).skip(rest.bounds.len()) {
+                *weight = self.weight(*branch, receiver, 0.0);
+            }
+            let sum = weights[..rest.branches.len()].iter().sum::<f32>();
+            let wanted = u * sum;
+            let mut running = 0.0;
+            for (weight, (branch, _)) in weights.iter().zip(&rest.branches) {
+                if wanted < running + weight {
+                    let u = ((wanted - running) / weight).clamp(0.0, 1.0 - f32::EPSILON);
+                    return Some((*branch, u, weight / sum));
+                }
+                running += weight;
+            }
+            // Rounding at the very end, or no weight at all.
+            let (branch, weight) = (rest.branches[last].0, weights[last.min(MOST_NEAR_BRANCHES - 1)]);
+            return (weight > 0.0).then(|| (branch, 1.0 - f32::EPSILON, weight / sum));
+        }
+        let at = rest.branches.partition_point(|(_, end)| *end <= u).min(last);
+        let start = if at == 0 { 0.0 } else { rest.branches[at - 1].1 };
+        let (branch, end) = rest.branches[at];
+        let probability = (end - start).max(f32::MIN_POSITIVE);
+        Some((branch, ((u - start) / probability).clamp(0.0, 1.0 - f32::EPSILON), probability))
+    }
+}
+
+impl LightCut {
+    /// One number for the sources that have samples of their own: where it differs, so does what the others bring.
+    pub fn key(&self) -> u64 {
+        let mut hasher = blake3::Hasher::new();
+        for number in self.lamps.iter().chain(&[u32::MAX]).chain(&self.lights) {
+            hasher.update(&number.to_le_bytes());
+        }
+        let [a, b, c, d, e, f, g, h, ..] = *hasher.finalize().as_bytes();
+        u64::from_le_bytes([a, b, c, d, e, f, g, h])
+    }
+}
+
+/// Up to so many lamps, of so many emitters together, all have samples of their own: what is exact for them, or the
+/// exact sum over them times the share that is seen, is less noisy than samples.
+const FEW_LAMPS: u32 = 8;
+const MOST_EMITTERS: u32 = 20_000;
+/// Most emitters of one of many lamps that has samples of its own.
+pub(crate) const FEW_EMITTERS: u32 = 24;
+/// Where more than this share of what a receiver sees shines, all lamps have samples of their own, too, in so many groups: the sum over them is
+/// exact, and little of it is hidden, while samples of what is near and large are noisy.
+const ENCLOSED: f32 = 0.5;
+const MOST_GROUPS: usize = 16;
+/// Of all that may arrive, what a source must bring to have samples of its own, and the most that have where sources are many.
+const OWN_SHARE: f32 = 0.12;
+const MOST_OWN: usize = 3;
+/// Parts are opened while they bring more than this share of all, up to so many.
+const OPENED: f32 = 0.02;
+const MOST_BRANCHES: usize = 32;
+/// Parts whose ball appears under a larger sine than this are near: opened while they bring more than this share, as which of their sources
+/// matters differs from receiver to receiver.
+const NEAR: f32 = 0.5;
+const OPENED_NEAR: f32 = 0.005;
+const MOST_NEAR_BRANCHES: usize = 48;
+
+/// A part with about what it brings.
+#[derive(Clone, Copy, PartialEq)]
+struct Weighted {
+    weight: f32,
+    branch: Branch,
+}
+
+impl Eq for Weighted {}
+
+impl Ord for Weighted {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        // The same everywhere, whatever the order in which they came.
+        self.weight.total_cmp(&other.weight).then(other.branch.cmp(&self.branch))
+    }
+}
+
+impl PartialOrd for Weighted {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Sources<'_> {
+    /// The cut at receivers within `reach` of one, canonical units. The lamps named in `shared` share samples, however bright they are.
+    pub fn cut(&self, receiver: &Receiver, reach: f32, shared: &[u32]) -> LightCut {
+        let mut cut = LightCut { lights: self.lights_apart.clone(), ..LightCut::default() };
+        let mut roots = Vec::new();
+        match self.few_lamps(receiver) {
+            Some(lamps) => (cut.lamps, cut.all_apart) = (lamps, true),
+            None => roots.extend(self.emitter_tree.root().map(Branch::Emitters)),
+        }
+        roots.extend(self.light_tree.root().map(Branch::Lights));
+        let weighted = |branch: Branch| Weighted { weight: self.weight(branch, receiver, reach), branch };
+        let mut open: BinaryHeap<Weighted> = roots.into_iter().map(weighted).collect();
+        let mut total: f32 = open.iter().map(|part| part.weight).sum();
+        let mut closed: Vec<Weighted> = Vec::new();
+        while let Some(part) = open.pop() {
+            let near = self.sine(part.branch, receiver, reach) > NEAR;
+            let (least, most) =
+                if near { (OPENED_NEAR, MOST_NEAR_BRANCHES) } else { (OPENED, MOST_BRANCHES) };
+            let worth_it = part.weight > least * total && open.len() + closed.len() + 2 <= most;
+            match self.halves(part.branch).filter(|_| worth_it) {
+                Some(halves) => {
+                    let halves = halves.map(weighted);
+                    total += halves.iter().map(|half| half.weight).sum::<f32>() - part.weight;
+                    open.extend(halves);
+                }
+                None => closed.push(part),
+            }
+        }
+        // What does not arrive at all is left out.
+        closed.retain(|part| part.weight > 0.0);
+        closed.sort_unstable_by(|a, b| b.cmp(a));
+        let mut own = 0;
+        closed.retain(|part| {
+            let is_own = own < MOST_OWN
+                && part.weight >= OWN_SHARE * total
+                && self.is_single(part.branch)
+                && !matches!(part.branch, Branch::Emitters(lamp) if shared.contains(&lamp));
+            if is_own {
+                own += 1;
+                match part.branch {
+                    Branch::Emitters(lamp) => cut.lamps.push(lamp),
+                    Branch::Lights(part) => cut.lights.extend(self.light_tree.children(part).err()),
+                }
+            }
+            !is_own
+        });
+        cut.lamps.sort_unstable();
+        cut.lights.sort_unstable();
+        // In the order of the tree, so that neighbours in the list are neighbours in space.
+        closed.sort_unstable_by_key(|part| part.branch);
+        let sum: f64 = closed.iter().map(|part| f64::from(part.weight)).sum();
+        cut.rest.near = closed.iter().any(|part| self.sine(part.branch, receiver, reach) > NEAR);
+        let (mut running, last) = (0.0, closed.len().saturating_sub(1));
+        for (place, part) in closed.iter().enumerate() {
+            running += f64::from(part.weight);
+            let end = if place == last { 1.0 } else { (running / sum) as f32 };
+            cut.rest.branches.push((part.branch, end));
+        }
+        if cut.rest.near {
+            let bounds = |part: &Weighted| match part.branch {
+                Branch::Emitters(part) => Some(self.emitter_tree.bounds(part)),
+                Branch::Lights(_) => None,
+            };
+            cut.rest.bounds = BoundsLanes::new(&closed.iter().map_while(bounds).collect::<Vec<_>>());
+        }
+        cut
+    }
+
+    /// All lamps, where they are few, or most of what a receiver sees.
+    fn few_lamps(&self, receiver: &Receiver) -> Option<Vec<u32>> {
+        let tree = &self.emitter_tree;
+        let Some(root) = tree.root() else { return Some(Vec::new()) };
+        let few = tree.lamps(root) <= FEW_LAMPS || tree.form_factor(receiver) > ENCLOSED;
+        if !few || tree.emitters(root) > MOST_EMITTERS {
+            return None;
+        }
+        let mut found = tree.groups(receiver, MOST_GROUPS);
+        found.sort_unstable();
+        Some(found)
+    }
+
+    /// Whether a part can have samples of its own.
+    fn is_single(&self, branch: Branch) -> bool {
+        match branch {
+            Branch::Emitters(part) => {
+                self.emitter_tree.lamps(part) == 1 && self.emitter_tree.emitters(part) <= FEW_EMITTERS
+            }
+            Branch::Lights(part) => self.light_tree.children(part).is_err(),
+        }
+    }
+
+    /// The halves of a part that is opened: lamps that can have samples of their own stay whole.
+    fn halves(&self, branch: Branch) -> Option<[Branch; 2]> {
+        match branch {
+            Branch::Emitters(_) if self.is_single(branch) => None,
+            Branch::Emitters(part) => Some(self.emitter_tree.children(part)?.map(Branch::Emitters)),
+            Branch::Lights(part) => Some(self.light_tree.children(part).ok()?.map(Branch::Lights)),
+        }
+    }
+
+    fn weight(&self, branch: Branch, receiver: &Receiver, reach: f32) -> f32 {
+        match branch {
+            Branch::Emitters(part) => self.emitter_tree.weight(part, receiver, reach),
+            Branch::Lights(part) => self.light_tree.weight(part, receiver, reach),
+        }
+    }
+
+    /// The sine under which a part's ball appears from receivers within `reach` of one, at most 1.
+    fn sine(&self, branch: Branch, receiver: &Receiver, reach: f32) -> f32 {
+        match branch {
+            Branch::Emitters(part) => self.emitter_tree.sine(part, receiver, reach),
+            Branch::Lights(part) => self.light_tree.sine(part, receiver, reach),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The part of a convex polygon on one side of a line or plane (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974), and the part of a
+//! segment in a polygon. Not both sides of a cut at once, in room that is reused: that is `cut_out`.
+
+use glam::{DVec2, DVec3};
+
+/// A corner, in the plane or in space.
+pub(crate) trait Corner: Copy {
+    /// The point at a share of the way to another.
+    fn towards(self, other: Self, share: f64) -> Self;
+}
+
+impl Corner for DVec2 {
+    fn towards(self, other: Self, share: f64) -> Self {
+        self.lerp(other, share)
+    }
+}
+
+impl Corner for DVec3 {
+    fn towards(self, other: Self, share: f64) -> Self {
+        self.lerp(other, share)
+    }
+}
+
+/// Calls `keep` for the corners, in their order, of the part of a convex polygon that is not below a height of 0.
+pub(crate) fn clip<C: Corner>(corners: &[C], height: impl Fn(C) -> f64, mut keep: impl FnMut(C)) {
+    let Some(&first) = corners.first() else { return };
+    let mut own = height(first);
+    for (place, &corner) in corners.iter().enumerate() {
+        let next = corners[(place + 1) % corners.len()];
+        let beyond = height(next);
+        if own >= 0.0 {
+            keep(corner);
+        }
+        if (own > 0.0 && beyond < 0.0) || (own < 0.0 && beyond > 0.0) {
+            keep(corner.towards(next, own / (own - beyond)));
+        }
+        own = beyond;
+    }
+}
+
+/// The part of a segment in a counter-clockwise convex polygon.
+pub(crate) fn clip_segment(polygon: &[DVec2], [p, q]: [DVec2; 2]) -> Option<[DVec2; 2]> {
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for (place, &a) in polygon.iter().enumerate() {
+        let b = polygon[(place + 1) % polygon.len()];
+        let (hp, hq) = ((b - a).perp_dot(p - a), (b - a).perp_dot(q - a));
+        match (hp >= 0.0, hq >= 0.0) {
+            (true, true) => {}
+            (false, false) => return None,
+            (true, false) => to = to.min(hp / (hp - hq)),
+            (false, true) => from = from.max(hp / (hp - hq)),
+        }
+    }
+    (from < to).then(|| [p.lerp(q, from), p.lerp(q, to)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: [DVec2; 3] = [DVec2::ZERO, DVec2::new(4.0, 0.0), DVec2::new(0.0, 4.0)];
+
+    #[test]
+    fn a_segment_ends_where_the_polygon_does() {
+        let part = |a: [f64; 2], b: [f64; 2]| clip_segment(&TRIANGLE, [a.into(), b.into()]);
+        let crossing = part([-1.0, 1.0], [9.0, 1.0]).expect("it crosses");
+        assert!(crossing[0].distance(DVec2::new(0.0, 1.0)) < 1e-12, "{crossing:?}");
+        assert!(crossing[1].distance(DVec2::new(3.0, 1.0)) < 1e-12, "{crossing:?}");
+        assert_eq!(part([0.5, 0.5], [1.0, 2.0]), Some([DVec2::new(0.5, 0.5), DVec2::new(1.0, 2.0)]));
+        // Beside an edge, past a corner, and along the prolonged edge.
+        assert_eq!(part([1.0, -0.1], [2.0, -0.1]), None);
+        assert_eq!(part([3.9, 2.0], [2.0, 3.9]), None);
+        assert_eq!(part([5.0, 0.0], [6.0, 0.0]), None);
+    }
+
+    #[test]
+    fn corners_on_the_plane_stay_once() {
+        let part = |height: &dyn Fn(DVec2) -> f64| {
+            let mut corners = Vec::new();
+            clip(&TRIANGLE, height, |corner| corners.push(corner));
+            corners
+        };
+        assert_eq!(part(&|p| p.x + 1.0), TRIANGLE);
+        assert_eq!(part(&|p| p.x), TRIANGLE);
+        assert!(part(&|p| -p.x - 1.0).is_empty());
+        assert_eq!(part(&|p| p.x - 1.0), [[1.0, 0.0], [4.0, 0.0], [1.0, 3.0]].map(DVec2::from));
+        // Through a corner and the middle of the edge before it.
+        assert_eq!(part(&|p| p.y - p.x), [[0.0, 0.0], [2.0, 2.0], [0.0, 4.0]].map(DVec2::from));
+    }
+}

@@ -1,0 +1,14 @@
+//! What stands between two places, by geometry alone: clipping of polygons, shafts from a lamp to a receiver, and shadows cut out of lamps. Not rays:
+//! those are `scene::occlusion`'s.
+
+pub(crate) mod clipping;
+pub(crate) mod contacts;
+pub(crate) mod cut_out;
+#[cfg(test)]
+pub(crate) mod lambert_integral;
+pub(crate) mod occluders;
+pub(crate) mod polygon;
+pub(crate) mod shadow_clipping;
+pub(crate) mod shaft;
+pub(crate) mod solid_angle;
+pub(crate) mod visible_part;
