@@ -22,7 +22,8 @@ pub struct Image {
 /// A lightmap: E/π per texel, linear RGB, top row first (v = 0 is the top row, as in glTF).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightmapImage {
-    /// File name of the OpenEXR image beside the glTF file.
+    /// File name given by the baker, or the path relative to the glTF file that the image was loaded from. Used
+    /// in messages, and to keep the names of atlases on export.
     pub name: String,
     /// Width in texels.
     pub width: u32,
