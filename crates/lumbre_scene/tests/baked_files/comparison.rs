@@ -103,7 +103,7 @@ impl Read {
         elements
     }
 
-    /// The vertex at each corner of each triangle in the index list, without triangles that repeat a vertex.
+    /// The vertex at each corner of each triangle, without triangles of a strip that repeat a vertex.
     pub fn corners(&self, primitive: &Value) -> Vec<usize> {
         let order: Vec<usize> = match &primitive["indices"] {
             Value::Null => (0..self.elements(&primitive["attributes"]["POSITION"]).len()).collect(),
