@@ -46,8 +46,8 @@ impl TriangleMesh {
     /// # Ok::<(), lumbre_mesh::MeshError>(())
     /// ```
     ///
+    /// # Errors
     /// [`MeshError`] if the mesh is not [valid](Self::validate).
-    /// [`MeshError`] where the mesh does not [validate](Self::validate).
     pub fn with_tangents(&self, set: TextureCoordinateSet) -> Result<Self, MeshError> {
         self.validate()?;
         let coordinates = match set {
