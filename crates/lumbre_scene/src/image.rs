@@ -112,7 +112,7 @@ pub struct TextureReference {
     pub offset: Vec2,
     /// Counter-clockwise rotation in radians about the origin.
     pub rotation: f32,
-    /// Factor per axis.
+    /// Scale factor per axis, applied first.
     pub scale: Vec2,
 }
 

@@ -23,14 +23,14 @@ pub enum QuadricShape {
     Plane,
     /// A sphere about the origin.
     Sphere {
-        /// Metres, greater than 0.
+        /// Radius in metres, greater than 0.
         radius: f64,
     },
     /// A cylinder from y = -height/2 to y = height/2.
     Cylinder {
-        /// Metres, greater than 0.
+        /// Radius in metres, greater than 0.
         radius: f64,
-        /// Metres, greater than 0.
+        /// Height in metres, greater than 0.
         height: f64,
         /// Whether its ends are closed by discs.
         closed: bool,
@@ -39,7 +39,7 @@ pub enum QuadricShape {
     Cone {
         /// Radius of the base in metres, greater than 0.
         radius: f64,
-        /// Metres, greater than 0.
+        /// Height in metres, greater than 0.
         height: f64,
         /// Whether its base is closed by a disc.
         closed: bool,

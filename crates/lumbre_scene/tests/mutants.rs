@@ -25,7 +25,7 @@ const BOUND: usize = 96 << 20;
 /// a hang.
 const SLOWEST: Duration = Duration::from_secs(5);
 
-/// Textures, a sparse accessor, a strip, vertex colours, an external-looking name.
+/// Textures, a sparse accessor, a strip and vertex colours.
 fn textured() -> Vec<u8> {
     let mut file = File::new();
     let view = file.view(&png(5, 4));

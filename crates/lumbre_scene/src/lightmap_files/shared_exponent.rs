@@ -1,7 +1,8 @@
 //! RGB9E5: three nine-bit mantissas that share a five-bit exponent, 32 bits per colour.
 //!
-//! A channel is m · 2^(e − 24), m < 512, e < 32 (`EXT_texture_shared_exponent`, N = 9, B = 15, Emax = 31; the same numbers are
-//! `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`): red in bits 0 to 8, green 9 to 17, blue 18 to 26, the exponent 27 to 31.
+//! A channel is m · 2^(e − 24), m < 512, e < 32 (`EXT_texture_shared_exponent`, N = 9, B = 15, Emax = 31; the
+//! same format is `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`). Red is in bits 0 to 8, green in 9 to 17, blue in 18 to 26,
+//! and the exponent in 27 to 31.
 
 use glam::{DVec3, Vec3};
 
@@ -58,7 +59,7 @@ mod tests {
     fn every_code_decodes_and_encodes_to_the_same_color() {
         for exponent in 0..32u32 {
             for red in 0..512u32 {
-                // Green and blue run through all mantissas as well, in orders of their own.
+                // Green and blue run through all mantissas as well, in other orders.
                 let code = red | ((red * 5 + 3) % 512) << 9 | ((red * 301 + 77) % 512) << 18 | exponent << 27;
                 let color = decode(code);
                 assert_eq!(color.x, red as f32 * 2f32.powi(exponent as i32 - 24));
@@ -77,7 +78,7 @@ mod tests {
         let unit = 2f64.powi(exponent - 24);
         let difference = (decoded - color.as_dvec3()).abs();
         assert!(difference.max_element() <= 0.5 * unit, "{color} became {decoded}, unit {unit}");
-        // The smallest exponent that holds the colour: with one less its largest channel rounds beyond 511.
+        // The exponent is the smallest possible: with one less the largest channel would round to above 511.
         if exponent > 0 {
             let mantissa = (color.max_element() as f64 / (0.5 * unit) + 0.5).floor();
             assert!(mantissa > 511.0, "{color} would fit exponent {}", exponent - 1);
@@ -94,7 +95,7 @@ mod tests {
             state
         };
         for _ in 0..400_000 {
-            // Any positive float up to the largest, log-uniform, subnormals included.
+            // Any positive float up to the largest value, log-uniform, including subnormals.
             let mut channel = || f32::from_bits((random() >> 32) as u32 % (LARGEST.to_bits() + 1));
             let color = Vec3::new(channel(), channel(), channel());
             let code = encode(color);
@@ -104,7 +105,7 @@ mod tests {
             let difference = (decode(code).as_dvec3() - color.as_dvec3()).abs().max_element();
             assert!(difference <= bound, "{color}: {difference} above {bound}");
         }
-        // Where the largest channel rounds up to a power of two and takes the next exponent.
+        // Values whose largest channel rounds up to a power of two and needs the next exponent.
         for power in -14..16 {
             for step in 0..64 {
                 let red = f32::from_bits((2f32.powi(power)).to_bits() - step * 1024);
@@ -119,7 +120,7 @@ mod tests {
         assert_eq!(decode(encode(Vec3::new(-1.0, 1e30, f32::MAX))), Vec3::new(0.0, LARGEST, LARGEST));
         assert_eq!(encode(Vec3::splat(-0.0)), 0);
         assert_eq!(encode(Vec3::splat(f32::MIN_POSITIVE)), 0);
-        // Half the smallest unit goes up, as the rule has it.
+        // Half of the smallest unit rounds up, as the rule requires.
         assert_eq!(decode(encode(Vec3::splat(2f32.powi(-25)))), Vec3::splat(2f32.powi(-24)));
     }
 }

@@ -1,8 +1,8 @@
 //! Unsigned floats of 11 and 10 bits with five exponent bits. Packing three of them into a word is in
 //! `packed_format`.
 //!
-//! (1 + m / 2^M) · 2^(e − 15) for 0 < e < 31, m / 2^M · 2^−14 for e = 0; e = 31 is infinity or NaN (Vulkan 1.3, sections
-//! "Unsigned 11-Bit Floating-Point Numbers" and "Unsigned 10-Bit Floating-Point Numbers").
+//! A number is (1 + m / 2^M) · 2^(e − 15) for 0 < e < 31 and m / 2^M · 2^−14 for e = 0; e = 31 is infinity or NaN
+//! (Vulkan 1.3, sections "Unsigned 11-Bit Floating-Point Numbers" and "Unsigned 10-Bit Floating-Point Numbers").
 
 /// A format, given by the number of its mantissa bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ mod tests {
         assert_eq!(FLOAT_10.encode(1.0), 0x1e0);
     }
 
-    /// Between any two neighbours: the nearer one, and the even one in the middle.
+    /// Values between two neighbouring numbers round to the nearer one, and ties to the even one.
     #[test]
     fn rounds_to_the_nearest() {
         for format in FORMATS {
