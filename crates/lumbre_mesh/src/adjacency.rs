@@ -1,18 +1,18 @@
-//! Who touches whom: the triangles around a vertex, the triangles along an edge. Not geometry.
+//! Adjacency of a triangle list: the triangles around a vertex and along an edge. No geometry.
 
 use std::collections::BTreeMap;
 
-/// The neighbourhoods of an indexed triangle list.
+/// The adjacency of an indexed triangle list.
 #[derive(Clone, Debug)]
 pub struct Adjacency {
     /// `fans[vertex_starts[v]..vertex_starts[v + 1]]` are the triangles of vertex v.
     vertex_starts: Vec<u32>,
     fans: Vec<u32>,
-    /// The edges, each with its triangles, sorted by their vertices.
+    /// All edges, sorted by their vertices.
     edges: Vec<Edge>,
-    /// For triangle t, `triangle_edges[t][k]` is the edge from its corner k to corner k + 1.
+    /// `triangle_edges[t][k]` is the edge from corner k to corner k + 1 of triangle t.
     triangle_edges: Vec<[u32; 3]>,
-    /// `edge_triangles[edge.first..edge.first + edge.count]`.
+    /// The triangles of an edge are `edge_triangles[edge.first..edge.first + edge.count]`.
     edge_triangles: Vec<u32>,
 }
 
@@ -25,9 +25,10 @@ struct Edge {
 }
 
 impl Adjacency {
-    /// From triangles whose indices are below `vertex_count`; others are ignored.
+    /// Builds the adjacency of triangles whose indices are below `vertex_count`; other triangles are ignored.
     ///
-    /// Pass indices through [`weld_positions`](crate::weld_positions) to cross the seams of split vertices.
+    /// Pass the indices through [`weld_positions`](crate::weld_positions) first to connect triangles across
+    /// split vertices.
     pub fn new(triangles: &[[u32; 3]], vertex_count: usize) -> Self {
         let valid = |t: &[u32; 3]| t.iter().all(|&vertex| (vertex as usize) < vertex_count);
         let mut vertex_starts = vec![0u32; vertex_count + 1];
@@ -66,20 +67,21 @@ impl Adjacency {
         Self { vertex_starts, fans, edges, triangle_edges, edge_triangles }
     }
 
-    /// The triangles that use a vertex, ascending; a triangle that uses it twice is there twice.
+    /// The triangles that use a vertex, in ascending order. A triangle that uses it twice is listed twice.
     pub fn triangles_of_vertex(&self, vertex: u32) -> &[u32] {
         let at = |index: usize| self.vertex_starts.get(index).map_or(0, |&start| start as usize);
         self.fans.get(at(vertex as usize)..at(vertex as usize + 1)).unwrap_or_default()
     }
 
-    /// The triangles that use the edge between two vertices, ascending; none if there is no such edge.
+    /// The triangles that use the edge between two vertices, in ascending order; empty if there is no such
+    /// edge.
     pub fn triangles_of_edge(&self, a: u32, b: u32) -> &[u32] {
         let key = [a.min(b), a.max(b)];
         let found = self.edges.binary_search_by_key(&key, |edge| edge.vertices);
         found.map_or(&[], |index| self.edge(index))
     }
 
-    /// The triangles along edge `corner` (to `corner + 1`) of a triangle, itself among them.
+    /// The triangles that share the edge from `corner` to `corner + 1` of a triangle, including itself.
     pub fn across(&self, triangle: u32, corner: usize) -> &[u32] {
         let edge = self.triangle_edges.get(triangle as usize).and_then(|edges| edges.get(corner));
         edge.map_or(&[], |&edge| self.edge(edge as usize))
@@ -92,12 +94,13 @@ impl Adjacency {
         })
     }
 
-    /// Number of different edges.
+    /// Number of distinct edges.
     pub fn edge_count(&self) -> usize {
         self.edges.len()
     }
 
-    /// How many edges have one triangle (a border), two (a surface), three (not a surface), and so on.
+    /// The number of edges by their number of triangles: one on a border, two inside a surface, three or more
+    /// where the mesh is not a manifold.
     pub fn edge_valences(&self) -> BTreeMap<u32, usize> {
         let mut valences = BTreeMap::new();
         for edge in &self.edges {

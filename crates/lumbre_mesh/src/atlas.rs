@@ -1,35 +1,35 @@
-//! Packs rectangles of texels into pages: a skyline, the highest rectangles first. Not what is inside them.
+//! Packs rectangles of texels into pages with a skyline packer, the tallest rectangles first.
 //!
-//! Jylänki, "A Thousand Ways to Pack the Bin", 2010: skyline, bottom-left. Deterministic.
+//! Jylänki, "A Thousand Ways to Pack the Bin", 2010: skyline, bottom-left. The result is deterministic.
 
-/// Limits of an atlas, in texels.
+/// Limits for packing, in texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AtlasOptions {
-    /// Widest page.
+    /// Largest width of a page.
     pub max_width: u32,
-    /// Highest page.
+    /// Largest height of a page.
     pub max_height: u32,
-    /// Free texels between two rectangles; none at the page's border.
+    /// Free texels between two rectangles. There is no gap at the borders of a page.
     pub gap: u32,
 }
 
-/// Where a rectangle went.
+/// The place of a rectangle in an atlas.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Placement {
     /// Index of the page.
     pub page: u32,
-    /// Texels from the page's left.
+    /// Left edge in texels.
     pub x: u32,
-    /// Texels from the page's first row.
+    /// First row in texels.
     pub y: u32,
 }
 
-/// A packing.
+/// The result of packing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Atlas {
-    /// Width and height of each page, in texels: what its rectangles need, at most the limits.
+    /// Width and height of each page in texels: as small as its rectangles allow, and within the limits.
     pub pages: Vec<(u32, u32)>,
-    /// One per rectangle, in their order.
+    /// The place of each rectangle, in the order of the input.
     pub placements: Vec<Placement>,
 }
 
@@ -43,26 +43,26 @@ pub enum AtlasError {
          raise the page size or lower the texel density"
     )]
     TooLarge {
-        /// Which rectangle.
+        /// Index of the rectangle.
         index: usize,
         /// Its width in texels.
         width: u32,
         /// Its height in texels.
         height: u32,
-        /// Widest page.
+        /// Largest width of a page.
         max_width: u32,
-        /// Highest page.
+        /// Largest height of a page.
         max_height: u32,
     },
 }
 
-/// Packs rectangles (width, height) into as many pages as they need; they are not rotated.
+/// Packs rectangles (width, height) into as many pages as necessary, without rotating them.
 ///
-/// Rectangles without area take no room. A page wider than it needs to be is tried narrower, so that few
-/// rectangles make a page that is about square.
+/// Rectangles without area take no space. Pages are made narrower than the limit where that suffices, so that
+/// few rectangles give an approximately square page.
 ///
 /// # Errors
-/// [`AtlasError::TooLarge`] where a rectangle alone exceeds a page.
+/// [`AtlasError::TooLarge`] if a single rectangle exceeds a page.
 pub fn pack(rectangles: &[(u32, u32)], options: AtlasOptions) -> Result<Atlas, AtlasError> {
     let AtlasOptions { max_width, max_height, gap } = options;
     for (index, &(width, height)) in rectangles.iter().enumerate() {
@@ -89,7 +89,7 @@ pub fn pack(rectangles: &[(u32, u32)], options: AtlasOptions) -> Result<Atlas, A
             Some(place) => place,
             None => {
                 let mut skyline = Skyline::new(limit.0);
-                // An empty skyline takes whatever is not larger than a page.
+                // An empty page can hold any rectangle that is not larger than a page.
                 let (x, y) = skyline.place(w, h, limit.1).unwrap_or_default();
                 skylines.push(skyline);
                 atlas.pages.push((0, 0));
@@ -104,22 +104,23 @@ pub fn pack(rectangles: &[(u32, u32)], options: AtlasOptions) -> Result<Atlas, A
     Ok(atlas)
 }
 
-/// The narrowest width at which the rectangles should fit a square, if one page can hold them at all.
+/// The width at which all rectangles should fit into a square page, or into the maximum height if that needs
+/// more width.
 fn page_width(order: &[usize], rectangles: &[(u32, u32)], options: AtlasOptions) -> u32 {
     let gap = f64::from(options.gap);
     let area: f64 =
         order.iter().map(|&i| (f64::from(rectangles[i].0) + gap) * (f64::from(rectangles[i].1) + gap)).sum();
     let widest = order.iter().map(|&i| rectangles[i].0).max().unwrap_or(1);
-    // A skyline wastes some 5 to 10 %.
+    // A skyline wastes about 5 to 10 %.
     let square = (area * 1.08).sqrt().ceil();
     let needed = (area * 1.15 / f64::from(options.max_height.max(1))).ceil();
     let width = square.max(needed).min(f64::from(options.max_width)) as u32;
     width.clamp(widest.min(options.max_width), options.max_width)
 }
 
-/// The upper outline of what is placed: segments from left to right.
+/// The upper outline of the placed rectangles, as segments from left to right.
 struct Skyline {
-    /// (left, top, width).
+    /// Each segment is (left, top, width).
     segments: Vec<(u64, u64, u64)>,
 }
 
@@ -128,7 +129,7 @@ impl Skyline {
         Self { segments: vec![(0, 0, width)] }
     }
 
-    /// The lowest, then leftmost place for a rectangle; takes it.
+    /// Finds the lowest and then leftmost place for a rectangle and occupies it.
     fn place(&mut self, width: u64, height: u64, max_height: u64) -> Option<(u64, u64)> {
         let mut best: Option<(u64, u64, usize)> = None;
         for first in 0..self.segments.len() {
@@ -142,7 +143,8 @@ impl Skyline {
         Some((x, y))
     }
 
-    /// Where a rectangle that starts at a segment comes to rest; `None` where it leaves the page.
+    /// The height at which a rectangle with its left edge at segment `first` comes to rest; `None` if it
+    /// exceeds the page.
     fn height_at(&self, first: usize, width: u64) -> Option<u64> {
         let (mut top, mut left_over) = (0, width);
         for &(_, y, segment) in &self.segments[first..] {
@@ -168,7 +170,7 @@ impl Skyline {
             }
         }
         self.segments.splice(first..last, [(x, top, width)].into_iter().chain(rest));
-        // Equal neighbours become one.
+        // Merge neighbouring segments of equal height.
         self.segments.dedup_by(|next, kept| {
             let same = next.1 == kept.1;
             if same {

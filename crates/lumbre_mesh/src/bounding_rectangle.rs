@@ -1,9 +1,10 @@
-//! The rectangle of least area around points of the plane: one side lies along an edge of the convex hull
-//! (Freeman and Shapira 1975). Not the bounding box along the axes.
+//! The bounding rectangle of least area of points in the plane. One of its sides contains an edge of the
+//! convex hull (Freeman and Shapira 1975).
 
 use glam::DVec2;
 
-/// Hull edges tried at most; a hull with more is nearly round, and every n-th edge is as good.
+/// Largest number of hull edges that are tried. A hull with more is nearly round, so trying every n-th edge
+/// suffices.
 const MOST_EDGES: usize = 256;
 
 /// A rotated rectangle: the points lie between `min` and `max` along `axis` and its perpendicular.
@@ -16,7 +17,7 @@ pub(crate) struct BoundingRectangle {
 }
 
 impl BoundingRectangle {
-    /// Around at least one finite point.
+    /// The rectangle around points, at least one of which must be finite.
     pub fn least_area(points: &[DVec2]) -> Self {
         let hull = convex_hull(points);
         let mut best = along(DVec2::X, &hull);
@@ -25,7 +26,8 @@ impl BoundingRectangle {
             let edge = hull[(i + 1) % hull.len()] - hull[i];
             let Some(axis) = edge.try_normalize() else { continue };
             let rectangle = along(axis, &hull);
-            // Equal areas keep the first: the rounding of a square's edges decides nothing.
+            // Of nearly equal areas keep the first, so that rounding does not decide between the sides of a
+            // square.
             if rectangle.area() < best.area() * (1.0 - 1e-9) || best.area() == 0.0 {
                 best = rectangle;
             }
@@ -55,7 +57,7 @@ fn along(axis: DVec2, points: &[DVec2]) -> BoundingRectangle {
     rectangle
 }
 
-/// Counter-clockwise, by Andrew's monotone chain.
+/// The convex hull in counter-clockwise order, by Andrew's monotone chain.
 fn convex_hull(points: &[DVec2]) -> Vec<DVec2> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
@@ -76,7 +78,7 @@ fn convex_hull(points: &[DVec2]) -> Vec<DVec2> {
             }
             hull.push(point);
         }
-        // The end of one half is the start of the other.
+        // The last point of one half is the first of the other.
         hull.pop();
     };
     half(&mut sorted.iter().copied());

@@ -1,5 +1,5 @@
-//! Cuts a surface into charts: connected patches that a parallel projection shows without overlap or flip.
-//! Not their place in the atlas: that is `unwrap`.
+//! Cuts a surface into charts: connected patches that an orthographic projection maps to the plane without
+//! overlaps or flipped triangles. Their place in the atlas is determined in `unwrap`.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -9,10 +9,10 @@ use glam::{DVec2, DVec3};
 use crate::adjacency::Adjacency;
 use crate::planar_overlap::OverlapGrid;
 
-/// A chart before it has a place: its triangles and their plane.
+/// A chart before packing: its triangles and the plane they are projected to.
 #[derive(Clone, Debug)]
 pub(crate) struct FlatChart {
-    /// Ascending.
+    /// In ascending order.
     pub triangles: Vec<u32>,
     pub normal: DVec3,
     pub tangent: DVec3,
@@ -25,7 +25,8 @@ impl FlatChart {
     }
 }
 
-/// A triangle that waits to join a chart; the flattest first, then the first in the mesh.
+/// A triangle that may join a chart. The queue prefers normals close to the seed's, then low triangle
+/// indices.
 struct Candidate {
     cosine: f64,
     triangle: u32,
@@ -51,30 +52,32 @@ impl PartialEq for Candidate {
 
 impl Eq for Candidate {}
 
-/// The surface to cut.
+/// The surface to be cut, and the options.
 pub(crate) struct Charting<'a> {
     pub corners: &'a [[DVec3; 3]],
-    /// Unit face normals; zero marks a triangle that belongs to no chart.
+    /// Unit face normals; zero for triangles that belong to no chart.
     pub normals: &'a [DVec3],
     pub areas: &'a [f64],
     pub adjacency: &'a Adjacency,
-    /// Cosine of the largest angle between a triangle and its chart.
+    /// Cosine of the largest angle between a triangle's normal and its chart's.
     pub least_cosine: f64,
 }
 
-/// Triangles between two questions whether to go on.
+/// Number of triangles between two calls of `go_on`.
 const STEPS: usize = 1024;
 
 impl Charting<'_> {
-    /// Every triangle with a normal lies in exactly one chart.
+    /// Cuts the surface so that every triangle with a normal lies in exactly one chart.
     ///
-    /// A region first grows from the first free triangle, led by its own mean normal; then it is grown again
-    /// in the fixed plane of that mean, taking only triangles that overlap none there. The rest stays free.
+    /// A region first grows from the first free triangle, guided by the region's own mean normal. Then it is
+    /// grown again in the fixed plane of that mean, accepting only triangles that do not overlap there. The
+    /// rejected ones stay free.
     ///
-    /// None if `go_on`, which is asked now and then, says no.
+    /// Returns `None` if `go_on`, which is called now and then, returns false.
     pub fn charts(&self, go_on: &dyn Fn() -> bool) -> Option<Vec<FlatChart>> {
         let mut owner: Vec<u32> = vec![u32::MAX; self.corners.len()];
-        // Number of the search that visited a triangle last, and whether as part of the region.
+        // For each triangle, the number of the last search that visited it, and of the last that added it to
+        // the region.
         let mut region_of = vec![0u32; self.corners.len()];
         let mut visited = vec![0u32; self.corners.len()];
         let mut round = 0;
@@ -98,7 +101,7 @@ impl Charting<'_> {
                 let accepted = region.is_empty()
                     || free(triangle) && normal.dot(mean) >= self.least_cosine * mean.length();
                 if accepted {
-                    // The seed's own normal counts even where its area underflows.
+                    // The seed must contribute its normal even if its area underflows.
                     mean += normal * self.areas[index].max(f64::MIN_POSITIVE);
                     region.push(triangle);
                     region_of[index] = round;
@@ -133,7 +136,8 @@ impl Charting<'_> {
                 accepted
             });
             if taken.is_empty() {
-                // Not reachable with a sound normal; a chart of its own keeps the promise all the same.
+                // Unreachable for valid normals; a chart of its own keeps every triangle in a chart all the
+                // same.
                 taken.push(seed);
             }
             taken.sort_unstable();
@@ -146,7 +150,7 @@ impl Charting<'_> {
         (!stopped).then_some(charts)
     }
 
-    /// Visits triangles outward from the seed, across edges with one neighbour that runs the same way round.
+    /// Visits triangles from the seed outwards, across edges with exactly two triangles.
     fn grow(&self, seed: u32, round: u32, visited: &mut [u32], mut accept: impl FnMut(u32, usize) -> bool) {
         let mut waiting = BinaryHeap::from([Candidate { cosine: 1.0, triangle: seed }]);
         visited[seed as usize] = round;
@@ -156,7 +160,7 @@ impl Charting<'_> {
                 continue;
             }
             for corner in 0..3 {
-                // More than two triangles on an edge are not a surface that could be laid flat.
+                // Surfaces cannot be flattened across an edge with more than two triangles.
                 let &[first, second] = self.adjacency.across(triangle, corner) else { continue };
                 let neighbour = if first == triangle { second } else { first };
                 let index = neighbour as usize;

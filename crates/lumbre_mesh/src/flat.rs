@@ -1,23 +1,23 @@
-//! Meshes for flat shading: one normal, one centroid per polygon. Not the shading itself.
+//! Meshes for flat shading: one normal and one centroid per triangle.
 
 use glam::Vec3;
 
 use crate::TriangleMesh;
 use crate::normals::face_normal;
 
-/// A triangle with its own three vertices, and what flat shading evaluates once for it.
+/// A triangle with vertices of its own, and the values for which flat shading is evaluated once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlatTriangle {
     /// Corners in metres.
     pub positions: [Vec3; 3],
-    /// Unit face normal; zero for a triangle without area.
+    /// Unit face normal; zero for a degenerate triangle.
     pub normal: Vec3,
     /// Mean of the corners, in metres, computed in f64.
     pub centroid: Vec3,
 }
 
-/// The mesh expanded for flat shading, a triangle at a time, in order. Triangles with an index out of range are
-/// left out; [`TriangleMesh::validate`] tells.
+/// The triangles of a mesh for flat shading, in order. Triangles with an index out of range are left out;
+/// [`TriangleMesh::validate`] reports them.
 pub fn flat_triangles(mesh: &TriangleMesh) -> impl Iterator<Item = FlatTriangle> + '_ {
     mesh.triangles().filter_map(|triangle| {
         let [a, b, c] = triangle.map(|vertex| mesh.positions.get(vertex as usize).copied());
@@ -28,10 +28,10 @@ pub fn flat_triangles(mesh: &TriangleMesh) -> impl Iterator<Item = FlatTriangle>
     })
 }
 
-/// The mesh with three vertices of its own for every triangle, all with the face's normal: what glTF asks for
-/// where a mesh has no normals. Other attributes are copied; a triangle without area has a normal of zero.
+/// The mesh with three separate vertices for every triangle, all with the face normal, as glTF requires for
+/// meshes without normals. Other attributes are copied. Degenerate triangles get zero normals.
 ///
-/// Triangles with an index out of range are left out; [`TriangleMesh::validate`] tells.
+/// Triangles with an index out of range are left out; [`TriangleMesh::validate`] reports them.
 pub fn flat_shaded(mesh: &TriangleMesh) -> TriangleMesh {
     let in_range = |t: &[u32; 3]| t.iter().all(|&vertex| (vertex as usize) < mesh.positions.len());
     let sources: Vec<u32> = mesh.triangles().filter(in_range).flatten().collect();
@@ -41,9 +41,10 @@ pub fn flat_shaded(mesh: &TriangleMesh) -> TriangleMesh {
     flat
 }
 
-/// The normals of a mesh that has none: flat, as glTF 2.0 asks (section 3.7.2.1), so vertices are split.
+/// Adds flat normals to a mesh without normals, as glTF 2.0 requires (section 3.7.2.1). Vertices are split by
+/// triangle.
 ///
-/// A mesh with normals comes back unchanged.
+/// A mesh with normals is returned unchanged.
 pub fn compute_flat_normals(mesh: TriangleMesh) -> TriangleMesh {
     if mesh.normals.is_empty() { flat_shaded(&mesh) } else { mesh }
 }

@@ -1,13 +1,13 @@
-//! Grids of quads, of which shapes and surfaces are made. Not what they are bent into.
+//! Grids of quads, from which shapes and parametric surfaces are built.
 
 use glam::{DVec3, Vec2};
 
 use crate::TriangleMesh;
 
-/// Largest count of segments, rings or columns.
+/// Largest number of segments, rings or columns.
 pub const MAX_SEGMENTS: u32 = 2048;
 
-/// One corner of a grid.
+/// One vertex of a grid.
 pub(crate) struct GridVertex {
     pub position: DVec3,
     pub normal: DVec3,
@@ -15,15 +15,17 @@ pub(crate) struct GridVertex {
 }
 
 impl TriangleMesh {
-    /// Appends a grid of `columns` by `rows` quads, counter-clockwise where column and row axes turn left.
+    /// Appends a grid of `columns` by `rows` quads. Triangles are counter-clockwise where the row axis is to
+    /// the left of the column axis.
     ///
-    /// `vertex(column, row)` is asked once per corner. Triangles with two corners in one place are left out.
+    /// `vertex(column, row)` is called once per vertex. Triangles with two corners at the same position are
+    /// left out.
     pub(crate) fn push_grid(&mut self, columns: u32, rows: u32, vertex: impl Fn(u32, u32) -> GridVertex) {
         let first = self.positions.len() as u32;
         for row in 0..=rows {
             for column in 0..=columns {
                 let GridVertex { position, normal, uv0 } = vertex(column, row);
-                // Adding 0 turns -0 into 0, so that both sides of a seam are the same bits.
+                // Adding 0 turns -0 into 0, so that positions on both sides of a seam are bitwise equal.
                 self.positions.push(position.as_vec3() + 0.0);
                 self.normals.push(normal.as_vec3());
                 self.uv0.push(Vec2::new(uv0[0] as f32, uv0[1] as f32));
@@ -60,7 +62,7 @@ impl TriangleMesh {
         self.with_vertices(&sources, indices)
     }
 
-    /// Appends a mesh with the same attributes as this one, or to an empty one.
+    /// Appends a mesh that has the same attributes as this one, or appends to an empty mesh.
     pub(crate) fn append(&mut self, other: Self) {
         let first = self.positions.len() as u32;
         self.positions.extend(other.positions);

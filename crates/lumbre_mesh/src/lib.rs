@@ -1,12 +1,13 @@
-//! Indexed triangle meshes and what lighting needs of them: normals, neighbourhoods, shapes, lightmap coordinates.
+//! Indexed triangle meshes and the geometry that lighting needs: normals, adjacency, exact shapes and
+//! lightmap coordinates.
 //!
-//! No ECS, no GPU, no files: `glam` in, `glam` out.
+//! The crate knows no ECS, GPU or files; its interface uses `glam` types only.
 //!
 //! ```text
 //!   surfaces ► shapes ┐              ┌─► normals (flat, smooth)
 //!                   ├─► TriangleMesh ┼─► flat (triangle, normal, centroid)
 //!                   │                ├─► tangents (MikkTSpace)
-//!                   │                ├─► surface_spread (how large and curved triangles are)
+//!                   │                ├─► surface_spread (bounds on triangle size and curvature)
 //!   a file's mesh ──┘                ├─► weld ─► adjacency
 //!                                    └─► unwrap ─► charts ─► atlas ─► uv1 ─► uv_validation
 //! ```

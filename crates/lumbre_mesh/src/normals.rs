@@ -1,24 +1,27 @@
-//! Normals from geometry: of a face, and averaged over the faces around a point. Not normal maps.
+//! Normals from geometry: face normals, and vertex normals averaged over the adjacent faces. Normal maps are
+//! elsewhere.
 
 use glam::{DVec3, Vec3};
 
 use crate::{Adjacency, MeshError, TriangleMesh, weld_positions};
 
-/// What a face counts for in the average at a vertex.
+/// The weight of a face in the average at a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NormalWeight {
-    /// Every face alike: the plain sum of unit normals of documents \[I\] and \[M\]. Depends on how a polygon is cut into triangles.
+    /// Equal weights: the plain sum of unit normals of documents \[I\] and \[M\]. Depends on how a polygon is
+    /// triangulated.
     Uniform,
-    /// By area: large faces decide.
+    /// By the area of the face, so that large faces dominate.
     Area,
-    /// By the face's angle at the vertex (Thürmer and Wüthrich 1998): does not depend on the cutting.
+    /// By the face's angle at the vertex (Thürmer and Wüthrich 1998), which is independent of the
+    /// triangulation.
     #[default]
     Angle,
 }
 
 /// The unit normal of a counter-clockwise triangle, computed in f64.
 ///
-/// `None` for a triangle without area or with a coordinate that is not finite.
+/// `None` if the triangle is degenerate or a coordinate is not finite.
 pub fn face_normal(triangle: &[Vec3; 3]) -> Option<Vec3> {
     face_normal_f64(&triangle.map(|vertex| vertex.as_dvec3())).map(|normal| normal.as_vec3())
 }
@@ -27,19 +30,20 @@ fn face_normal_f64([a, b, c]: &[DVec3; 3]) -> Option<DVec3> {
     (*b - *a).cross(*c - *a).try_normalize()
 }
 
-/// A mesh with averaged normals, and where there was none to average.
+/// A mesh with averaged normals, and the number of vertices that have no average.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothNormals {
     /// The mesh.
     pub mesh: TriangleMesh,
-    /// Vertices around which the faces cancel: they have the normal of their first face.
+    /// Number of vertices at which the face normals cancel; these have the normal of their first face.
     pub cancelled: usize,
-    /// Vertices without a face that has a normal: theirs is zero, and they take ambient light only.
+    /// Number of vertices without any face that has a normal; theirs is zero, so they receive ambient light
+    /// only.
     pub missing: usize,
 }
 
 impl SmoothNormals {
-    /// One sentence about the mesh of that name if any vertex fell back, for a log: once a mesh, not once a vertex.
+    /// A message about the mesh, named `name`, if any vertex has no average: one per mesh, for a log.
     pub fn remark(&self, name: &str) -> Option<String> {
         let Self { cancelled, missing, .. } = self;
         (cancelled + missing > 0).then(|| {
@@ -51,20 +55,21 @@ impl SmoothNormals {
     }
 }
 
-/// The mesh with smooth normals: at each point of space the normalized sum of the faces around it,
-/// N = sum w_k N_k / |sum w_k N_k|. Vertices at the same position share it.
+/// The mesh with smooth normals: the normalized weighted sum over the faces around each position, N = sum w_k
+/// N_k / |sum w_k N_k|. Vertices at the same position share it.
 ///
-/// Where the sum cancels, the normal is that of the first face of the vertex that has one; a vertex with no such
+/// Where the sum cancels, the normal is that of the vertex's first face that has one; a vertex without such a
 /// face gets zero. The result counts both.
 ///
-/// Against a smooth surface the error falls with the square of the edges' length where the faces around a vertex lie point by point
-/// opposite each other, as on a regular grid, and with the length itself where they do not, whatever the weight, as long as no
-/// triangle's angle comes near 180 degrees.
+/// Compared with a smooth surface, the error falls with the square of the edge length where the faces around
+/// a vertex are symmetric about it, as on a regular grid, and with the edge length itself elsewhere. This
+/// holds for every weight, as long as no angle of a triangle comes near 180 degrees.
 ///
-/// Source: document \[I\], Gouraud (uniform weight); \[M\] 1.6.2 and figure 2.5, where the divisor is printed as sum |N_k|.
+/// Source: document \[I\], Gouraud (uniform weight); \[M\] 1.6.2 and figure 2.5, where the divisor is printed
+/// as sum |N_k|.
 ///
 /// # Errors
-/// [`MeshError`] where the mesh is not sound.
+/// [`MeshError`] if the mesh is invalid.
 pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Result<SmoothNormals, MeshError> {
     mesh.validate()?;
     let welded = weld_positions(&mesh.positions);
@@ -84,7 +89,8 @@ pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Resu
             sum += normal * weight;
             weights += weight;
         }
-        // A sum of unit vectors is exact to some 1e-16 of its weights: less than that has cancelled.
+        // A sum of unit vectors has a rounding error of about 1e-16 times its weights. A shorter sum has
+        // cancelled.
         let average = if sum.length() <= 1e-12 * weights { None } else { sum.try_normalize() };
         match (average, around.iter().find_map(|&t| faces[t as usize])) {
             (Some(average), _) => Around::Average(average.as_vec3()),
@@ -94,7 +100,7 @@ pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Resu
     };
     let mut found = vec![Around::Nothing; mesh.positions.len()];
     for (vertex, &point) in welded.iter().enumerate() {
-        // The first vertex at a point comes before the others.
+        // Welding refers to the first vertex at a position, so its result is known already.
         found[vertex] = if point as usize == vertex { average(point) } else { found[point as usize] };
     }
     let count = |is: fn(&Around) -> bool| found.iter().filter(|around| is(around)).count();
@@ -104,7 +110,7 @@ pub fn compute_smooth_normals(mesh: &TriangleMesh, weight: NormalWeight) -> Resu
     Ok(SmoothNormals { mesh: TriangleMesh { normals, ..mesh.clone() }, cancelled, missing })
 }
 
-/// What the faces around a point come to.
+/// The result for the faces around a position.
 #[derive(Clone, Copy)]
 enum Around {
     Average(Vec3),
@@ -129,7 +135,7 @@ fn face_weight(weight: NormalWeight, triangle: &[u32; 3], vertex: u32, corners: 
         NormalWeight::Angle => {
             let corner = triangle.iter().position(|&v| v == vertex).unwrap_or(0);
             let to = |next: usize| corners[(corner + next) % 3] - corners[corner];
-            // atan2 keeps its accuracy for slivers, where acos does not.
+            // atan2 stays accurate for slivers, where acos does not.
             to(1).cross(to(2)).length().atan2(to(1).dot(to(2)))
         }
     }

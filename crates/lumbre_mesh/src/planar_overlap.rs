@@ -1,12 +1,13 @@
-//! Do two triangles of the plane overlap, and which of many: the exact question behind an injective chart.
-//! Not texels: those are `uv_validation`.
+//! Tests whether triangles in the plane overlap, for pairs and against a grid of many. Used to keep charts
+//! injective; the check by texels is in `uv_validation`.
 
 use glam::DVec2;
 
-/// Relative slack of a separating line, for coordinates that were rounded in f64.
+/// Relative tolerance for separating lines, for coordinates rounded in f64.
 const SLACK: f64 = 1e-12;
 
-/// Whether the interiors of two counter-clockwise triangles meet; touching at an edge or a corner is not meeting.
+/// Returns true if the interiors of two counter-clockwise triangles intersect. Triangles that only share an
+/// edge or a corner do not overlap.
 pub(crate) fn triangles_overlap(a: &[DVec2; 3], b: &[DVec2; 3]) -> bool {
     !separated_by_an_edge_of(a, b) && !separated_by_an_edge_of(b, a)
 }
@@ -21,7 +22,7 @@ fn separated_by_an_edge_of(a: &[DVec2; 3], b: &[DVec2; 3]) -> bool {
     })
 }
 
-/// The triangles accepted so far, in a grid, so that a new one is compared with its neighbours only.
+/// The accepted triangles in a uniform grid, so that a new one is compared only with those nearby.
 pub(crate) struct OverlapGrid {
     min: DVec2,
     cells_per_unit: DVec2,
@@ -29,16 +30,16 @@ pub(crate) struct OverlapGrid {
     rows: usize,
     cells: Vec<Vec<u32>>,
     triangles: Vec<[DVec2; 3]>,
-    /// Per triangle, the last candidate it was compared with: no pair is tested twice.
+    /// For each triangle, the last candidate it was compared with, so that no pair is tested twice.
     seen: Vec<u32>,
     candidate: u32,
 }
 
 impl OverlapGrid {
-    /// For about `count` triangles within a box.
+    /// An empty grid for about `count` triangles within a box.
     pub fn new(min: DVec2, max: DVec2, count: usize) -> Self {
         let size = (max - min).max(DVec2::splat(f64::MIN_POSITIVE));
-        // About one cell per triangle, nearly square cells.
+        // About one cell per triangle, with nearly square cells.
         let cells = count.clamp(1, 1 << 22) as f64;
         let columns = (cells * size.x / size.y).sqrt().clamp(1.0, cells).ceil() as usize;
         let rows = (cells / columns as f64).ceil().max(1.0) as usize;
@@ -54,7 +55,7 @@ impl OverlapGrid {
         }
     }
 
-    /// Adds a counter-clockwise triangle unless it overlaps one that is there; whether it was added.
+    /// Adds a counter-clockwise triangle unless it overlaps one in the grid. Returns true if it was added.
     pub fn insert(&mut self, triangle: [DVec2; 3]) -> bool {
         let cells = self.cells_of(&triangle);
         self.candidate += 1;
@@ -78,7 +79,8 @@ impl OverlapGrid {
         true
     }
 
-    /// The cells a triangle touches, row by row, so that a long sliver does not take its whole box.
+    /// The cells that a triangle touches, found row by row, so that a long sliver does not take its whole
+    /// bounding box.
     fn cells_of(&self, triangle: &[DVec2; 3]) -> Vec<usize> {
         let local = triangle.map(|point| (point - self.min) * self.cells_per_unit);
         let clamp = |value: f64, count: usize| value.floor().clamp(0.0, (count - 1) as f64) as usize;
@@ -86,7 +88,7 @@ impl OverlapGrid {
         let high = local[0].y.max(local[1].y).max(local[2].y);
         let mut cells = Vec::new();
         for row in clamp(low, self.rows)..=clamp(high, self.rows) {
-            // One unit of slack on each side covers the rounding of `local`.
+            // The margin covers the rounding of `local`.
             let margin = 1e-6 * (1.0 + self.rows as f64);
             let (bottom, top) = (row as f64 - margin, row as f64 + 1.0 + margin);
             let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -143,7 +145,7 @@ mod tests {
         let mut grid = OverlapGrid::new(DVec2::ZERO, DVec2::ONE, 300);
         let mut kept: Vec<[DVec2; 3]> = Vec::new();
         for i in 0..2000 {
-            // Slivers across the square and small triangles.
+            // Slivers across the square, and small triangles.
             let size = if i % 10 == 0 { 1.0 } else { 0.05 };
             let at = DVec2::new(random(), random());
             let mut t = [(); 3].map(|()| (at + size * DVec2::new(random(), random())).min(DVec2::ONE));

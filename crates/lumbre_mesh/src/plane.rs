@@ -1,30 +1,31 @@
-//! The plane that a flat mesh lies in, for mirrors. Not flat shading, which gives every triangle a normal of its own: that is `flat`.
+//! The plane of a flat mesh, for planar mirrors. Flat shading, with a normal per triangle, is in `flat`.
 
 use glam::DVec3;
 
 use crate::TriangleMesh;
 
-/// The plane of a flat mesh, in its own space.
+/// The plane of a flat mesh, in mesh space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshPlane {
     /// A point on it, in metres.
     pub point: DVec3,
-    /// Its unit normal, towards the side from which the triangles wind counter-clockwise.
+    /// Its unit normal, on the side from which the triangles are counter-clockwise.
     pub normal: DVec3,
 }
 
-/// The farthest that a vertex may stand off the plane, as a part of the mesh's extent: what positions in f32 lose.
+/// Largest distance of a vertex from the plane as a fraction of the mesh's extent, to allow for positions
+/// rounded to f32.
 const FLATNESS: f64 = 1e-5;
-/// The cosine of the largest angle between a vertex normal and the plane's, 1 mrad.
+/// Cosine of the largest angle between a vertex normal and the plane's normal, 1 mrad.
 const ALONG_NORMAL: f64 = 1.0 - 0.5e-6;
 
 impl TriangleMesh {
-    /// The plane in which all triangles lie, facing the same side, with vertex normals (where there are any) that stand on it. `None` where
-    /// the mesh is not flat, has no area, or an index is out of range.
+    /// The plane that contains all triangles, if they all face the same side and the vertex normals, if any,
+    /// are perpendicular to it. `None` if the mesh is not flat, has no area, or has an index out of range.
     pub fn plane(&self) -> Option<MeshPlane> {
         let corner = |vertex: u32| self.positions.get(vertex as usize).map(|position| position.as_dvec3());
         let first = corner(*self.indices.first()?)?;
-        // Twice the vector area: triangles that lie in one plane add up to its normal.
+        // Twice the vector area, which has the direction of the plane's normal.
         let (mut area, mut extent) = (DVec3::ZERO, 0.0_f64);
         for triangle in self.triangles() {
             let [Some(a), Some(b), Some(c)] = triangle.map(corner) else { return None };
@@ -36,7 +37,7 @@ impl TriangleMesh {
         for triangle in self.triangles() {
             let [Some(a), Some(b), Some(c)] = triangle.map(corner) else { return None };
             let flat = [a, b, c].iter().all(|corner| normal.dot(*corner - first).abs() <= slack);
-            // A sliver's winding is lost in rounding, and it covers no pixel.
+            // The winding of a sliver is unreliable, and it covers no pixel.
             let faces_away = normal.dot((b - a).cross(c - a)) < -slack * extent;
             let upright = triangle.iter().all(|&vertex| match self.normals.get(vertex as usize) {
                 Some(vertex_normal) => normal.dot(vertex_normal.as_dvec3()) >= ALONG_NORMAL,

@@ -1,50 +1,56 @@
-//! How large the triangles of a mesh are and how curved, in a handful of numbers by patches: what interpolated lighting may be off by follows from them. Not the lighting.
+//! Bounds on the size and curvature of a mesh's triangles, for the whole mesh and for patches of it. The
+//! renderer derives from them how far interpolated lighting can be off.
 
 use glam::DVec3;
 
 use crate::TriangleMesh;
 
-/// All directions within an angle of an axis.
+/// The cone of all directions within an angle of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalCone {
-    /// Unit.
+    /// Unit vector.
     pub axis: DVec3,
-    /// Radians, 0 to π.
+    /// In radians, 0 to π.
     pub half_angle: f64,
 }
 
-/// Triangles near each other that look in about the same direction: the largest number of each kind over all of them. Lengths are in metres of the mesh.
+/// Bounds over triangles that are near each other and have similar normals. Lengths are in metres in mesh
+/// space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePatch {
-    /// Middle of the bounding box.
+    /// Centre of the bounding box.
     pub center: DVec3,
-    /// Half the box's sides.
+    /// Half the side lengths of the bounding box.
     pub half_size: DVec3,
-    /// The longest edge.
+    /// Length of the longest edge.
     pub edge: f64,
-    /// The longest difference between two unit normals of a triangle's vertices, 0 to 2. A triangle of which some vertices have a normal and others have none counts as 2.
+    /// Largest length of the difference between two unit normals at vertices of the same triangle, 0 to 2. A
+    /// triangle with normals at only some of its vertices counts as 2.
     pub normals: f64,
-    /// The longest difference between the unit normal of a triangle and that of one of its vertices, 0 to 2.
+    /// Largest length of the difference between the unit normal of a triangle and that at one of its
+    /// vertices. It is 0 to 2, and 1 at vertices without a normal.
     pub face_normals: f64,
-    /// Holds the normals of all triangles and vertices; none where they point everywhere.
+    /// Contains the normals of all triangles and vertices; `None` if the triangle normals cancel.
     pub cone: Option<NormalCone>,
 }
 
-/// The triangles of a mesh that have an area.
+/// Bounds over the triangles of a mesh, without degenerate ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceSpread {
-    /// All of them; none for a mesh without area.
+    /// Bounds over all triangles; `None` for a mesh without area.
     pub whole: Option<SurfacePatch>,
-    /// Each of them in one of at most [`MOST_PATCHES`], those with the longest edges and the most different normals first.
+    /// A partition of the triangles into at most [`MOST_PATCHES`] patches, those with the longest edges and
+    /// the largest normal differences first.
     pub patches: Vec<SurfacePatch>,
 }
 
-/// Patches of a mesh at most: every triangle of a small one is a patch.
+/// Largest number of patches of a mesh. In a mesh with fewer triangles, every triangle is a patch.
 pub const MOST_PATCHES: usize = 1 << HALVINGS;
 const HALVINGS: u32 = 7;
 
 impl SurfaceSpread {
-    /// Of a mesh whose indices are in range; triangles that are not, or that are not finite, are left out.
+    /// Computes the bounds of a mesh. Degenerate triangles, and those with an index out of range or a
+    /// coordinate that is not finite, are left out.
     pub fn of(mesh: &TriangleMesh) -> Self {
         let mut triangles: Vec<Triangle> = triangles(mesh).collect();
         if triangles.is_empty() {
@@ -54,14 +60,16 @@ impl SurfaceSpread {
         let mut patches = Vec::new();
         halve(&mut triangles, HALVINGS, whole.half_size.max_element(), &mut patches);
         let size = whole.half_size.max_element();
-        // What is most likely to be off first: whoever looks for that need not look at all.
+        // Patches with the largest expected error come first, so that a search for a violation can stop
+        // early.
         let most = |patch: &SurfacePatch| patch.edge / size + patch.normals;
         patches.sort_by(|a, b| most(b).total_cmp(&most(a)));
         Self { whole: Some(whole), patches }
     }
 }
 
-/// Halves triangles across where they are farthest apart, in place or in direction, so many times.
+/// Splits triangles `times` times into halves, each time along the axis of position or normal with the widest
+/// spread.
 fn halve(triangles: &mut [Triangle], times: u32, size: f64, patches: &mut Vec<SurfacePatch>) {
     if times == 0 || triangles.len() < 2 {
         patches.push(SurfacePatch::of(triangles));
@@ -88,7 +96,7 @@ fn halve(triangles: &mut [Triangle], times: u32, size: f64, patches: &mut Vec<Su
 }
 
 impl SurfacePatch {
-    /// Of one triangle at least.
+    /// The bounds over at least one triangle.
     fn of(triangles: &[Triangle]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (mut edge, mut normals, mut face_normals) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -114,16 +122,16 @@ fn normal_cone(triangles: &[Triangle]) -> Option<NormalCone> {
             cosine = cosine.min(normal.dot(axis));
         }
     }
-    // The rounding of the normals' f32, of which the cosine of a small angle knows nothing.
+    // The margin covers the f32 rounding of the normals, to which the cosine of a small angle is insensitive.
     Some(NormalCone { axis, half_angle: cosine.clamp(-1.0, 1.0).acos() + 1e-3 })
 }
 
-/// A triangle with an area.
+/// A non-degenerate triangle.
 struct Triangle {
     corners: [DVec3; 3],
-    /// Unit.
+    /// Unit vector.
     normal: DVec3,
-    /// Unit, or zero.
+    /// Unit vectors, or zero where the mesh has no normal.
     corner_normals: [DVec3; 3],
 }
 
@@ -182,13 +190,13 @@ mod tests {
     fn a_finer_sphere_is_less_curved_by_triangle_and_its_patches_are_small() {
         let of = |segments| SurfaceSpread::of(&shapes::uv_sphere(1.0, segments, segments / 2));
         let (coarse, fine) = (of(16), of(64));
-        // Normals of a unit sphere are its points: the difference of normals is the edge.
+        // The normals of a unit sphere are its points, so normal differences equal edge lengths.
         let (all_coarse, all_fine) = (coarse.whole.unwrap(), fine.whole.unwrap());
         assert!((all_coarse.normals - all_coarse.edge).abs() < 1e-5, "{all_coarse:?}");
         assert!((all_coarse.normals / all_fine.normals - 4.0).abs() < 0.2, "{all_coarse:?} {all_fine:?}");
         assert!(all_fine.cone.is_none_or(|cone| cone.half_angle > 3.0), "{all_fine:?}");
         assert_eq!(fine.patches.len(), MOST_PATCHES);
-        // A 128th of a sphere, were it round, has a half angle of 0.18.
+        // A round 128th of a sphere would have a half-angle of 0.18.
         let angles: Vec<f64> = fine.patches.iter().map(|patch| patch.cone.unwrap().half_angle).collect();
         assert!(angles.iter().all(|angle| *angle < 0.5), "{angles:?}");
     }

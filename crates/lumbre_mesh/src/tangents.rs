@@ -1,8 +1,9 @@
-//! Tangents over texture coordinates, by MikkTSpace: what normal maps lean on. Not the normal maps.
+//! Tangents for normal maps, computed from texture coordinates by MikkTSpace.
 //!
-//! glTF asks for this algorithm where a file has no tangents, and the tools that bake normal maps use it too; any other would show their
-//! seams. Its bitangent points where v grows. The green of glTF's normal maps points the other way, as v runs down the picture, so that w
-//! has the opposite sign here.
+//! glTF requires this algorithm for files without tangents, and the tools that bake normal maps use it too;
+//! tangents of another algorithm would make their seams visible. MikkTSpace's bitangent points towards
+//! increasing v. The green of glTF's normal maps points the other way, since v runs down the image, so w has
+//! the opposite sign here.
 
 use std::collections::HashMap;
 
@@ -11,8 +12,8 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::{MeshError, TriangleMesh};
 
-/// Most triangles that may meet in one place. The library's time grows with their square, and its stack with their number; a cap or a pole
-/// has some hundred.
+/// Most triangles that may meet at one position. The library's time grows with the square of their number,
+/// and its stack with the number itself. The caps and poles of shapes have some hundred.
 const MOST_AROUND: usize = 4096;
 
 /// One of a mesh's sets of texture coordinates.
@@ -26,12 +27,14 @@ pub enum TextureCoordinateSet {
 }
 
 impl TriangleMesh {
-    /// The mesh with tangents over one of its sets of texture coordinates. Triangles keep their place in the list; a vertex whose triangles
-    /// disagree, because the texture is mirrored or cut there, is split.
+    /// Returns the mesh with tangents computed from one of its sets of texture coordinates. Triangles keep
+    /// their order. A vertex at which its triangles' tangents differ, because the texture is mirrored or cut
+    /// there, is split.
     ///
-    /// Where coordinates or positions of a triangle coincide, or are no numbers, it takes the tangents of its neighbours; without any,
-    /// or without coordinates at all, the zero vector, on which a normal map has no effect. So does a mesh of which more than 4,096 triangles
-    /// meet in one place.
+    /// A triangle whose coordinates or positions coincide or are not finite takes the tangents of its
+    /// neighbours. Without neighbours, or for a mesh without coordinates or normals, tangents are zero, which
+    /// disables normal maps. The same holds for all tangents of a mesh with more than 4,096 triangles at one
+    /// position.
     ///
     /// ```
     /// use glam::{Vec3, Vec4};
@@ -44,7 +47,7 @@ impl TriangleMesh {
     /// ```
     ///
     /// # Errors
-    /// [`MeshError`] where the mesh does not [validate](Self::validate).
+    /// [`MeshError`] if the mesh is not [valid](Self::validate).
     pub fn with_tangents(&self, set: TextureCoordinateSet) -> Result<Self, MeshError> {
         self.validate()?;
         let coordinates = match set {
@@ -61,18 +64,18 @@ impl TriangleMesh {
                 Corners { mesh: self, coordinates, tangents: vec![Vec4::ZERO; self.indices.len()] };
             match generate_tangents(&mut corners) {
                 Ok(()) => corners.tangents,
-                // There is no such error, and none of it could be mended.
+                // The error type has no variants in this version of the library.
                 Err(_) => vec![Vec4::ZERO; self.indices.len()],
             }
         };
         Ok(self.split_by(&tangents))
     }
 
-    /// The most corners that lie in one place.
+    /// The largest number of triangle corners at one position.
     fn most_triangles_around_a_place(&self) -> usize {
         let mut around: HashMap<[u32; 3], usize> = HashMap::new();
         for &vertex in &self.indices {
-            // As MikkTSpace welds vertices: by what they are, not by their index. Zeros of both signs are one place.
+            // MikkTSpace welds vertices by value, not by index. Adding 0 turns -0 into 0.
             *around
                 .entry((self.positions[vertex as usize] + 0.0).to_array().map(f32::to_bits))
                 .or_default() += 1;
@@ -83,7 +86,7 @@ impl TriangleMesh {
     /// Splits vertices whose corners have different tangents.
     fn split_by(&self, corners: &[Vec4]) -> Self {
         const NONE: u32 = u32::MAX;
-        // Of each vertex, its first copy; of each copy, the next one of the same vertex.
+        // For each vertex, its first copy; for each copy, the next copy of the same vertex.
         let mut first = vec![NONE; self.positions.len()];
         let mut next: Vec<u32> = Vec::new();
         let (mut sources, mut tangents): (Vec<u32>, Vec<Vec4>) = (Vec::new(), Vec::new());
@@ -107,7 +110,7 @@ impl TriangleMesh {
     }
 }
 
-/// A mesh as MikkTSpace asks for it: corner by corner.
+/// The mesh in the form that MikkTSpace reads, corner by corner.
 struct Corners<'a> {
     mesh: &'a TriangleMesh,
     coordinates: &'a [Vec2],
@@ -196,17 +199,17 @@ mod tests {
     fn a_mirrored_texture_splits_the_vertices_of_its_seam() {
         let mesh = folded().with_tangents(TextureCoordinateSet::First).unwrap();
         mesh.validate().unwrap();
-        // Two vertices lie on the fold.
+        // The two vertices on the fold are split.
         assert_eq!(mesh.positions.len(), 8);
         for (at, triangle) in mesh.triangles().enumerate() {
             for vertex in triangle {
                 let (tangent, side) = (mesh.tangents[vertex as usize], if at < 2 { 1.0 } else { -1.0 });
                 assert_eq!(tangent.truncate(), side * Vec3::X);
-                // Green leans up the picture, towards smaller v, on both sides: along y.
+                // Green points up the image, towards smaller v, on both sides: along y.
                 assert_eq!(Vec3::Z.cross(tangent.truncate()) * tangent.w, Vec3::Y);
             }
         }
-        // The triangles are where they were.
+        // The triangles keep their order and positions.
         let places = |mesh: &TriangleMesh| mesh.triangle_positions().unwrap();
         assert_eq!(places(&mesh), places(&folded()));
     }
@@ -223,14 +226,15 @@ mod tests {
         assert!(broken.with_tangents(TextureCoordinateSet::First).is_err());
     }
 
-    /// The positions of the fold in the order in which triangles name them.
+    /// The positions of the folded square in the order in which triangles first use them.
     fn none_split() -> Vec<Vec3> {
         [0, 2, 1, 3, 4, 5].map(|vertex: usize| folded().positions[vertex]).to_vec()
     }
 
     #[test]
     fn meshes_of_any_numbers_get_tangents_that_are_numbers() {
-        // A linear congruential generator: few vertices, so that triangles share, degenerate and coincide.
+        // Few vertices, so that triangles share them, degenerate and coincide. The generator is linear
+        // congruential.
         let mut state = 1u64;
         let mut next = move |below: u32| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -1,4 +1,4 @@
-//! The indexed triangle mesh that every other crate reads. Not its neighbourhoods: those are `adjacency`.
+//! The indexed triangle mesh that all other crates use. Adjacency is in `adjacency`.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -9,16 +9,17 @@ pub struct TriangleMesh {
     pub positions: Vec<Vec3>,
     /// Unit normals. A zero vector marks a normal that could not be computed.
     pub normals: Vec<Vec3>,
-    /// Unit tangents, which point where u grows, in the order of TANGENT: w is +1 or -1, and (normal x tangent) w points where the green of
-    /// a normal map leans, towards smaller v. Absent in most meshes: [`with_tangents`](Self::with_tangents) makes them.
+    /// Unit tangents in the direction of increasing u, stored as in glTF's TANGENT: w is +1 or -1, and
+    /// (normal x tangent) w is the direction of a normal map's green, towards decreasing v. Empty in most
+    /// meshes; [`with_tangents`](Self::with_tangents) computes them.
     pub tangents: Vec<Vec4>,
-    /// TEXCOORD_0: material textures.
+    /// TEXCOORD_0: coordinates of material textures.
     pub uv0: Vec<Vec2>,
-    /// TEXCOORD_1: lightmap, in [0, 1].
+    /// TEXCOORD_1: lightmap coordinates in [0, 1].
     pub uv1: Vec<Vec2>,
     /// Linear RGBA vertex colours.
     pub colors: Vec<Vec4>,
-    /// Three per triangle, counter-clockwise seen from the front.
+    /// Three vertex indices per triangle, counter-clockwise seen from the front.
     pub indices: Vec<u32>,
 }
 
@@ -33,18 +34,20 @@ impl TriangleMesh {
         self.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]])
     }
 
-    /// The corners of every triangle, in metres: what a hierarchy for ray casting is built from.
+    /// The corners of every triangle in metres, e.g. for building an acceleration structure.
     ///
     /// # Errors
-    /// [`MeshError`] where the mesh does not [validate](Self::validate).
+    /// [`MeshError`] if the mesh is not [valid](Self::validate).
     pub fn triangle_positions(&self) -> Result<Vec<[Vec3; 3]>, MeshError> {
         self.validate()?;
         Ok(self.triangles().map(|t| t.map(|vertex| self.positions[vertex as usize])).collect())
     }
 
-    /// Checks that the indices come in threes and in range, and that attributes are as long as the positions.
+    /// Checks that the number of indices is a multiple of three, that they are in range, and that attributes
+    /// are as long as the positions.
     ///
-    /// Positions may be NaN and triangles without area: each algorithm says what it does with those.
+    /// Positions that are not finite and degenerate triangles are valid; each algorithm documents how it
+    /// treats them.
     ///
     /// # Errors
     /// The first [`MeshError`] found.
@@ -70,9 +73,9 @@ impl TriangleMesh {
         Ok(())
     }
 
-    /// A mesh whose vertices are copies of this one's, in the order of `sources`; every attribute comes along.
+    /// A mesh with the vertices `sources` of this one, including all attributes.
     ///
-    /// `sources` must hold valid vertices and `indices` refer to `sources`.
+    /// `sources` must be valid vertices of this mesh, and `indices` valid indices into `sources`.
     pub(crate) fn with_vertices(&self, sources: &[u32], indices: Vec<u32>) -> Self {
         fn copy<T: Copy>(values: &[T], sources: &[u32]) -> Vec<T> {
             if values.is_empty() { Vec::new() } else { sources.iter().map(|&s| values[s as usize]).collect() }
@@ -89,7 +92,7 @@ impl TriangleMesh {
     }
 }
 
-/// Why a mesh cannot be read.
+/// Why a mesh is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -99,20 +102,20 @@ pub enum MeshError {
         /// Number of indices found.
         indices: usize,
     },
-    /// A triangle names a vertex that does not exist.
+    /// A triangle uses a vertex that does not exist.
     #[error("triangle {triangle} uses vertex {index}, but the mesh has {vertices} vertices")]
     IndexOutOfRange {
-        /// The triangle.
+        /// Index of the triangle.
         triangle: usize,
-        /// The index it uses.
+        /// The index out of range.
         index: u32,
         /// Number of vertices.
         vertices: usize,
     },
-    /// An attribute is neither absent nor one per vertex.
+    /// The length of an attribute is neither 0 nor the number of vertices.
     #[error("{attribute} has {found} entries for {vertices} vertices; give one per vertex or none")]
     AttributeLength {
-        /// Field of [`TriangleMesh`], or `metric positions`.
+        /// Name of the field of [`TriangleMesh`], or `metric positions`.
         attribute: &'static str,
         /// Its length.
         found: usize,

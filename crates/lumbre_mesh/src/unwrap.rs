@@ -1,8 +1,9 @@
-//! Lightmap coordinates for a mesh that has none: charts by normal, projected, packed into one rectangle of texels.
-//! Not the packing of many meshes into pages: the caller packs whole meshes with `atlas`.
+//! Lightmap coordinates for a mesh: cuts it into charts by normal, projects them, and packs them into one
+//! rectangle of texels. Packing several meshes into shared pages is done by the caller with `atlas`.
 //!
-//! A chart of W by H texels has its border on the *centres* of its outermost texels: bilinear filtering inside
-//! the chart reads its own texels only, and two charts that meet at a seam both have samples on the seam.
+//! A chart of W by H texels has its border at the *centres* of its outermost texels. Bilinear filtering
+//! inside the chart thus reads only its own texels, and two charts that meet at a seam both have samples on
+//! the seam.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -12,15 +13,15 @@ use crate::chart::{Charting, FlatChart};
 use crate::vertex_split::VertexSplitter;
 use crate::{Adjacency, MeshError, TriangleMesh, weld_positions};
 
-/// How to unwrap.
+/// Options for unwrapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnwrapOptions {
     /// Free texels between charts: 2 for bilinear filtering, 4 for bicubic.
     pub gap: u32,
-    /// Largest angle between a triangle's normal and its chart's, in degrees, in [0, 80]. Larger charts have fewer
-    /// seams; a triangle is shrunk by at most the cosine.
+    /// Largest angle between a triangle's normal and its chart's, in degrees, in [0, 80]. Larger angles give
+    /// larger charts with fewer seams; a triangle shrinks by at most the cosine of the angle.
     pub chart_angle: f64,
-    /// Largest width and height, in texels.
+    /// Largest width and height in texels.
     pub max_size: u32,
 }
 
@@ -30,36 +31,36 @@ impl Default for UnwrapOptions {
     }
 }
 
-/// Where a chart lies, in texels.
+/// A chart and its rectangle in texels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
-    /// Its triangles, ascending.
+    /// Its triangles in ascending order.
     pub triangles: Vec<u32>,
-    /// Its plane's unit normal; zero for the spot that holds triangles without area.
+    /// Unit normal of its plane; zero for the chart that collects degenerate triangles.
     pub normal: Vec3,
-    /// Left texel.
+    /// Left edge in texels.
     pub x: u32,
-    /// First texel row.
+    /// First row in texels.
     pub y: u32,
-    /// Texels across, all of them the chart's own.
+    /// Width in texels, without any gap.
     pub width: u32,
-    /// Texel rows.
+    /// Height in texels, without any gap.
     pub height: u32,
 }
 
 /// An unwrapped mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unwrapped {
-    /// The mesh with `uv1`. Triangles keep their order; vertices on seams are split: the first
-    /// `positions.len()` of the original are in place, copies follow.
+    /// The mesh with `uv1`. Triangles keep their order. The original vertices keep their indices, and copies
+    /// of the vertices on seams follow them.
     pub mesh: TriangleMesh,
-    /// The original vertex of every vertex.
+    /// For every vertex, the original vertex.
     pub vertex_sources: Vec<u32>,
-    /// Texels across.
+    /// Width of the rectangle in texels.
     pub width: u32,
-    /// Texel rows.
+    /// Height of the rectangle in texels.
     pub height: u32,
-    /// Together they hold every triangle once.
+    /// The charts; every triangle is in exactly one.
     pub charts: Vec<Chart>,
 }
 
@@ -67,10 +68,10 @@ pub struct Unwrapped {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnwrapError {
-    /// The mesh is not sound.
+    /// The mesh is invalid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The density is zero, negative or not a number.
+    /// The density is not a positive finite number.
     #[error("{texels_per_meter} texels per metre; give a positive finite density")]
     Density {
         /// The density given.
@@ -82,33 +83,34 @@ pub enum UnwrapError {
         /// The angle given.
         degrees: f64,
     },
-    /// The caller wanted no more.
+    /// The caller's `go_on` returned false.
     #[error("unwrapping was stopped")]
     Stopped,
-    /// A chart or all of them need more texels than allowed.
+    /// A single chart, or all charts together, exceed the size limit.
     #[error(
         "the charts need {width:.0} x {height:.0} texels, the limit is {max_size}; \
          lower the texel density or raise the limit"
     )]
     TooLarge {
-        /// Texels needed across.
+        /// Width needed in texels.
         width: f64,
-        /// Texel rows needed.
+        /// Height needed in texels.
         height: f64,
-        /// The limit.
+        /// The limit in texels.
         max_size: u32,
     },
 }
 
-/// Gives a mesh lightmap coordinates in `uv1`.
+/// Computes lightmap coordinates for a mesh, in `uv1`.
 ///
-/// `metric_positions` are the vertices' world positions in metres, for the density: the mesh's own positions
-/// transformed by its node, so that a node's scale counts. `texels_per_meter` is met or exceeded everywhere,
-/// except that a curved chart shrinks a tilted triangle (see [`UnwrapOptions::chart_angle`]); a chart is never
-/// less than 2 texels wide. Triangles without area, or with a coordinate that is not finite, share one texel.
+/// `metric_positions` are the world positions of the vertices in metres, i.e. the mesh's positions
+/// transformed by its node, so that the density accounts for the node's scale. The density is at least
+/// `texels_per_meter` everywhere, except that a triangle tilted against its chart shrinks (see
+/// [`UnwrapOptions::chart_angle`]). A chart is at least 2 texels wide. Degenerate triangles and those with a
+/// coordinate that is not finite share one texel.
 ///
 /// # Errors
-/// [`UnwrapError`]; an allocation is bounded by the mesh and by `max_size`.
+/// [`UnwrapError`]. Allocations are bounded by the size of the mesh and by `max_size`.
 pub fn unwrap(
     mesh: &TriangleMesh,
     metric_positions: &[Vec3],
@@ -120,7 +122,8 @@ pub fn unwrap(
     charted.unwrap(texels_per_meter, options.gap, options.max_size)
 }
 
-/// A mesh cut into charts, which do not depend on the density: to be unwrapped at several.
+/// A mesh cut into charts, which are independent of the density, so that it can be unwrapped at several
+/// densities.
 pub struct Charted<'a> {
     mesh: &'a TriangleMesh,
     surface: Surface,
@@ -130,10 +133,11 @@ pub struct Charted<'a> {
 }
 
 impl<'a> Charted<'a> {
-    /// Cuts a mesh, as [`unwrap`] does. `go_on` is asked now and then whether to.
+    /// Cuts a mesh into charts, as [`unwrap`] does. `go_on` is called now and then; if it returns false, the
+    /// work stops.
     ///
     /// # Errors
-    /// [`UnwrapError`]; [`UnwrapError::Stopped`] if `go_on` said no.
+    /// [`UnwrapError`]; [`UnwrapError::Stopped`] if `go_on` returned false.
     pub fn new(
         mesh: &'a TriangleMesh,
         metric_positions: &[Vec3],
@@ -154,7 +158,7 @@ impl<'a> Charted<'a> {
             normals: &surface.normals,
             areas: &surface.areas,
             adjacency: &surface.adjacency,
-            // Rounding must not split a plane at an angle of 0.
+            // The tolerance keeps rounding from splitting a plane at an angle of 0.
             least_cosine: chart_angle.to_radians().cos() - 1e-6,
         };
         let flat_charts = charting.charts(go_on).ok_or(UnwrapError::Stopped)?;
@@ -164,17 +168,17 @@ impl<'a> Charted<'a> {
         Ok(Self { mesh, surface, flat_charts, without_area, go_on })
     }
 
-    /// How many charts there are, one for triangles without area among them.
+    /// Number of charts, including one for degenerate triangles if there are any.
     pub fn len(&self) -> usize {
         self.flat_charts.len() + usize::from(!self.without_area.is_empty())
     }
 
-    /// Whether the mesh has no triangles.
+    /// Returns true if the mesh has no triangles.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Gives the mesh lightmap coordinates at a density, as [`unwrap`] does.
+    /// Computes lightmap coordinates at a density, as [`unwrap`] does.
     ///
     /// # Errors
     /// [`UnwrapError`].
@@ -226,7 +230,7 @@ impl<'a> Charted<'a> {
     }
 }
 
-/// The mesh in world metres, in f64.
+/// The triangles in world metres, in f64.
 struct Surface {
     corners: Vec<[DVec3; 3]>,
     normals: Vec<DVec3>,
@@ -245,7 +249,7 @@ impl Surface {
         let (mut normals, mut areas) = (Vec::new(), Vec::new());
         for [a, b, c] in &corners {
             let cross = (*b - *a).cross(*c - *a);
-            // Also zero where a coordinate is not finite.
+            // Also zero if a coordinate is not finite.
             normals.push(cross.normalize_or_zero());
             areas.push(0.5 * cross.length());
         }
@@ -253,7 +257,7 @@ impl Surface {
     }
 }
 
-/// How a chart's plane maps to its own texels.
+/// The mapping from a chart's plane to its texels.
 struct Layout {
     rectangle: BoundingRectangle,
     /// Texels per metre along the rectangle's sides.
@@ -277,10 +281,10 @@ impl Layout {
             projected += 0.5 * (b - a).perp_dot(c - a);
         }
         let rectangle = BoundingRectangle::least_area(&points);
-        // A curved chart gets the texels of its area, not of its shadow.
+        // A curved chart gets texels for its surface area, not for its projected area.
         let stretch = if projected > 0.0 && area > projected { (area / projected).sqrt() } else { 1.0 };
         let extent = (rectangle.max - rectangle.min) * texels_per_meter * stretch;
-        // Whole texels between border and border; the tolerance keeps 4.000001 from becoming 5.
+        // A whole number of texels between the borders; the tolerance keeps 4.000001 from becoming 5.
         let intervals = (extent - 1e-4).ceil().max(DVec2::ONE);
         let needed = intervals + 1.0;
         if needed.max_element() > f64::from(max_size) {
@@ -292,7 +296,7 @@ impl Layout {
         Ok(Self { rectangle, scale, texels: (needed.x as u32, needed.y as u32) })
     }
 
-    /// Where a position falls, in texels from the chart's corner.
+    /// The texel coordinates of a position, relative to the chart's corner.
     fn texel(&self, chart: &FlatChart, position: DVec3) -> DVec2 {
         let local = self.rectangle.local(chart.project(position)) - self.rectangle.min;
         (local * self.scale).clamp(DVec2::ZERO, self.interior()) + 0.5
@@ -303,13 +307,13 @@ impl Layout {
     }
 }
 
-/// All rectangles on one page.
+/// Packs all rectangles into one page.
 fn place(rectangles: &[(u32, u32)], gap: u32, max_size: u32) -> Result<Atlas, UnwrapError> {
     let padded = f64::from(gap);
     let area = |&(w, h): &(u32, u32)| (f64::from(w) + padded) * (f64::from(h) + padded);
     let side = rectangles.iter().map(area).sum::<f64>().sqrt();
     let too_large = UnwrapError::TooLarge { width: side, height: side, max_size };
-    // Packing them would only tell the same.
+    // The total area already exceeds the limit, so packing cannot succeed.
     if side > f64::from(max_size) + padded {
         return Err(too_large);
     }

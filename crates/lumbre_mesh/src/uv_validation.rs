@@ -1,60 +1,63 @@
-//! Checks lightmap coordinates before anything is baked into them: range, overlap, coverage, texel by texel.
-//! Not a repair: a mesh that fails is unwrapped or handed back to its author with the triangles named.
+//! Validates lightmap coordinates before they are used for baking: range, overlaps and coverage, texel by
+//! texel. Nothing is repaired: the caller unwraps an invalid mesh again or reports the triangles to its
+//! author.
 
 use glam::{DVec2, Vec2};
 
 use crate::{MeshError, TriangleMesh};
 
-/// How far inside a triangle a texel's centre must lie to be owned by it, in texels. Centres on a shared edge
-/// belong to both neighbours, and f32 coordinates in an atlas of 8192 texels are off by 2^-11.
+/// How far inside a triangle a texel's centre must lie for the triangle to own the texel, in texels. Centres
+/// on a shared edge would otherwise belong to both triangles, and f32 coordinates in an atlas of 8192 texels
+/// are off by 2^-11.
 const OWNERSHIP_MARGIN: f64 = 2e-3;
 
-/// Most texels that a check allocates: 2^28, a square of 16384.
+/// Largest number of texels that validation allocates: 2^28, a square of 16384.
 pub const MAX_TEXELS: u64 = 1 << 28;
 
-/// What is wrong with a set of lightmap coordinates. Lists are ascending; empty lists are good.
+/// Faults in a set of lightmap coordinates. Lists are in ascending order; the coordinates are valid if all
+/// are empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UvReport {
     /// Triangles with a coordinate that is not finite or outside [0, 1].
     pub out_of_range: Vec<u32>,
-    /// Triangles with area whose coordinates have none: their light has no place.
+    /// Non-degenerate triangles whose coordinates are degenerate, so that they have no texels.
     pub without_coverage: Vec<u32>,
     /// Pairs of triangles that own the same texel, each pair once.
     pub overlapping: Vec<(u32, u32)>,
-    /// Texels owned by some triangle.
+    /// Number of texels owned by a triangle.
     pub owned_texels: u64,
-    /// Owned texels over all texels, in [0, 1].
+    /// Fraction of all texels that are owned, in [0, 1].
     pub utilisation: f64,
 }
 
 impl UvReport {
-    /// Whether the coordinates can be baked into.
+    /// Returns true if the coordinates can be used for baking.
     pub fn is_sound(&self) -> bool {
         self.out_of_range.is_empty() && self.without_coverage.is_empty() && self.overlapping.is_empty()
     }
 }
 
-/// Why coordinates cannot be checked.
+/// Why coordinates cannot be validated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UvValidationError {
-    /// The mesh is not sound.
+    /// The mesh is invalid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// There is nothing to check.
+    /// The mesh has no lightmap coordinates.
     #[error("the mesh has no lightmap coordinates (uv1); unwrap it first")]
     MissingUv1,
-    /// More texels than the check allocates.
+    /// The grid has more texels than validation allocates.
     #[error("{width} x {height} texels exceed {MAX_TEXELS}; check at a lower resolution")]
     TooManyTexels {
-        /// Texels across.
+        /// Width in texels.
         width: u32,
-        /// Texel rows.
+        /// Height in texels.
         height: u32,
     },
 }
 
-/// Checks `uv1` on a grid of `width` by `height` texels.
+/// Validates `uv1` on a grid of `width` by `height` texels.
 ///
 /// # Errors
 /// [`UvValidationError`].
@@ -102,8 +105,9 @@ pub fn validate_uv1(mesh: &TriangleMesh, width: u32, height: u32) -> Result<UvRe
     Ok(report)
 }
 
-/// Calls `visit(x, y)` for the texels of a grid whose centres lie inside a triangle, given in texels, by more
-/// than a five hundredth of a texel. Either winding; nothing for a triangle without area or with NaN.
+/// Calls `visit(x, y)` for every texel of a grid whose centre lies inside a triangle, given in texels, by
+/// more than 1/500 of a texel. The winding does not matter. Degenerate triangles and those with NaN have no
+/// texels.
 pub fn for_each_owned_texel(triangle: &[DVec2; 3], width: u32, height: u32, mut visit: impl FnMut(u32, u32)) {
     let [a, mut b, mut c] = *triangle;
     if (b - a).perp_dot(c - a) < 0.0 {
@@ -115,7 +119,7 @@ pub fn for_each_owned_texel(triangle: &[DVec2; 3], width: u32, height: u32, mut 
     let edges = [(a, b - a), (b, c - b), (c, a - c)].map(|(start, along)| (start, along.normalize_or_zero()));
     let low = a.min(b).min(c).floor().max(DVec2::ZERO);
     let high = a.max(b).max(c).ceil().min(DVec2::new(f64::from(width), f64::from(height)));
-    // Saturates: negative becomes 0, and the limits are u32.
+    // The casts saturate: negative values become 0, and the limits fit u32.
     for y in low.y as u32..high.y as u32 {
         for x in low.x as u32..high.x as u32 {
             let centre = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
@@ -145,7 +149,7 @@ mod tests {
         let square = mesh(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], &[0, 1, 2, 0, 2, 3]);
         let report = validate_uv1(&square, 8, 4).unwrap();
         assert!(report.is_sound());
-        // The diagonal of 8 x 4 passes through no centre: all 32 are owned.
+        // The diagonal of 8 x 4 passes through no texel centre, so all 32 are owned.
         assert_eq!((report.owned_texels, report.utilisation), (32, 1.0));
     }
 
@@ -157,7 +161,8 @@ mod tests {
         );
         let report = validate_uv1(&faulty, 32, 32).unwrap();
         assert_eq!(report.out_of_range, [2, 3]);
-        // Triangle 4 has one vertex three times: no area, nothing lost. 5 is a line in uv only.
+        // Triangle 4 has the same vertex three times, so it needs no coverage. Triangle 5 is degenerate in uv
+        // only.
         assert_eq!(report.without_coverage, [5]);
         assert_eq!(report.overlapping, [(0, 1), (0, 6)]);
         assert!(!report.is_sound());

@@ -1,16 +1,17 @@
-//! Splits vertices on the seams between charts: one copy per chart that uses the vertex. Not the charts themselves.
+//! Splits vertices on the seams between charts, so that each chart has a copy of its own.
 
 use glam::{DVec2, Vec2};
 
 use crate::TriangleMesh;
 
-/// Gives each vertex one coordinate per chart that uses it.
+/// Gives each vertex one lightmap coordinate per chart that uses it.
 pub(crate) struct VertexSplitter<'a> {
     mesh: &'a TriangleMesh,
     sources: Vec<u32>,
     uv1: Vec<Vec2>,
     indices: Vec<u32>,
-    /// Per vertex: the chart that used it last and the copy it has there. Charts come one after the other.
+    /// For each vertex, the last chart that used it and the copy it has there. This suffices as charts are
+    /// assigned in turn.
     current: Vec<(u32, u32)>,
 }
 
@@ -26,7 +27,8 @@ impl<'a> VertexSplitter<'a> {
         }
     }
 
-    /// The coordinates of a triangle's corners. A chart's triangles must come together.
+    /// Sets the lightmap coordinates of a triangle's corners. All triangles of a chart must be assigned
+    /// consecutively.
     pub fn assign(&mut self, chart: u32, triangle: u32, uv: [DVec2; 3]) {
         for (corner, uv) in uv.into_iter().enumerate() {
             let at = triangle as usize * 3 + corner;
@@ -47,7 +49,7 @@ impl<'a> VertexSplitter<'a> {
         }
     }
 
-    /// The mesh with `uv1`, and the original vertex of each of its vertices.
+    /// The mesh with `uv1`, and the original vertex for each of its vertices.
     pub fn finish(self) -> (TriangleMesh, Vec<u32>) {
         let mut mesh = self.mesh.with_vertices(&self.sources, self.indices);
         mesh.uv1 = self.uv1;

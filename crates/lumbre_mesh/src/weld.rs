@@ -1,11 +1,12 @@
-//! Which vertices share a position: files split a vertex for its normal or texture, its surface goes on.
-//! Not a tolerance weld: only bit-equal positions (with -0 = 0) are one.
+//! Finds vertices with equal positions: files split vertices for normals and texture coordinates where the
+//! surface itself is connected. There is no tolerance: positions must be bitwise equal, except that -0 equals
+//! 0.
 
 use std::collections::HashMap;
 
 use glam::Vec3;
 
-/// For every vertex, the first vertex at the same position.
+/// For every vertex, the index of the first vertex at the same position.
 pub fn weld_positions(positions: &[Vec3]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(positions.len());
     positions

@@ -1,4 +1,4 @@
-//! Packing: nothing overlaps, nothing leaves its page, whatever the sizes.
+//! Packing rectangles of any sizes: none overlap, and none exceed their page.
 
 use lumbre_mesh::atlas::{Atlas, AtlasError, AtlasOptions, pack};
 use proptest::prelude::*;
@@ -71,7 +71,7 @@ fn mixed_sizes_waste_little() {
     let atlas = pack(&rectangles, options).unwrap();
     let used: u32 = rectangles.iter().map(|r| r.0 * r.1).sum();
     let [(width, height)] = atlas.pages[..] else { panic!("{} pages", atlas.pages.len()) };
-    // The skyline's usual waste is 5 to 10 %.
+    // A skyline usually wastes 5 to 10 %.
     assert!(f64::from(used) / f64::from(width * height) > 0.85, "{used} of {width} x {height}");
     assert!(width.abs_diff(height) < width / 5);
 }
@@ -84,7 +84,7 @@ fn too_large_is_an_error_and_nothing_is_nothing() {
     assert_eq!(pack(&[(64, 32)], options).unwrap().pages, [(64, 32)]);
     assert_eq!(pack(&[], options).unwrap(), Atlas::default());
     assert_eq!(pack(&[(0, 9), (5, 0)], options).unwrap().pages, []);
-    // Sizes near the end of u32 neither overflow nor allocate.
+    // Sizes near the largest u32 must neither overflow nor allocate much.
     let huge = AtlasOptions { max_width: u32::MAX, max_height: u32::MAX, gap: u32::MAX };
     assert_eq!(pack(&[(u32::MAX, u32::MAX); 3], huge).unwrap().pages.len(), 3);
 }

@@ -1,4 +1,5 @@
-//! Normals of meshes: averages by each weight, how they converge to the surface's, and input that has none.
+//! Normals of meshes: averages with each weight, their convergence to the surface's normals, and degenerate
+//! input.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
@@ -17,7 +18,7 @@ use proptest::test_runner::RngSeed;
 
 const WEIGHTS: [NormalWeight; 3] = [NormalWeight::Uniform, NormalWeight::Area, NormalWeight::Angle];
 
-/// Largest and root mean square angle, in radians, between averaged normals and those of the surface.
+/// The largest and the root mean square angle, in radians, between averaged normals and those of the surface.
 fn errors(mesh: &TriangleMesh, surface: &impl ImplicitSurface, weight: NormalWeight) -> [f64; 2] {
     let smooth = compute_smooth_normals(mesh, weight).unwrap();
     assert_eq!((smooth.cancelled, smooth.missing), (0, 0));
@@ -35,7 +36,7 @@ fn errors(mesh: &TriangleMesh, surface: &impl ImplicitSurface, weight: NormalWei
     [angles.iter().copied().fold(0.0, f64::max), (square / angles.len() as f64).sqrt()]
 }
 
-/// The orders at which two sequences of errors fall when the edges are halved at each step.
+/// The convergence orders of the two errors when the edges are halved at each step.
 fn orders(name: &str, weight: NormalWeight, steps: &[[f64; 2]]) -> [f64; 2] {
     let last = steps.len() - 1;
     for (step, [largest, mean]) in steps.iter().enumerate() {
@@ -51,8 +52,8 @@ fn orders(name: &str, weight: NormalWeight, steps: &[[f64; 2]]) -> [f64; 2] {
 
 #[test]
 fn on_a_regular_grid_every_weight_converges_at_order_two() {
-    // The six triangles around a vertex lie point by point opposite each other, but for the bend of the parameters: what is linear
-    // in the edges cancels.
+    // The six triangles around a vertex are symmetric about it, except for the curvature of the parameters,
+    // so errors linear in the edge length cancel.
     let torus = Torus { major_radius: 1.0, minor_radius: 0.4 };
     for weight in WEIGHTS {
         let steps: Vec<_> = [16u32, 32, 64, 128, 256]
@@ -66,8 +67,9 @@ fn on_a_regular_grid_every_weight_converges_at_order_two() {
 
 #[test]
 fn on_the_recursive_sphere_the_largest_error_falls_at_order_one_and_the_mean_at_one_and_a_half() {
-    // Along the edges of the first tetrahedron the triangles of one side are not those of the other: there the error is linear.
-    // These vertices are one in 1 / h, so that the mean square falls with h^2 times h.
+    // Along the edges of the initial tetrahedron the triangles are not symmetric, so the error is linear
+    // there. These vertices are a fraction proportional to h of all, so the mean square error falls with h^2
+    // times h.
     let sphere = Sphere { radius: 1.0 };
     for weight in WEIGHTS {
         let steps: Vec<_> = (2..8)
@@ -81,8 +83,9 @@ fn on_the_recursive_sphere_the_largest_error_falls_at_order_one_and_the_mean_at_
 
 #[test]
 fn on_an_irregular_mesh_every_weight_converges_at_order_one() {
-    // Vertices moved along the torus by up to a seventh of a cell each way: no triangle has an opposite, and no angle comes near
-    // 180 degrees, where a triangle's own normal would no longer converge (Schwarz's lantern; a third of a cell shows it).
+    // Vertices are moved along the torus by up to a seventh of a cell each way: no triangle has a symmetric
+    // counterpart, and no angle comes near 180 degrees, where even a triangle's own normal does not converge
+    // (Schwarz's lantern; moving by a third of a cell shows it).
     let torus = Torus { major_radius: 1.0, minor_radius: 0.4 };
     for weight in WEIGHTS {
         let steps: Vec<_> = [16u32, 32, 64, 128, 256]
@@ -116,7 +119,8 @@ fn on_an_irregular_mesh_every_weight_converges_at_order_one() {
 
 #[test]
 fn averaged_normals() {
-    // A cube's corner has three faces, one to two triangles each; only the angle weight does not see the cut.
+    // A corner of a cube has three faces with one or two triangles each; only the angle weight is independent
+    // of that.
     let cube = shapes::cuboid(Vec3::ONE, 1);
     let bare = TriangleMesh { normals: Vec::new(), ..cube };
     let smooth = |mesh: &TriangleMesh, weight| compute_smooth_normals(mesh, weight).unwrap().mesh.normals;
@@ -126,7 +130,7 @@ fn averaged_normals() {
     let uniform = smooth(&bare, NormalWeight::Uniform);
     assert!(uniform.iter().zip(&bare.positions).any(|(n, p)| (*n - p.normalize()).length() > 0.1));
 
-    // Two faces of areas 1/2 and 2 at a right angle along x: weights show in the ratio of the components.
+    // Two faces of areas 1/2 and 2 at a right angle along x: the ratio of the components shows the weights.
     let wedge = TriangleMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z * 4.0],
         indices: vec![0, 1, 2, 0, 3, 1],
@@ -141,7 +145,7 @@ fn averaged_normals() {
     let angles = Vec3::new(0.0, 4f32.atan(), std::f32::consts::FRAC_PI_4).normalize();
     assert!((smooth(&wedge, NormalWeight::Angle)[1] - angles).length() < 1e-6);
 
-    // The sphere's averaged normals approach the sphere's.
+    // Averaged normals of the sphere approach the exact ones.
     let sphere = shapes::tetrahedral_sphere(1.0, 5, false);
     for weight in [NormalWeight::Uniform, NormalWeight::Area, NormalWeight::Angle] {
         let normals = smooth(&sphere, weight);
@@ -152,7 +156,8 @@ fn averaged_normals() {
 
 #[test]
 fn normals_that_cannot_be_computed() {
-    // A face and its own back cancel: the first face decides. A lone sliver has none: zero.
+    // A face and its own back cancel, so the first face decides. A lone degenerate triangle has no normal:
+    // zero.
     let mesh = TriangleMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NAN, Vec3::Z],
         indices: vec![0, 1, 2, 0, 2, 1, 3, 4, 4],
@@ -162,7 +167,7 @@ fn normals_that_cannot_be_computed() {
         let smooth = compute_smooth_normals(&mesh, weight).unwrap();
         assert_eq!(smooth.mesh.normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::ZERO]);
         assert_eq!((smooth.cancelled, smooth.missing), (3, 2));
-        // Said once, with the name.
+        // One message per mesh, with its name.
         let remark = smooth.remark("leaf").unwrap();
         assert!(remark.contains("\"leaf\"") && remark.lines().count() == 1, "{remark}");
         let sound = compute_smooth_normals(&shapes::cuboid(Vec3::ONE, 1), weight).unwrap();
@@ -172,13 +177,14 @@ fn normals_that_cannot_be_computed() {
     assert_eq!((flat.positions.len(), flat.normals[3], flat.normals[8]), (9, Vec3::NEG_Z, Vec3::ZERO));
     assert_eq!(compute_flat_normals(flat.clone()).normals, flat.normals);
     assert_eq!(flat_triangles(&flat).count(), 3);
-    // Sizes at both ends of f32 have normals: the cross product is taken in f64.
+    // Sizes at both ends of the range of f32 have normals, since the cross product is computed in f64.
     for size in [1e-30f32, 1e30] {
         assert_eq!(face_normal(&[Vec3::ZERO, Vec3::X * size, Vec3::Y * size]), Some(Vec3::Z));
     }
 }
 
-/// Points on a coarse grid, so that many coincide and many triangles have no area; some far, some tiny, some no numbers.
+/// Points on a coarse grid, so that many coincide and many triangles are degenerate; some are very large,
+/// tiny or not finite.
 fn point() -> impl Strategy<Value = Vec3> {
     let grid = || prop::sample::select(vec![-1.0f32, 0.0, 1.0, 2.0]);
     let odd = prop::sample::select(vec![f32::NAN, f32::INFINITY, 1e30, -1e-30, f32::MIN_POSITIVE, 0.3]);
@@ -231,7 +237,7 @@ proptest! {
 
     #[test]
     fn scaling_by_a_power_of_two_changes_no_bit_and_mirroring_every_sign(mesh in mesh(), exponent in -20i32..20) {
-        // Coordinates at f32's ends would leave its range.
+        // Scaling must not leave the range of f32.
         prop_assume!(mesh.positions.iter().all(|p| !p.is_finite() || p.abs().max_element() < 1e9));
         prop_assume!(mesh.positions.iter().all(|p| p.to_array().iter().all(|c| *c == 0.0 || c.is_nan() || c.abs() >= 1e-20)));
         for weight in WEIGHTS {

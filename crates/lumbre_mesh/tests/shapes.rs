@@ -1,4 +1,4 @@
-//! Shapes against closed forms: counts, Euler's formula, areas, normals; and the normals of meshes.
+//! Compares shapes with closed forms: counts, Euler's formula, areas, volumes and normals.
 
 use std::f64::consts::{PI, TAU};
 
@@ -18,13 +18,13 @@ fn area(mesh: &TriangleMesh) -> f64 {
         .sum()
 }
 
-/// Signed volume by the divergence theorem: positive where the faces look outward.
+/// Signed volume by the divergence theorem; positive if the faces point outwards.
 fn volume(mesh: &TriangleMesh) -> f64 {
     let triangles = mesh.triangle_positions().expect("a sound shape");
     triangles.iter().map(|t| t.map(|p| p.as_dvec3())).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
-/// Points, V - E + F, and whether every edge has two triangles, after welding.
+/// After welding: the number of points, V - E + F, and whether every edge has exactly two triangles.
 fn topology(mesh: &TriangleMesh) -> (usize, i64, bool) {
     mesh.validate().expect("a sound shape");
     let welded = weld_positions(&mesh.positions);
@@ -35,7 +35,8 @@ fn topology(mesh: &TriangleMesh) -> (usize, i64, bool) {
     (points, euler, adjacency.edge_valences().keys().eq([&2]))
 }
 
-/// The largest angle between a vertex normal and its face, in degrees; also checks that they are unit vectors.
+/// The largest angle between a vertex normal and its face, in degrees. Also checks that the normals are unit
+/// vectors.
 fn normal_deviation(mesh: &TriangleMesh) -> f64 {
     let mut largest = 0.0f64;
     for triangle in mesh.triangles() {
@@ -52,7 +53,7 @@ fn normal_deviation(mesh: &TriangleMesh) -> f64 {
 
 #[test]
 fn the_sphere_from_a_tetrahedron() {
-    // The tetrahedron in the unit sphere: edge sqrt(8/3), area 8 / sqrt(3), volume 8 sqrt(3) / 27.
+    // The tetrahedron inscribed in the unit sphere: edge sqrt(8/3), area 8 / sqrt(3), volume 8 sqrt(3) / 27.
     let tetrahedron = shapes::tetrahedral_sphere(1.0, 0, false);
     assert!((area(&tetrahedron) - 8.0 / 3f64.sqrt()).abs() < 1e-6);
     assert!((volume(&tetrahedron) - 8.0 * 3f64.sqrt() / 27.0).abs() < 1e-6);
@@ -66,7 +67,8 @@ fn the_sphere_from_a_tetrahedron() {
             assert!((position.as_dvec3() - normal.as_dvec3() * 2.0).length() < 1e-6);
             assert!((position.as_dvec3().length() - 2.0).abs() < 1e-6);
         }
-        // Inscribed: below 4 pi r^2 and ever closer. Each halving of the edges quarters the error in the limit.
+        // Inscribed, so the area is below 4 pi r^2 and converges to it; halving the edges quarters the error
+        // in the limit.
         let error = 1.0 - area(&smooth) / (4.0 * PI * 4.0);
         assert!(error > 0.0 && error < last_error * if depth < 3 { 0.75 } else { 0.3 }, "{error}");
         last_error = error;
@@ -83,7 +85,8 @@ fn the_sphere_of_990_triangles_and_497_points() {
     let sphere = shapes::uv_sphere(1.0, 33, 16);
     assert_eq!(sphere.triangle_count(), 990);
     assert_eq!(topology(&sphere), (497, 2, true));
-    // Inscribed in 4/3 pi: the deficit is about (1 / 6) (pi / 16)^2 + (1 / 6) (2 pi / 33)^2 * 2, or 1.9 %.
+    // Inscribed in a sphere of volume 4/3 pi: the deficit is about (1 / 6) (pi / 16)^2 + (1 / 6) (2 pi /
+    // 33)^2 * 2, or 1.9 %.
     assert!((volume(&sphere) / (4.0 / 3.0 * PI) - 1.0).abs() < 0.025);
     for (position, normal) in sphere.positions.iter().zip(&sphere.normals) {
         assert_eq!(position, normal);
@@ -92,14 +95,15 @@ fn the_sphere_of_990_triangles_and_497_points() {
 
 #[test]
 fn texture_coordinates_run_on_and_never_flip_on_spheres() {
-    // The tetrahedron's lower pole lies inside a triangle, where no three longitudes are right.
+    // The tetrahedral sphere's lower pole lies inside a triangle, whose longitudes cannot be consistent.
     for (mesh, around_a_pole) in
         [(shapes::uv_sphere(1.0, 24, 12), 0), (shapes::tetrahedral_sphere(1.0, 4, false), 1)]
     {
         let mut wide = 0;
         for triangle in mesh.triangles() {
             let [a, b, c] = triangle.map(|v| mesh.uv0[v as usize]);
-            // v runs down, so counter-clockwise on the surface is clockwise in texture space.
+            // v runs down, so triangles that are counter-clockwise on the surface are clockwise in texture
+            // space.
             assert!((b - a).perp_dot(c - a) < 1e-6, "{a} {b} {c}");
             let span = a.x.max(b.x).max(c.x) - a.x.min(b.x).min(c.x);
             wide += usize::from(span > 0.5);
@@ -120,7 +124,7 @@ fn box_plane_cylinder_cone_and_torus() {
     assert!((area(&plane) - 8.0).abs() < 1e-6 && normal_deviation(&plane) == 0.0);
     assert_eq!(plane.normals[0], Vec3::Y);
 
-    // A prism over the inscribed n-gon of area n/2 sin(2 pi / n).
+    // A prism over the inscribed n-gon, whose area is n/2 sin(2 pi / n) for radius 1.
     let n = 40.0;
     let polygon = n / 2.0 * (TAU / n).sin();
     let cylinder = shapes::cylinder(0.5, 2.0, 40);
@@ -132,12 +136,12 @@ fn box_plane_cylinder_cone_and_torus() {
     assert_eq!(topology(&cone), (42, 2, true));
     assert!((volume(&cone) - polygon * 0.25 * 2.0 / 3.0).abs() < 1e-5);
     for (position, normal) in cone.positions.iter().zip(&cone.normals).filter(|(_, n)| n.y > -0.5) {
-        // The slope: the normal is perpendicular to the line to the apex.
+        // On the slope, the normal is perpendicular to the line to the apex.
         let to_apex = Vec3::Y - *position;
         assert!(normal.dot(to_apex).abs() < 1e-6 && (normal.y - 0.5 / 4.25f32.sqrt()).abs() < 1e-6);
     }
 
-    // Pappus, for the inscribed torus with its two deficits below one percent each.
+    // Pappus's theorem. Both deficits of the inscribed torus are below one percent.
     let torus = shapes::torus(2.0, 0.5, 64, 48);
     assert_eq!(topology(&torus), (64 * 48, 0, true));
     let exact = 2.0 * PI * PI * 2.0 * 0.25;
@@ -150,7 +154,7 @@ fn counts_out_of_range_are_clamped() {
     assert_eq!(shapes::plane(1.0, 1.0, 0, 0).triangle_count(), 2);
     assert_eq!(shapes::cylinder(1.0, 1.0, 1).triangle_count(), 12);
     assert_eq!(shapes::plane(1.0, 1.0, u32::MAX, 1).triangle_count(), 2 * shapes::MAX_SEGMENTS as usize);
-    // No extent: no triangle, and nothing that is not finite.
+    // A shape without extent has no triangles, and all its values are finite.
     assert!(shapes::cone(0.0, 0.0, 8).normals.iter().all(|n| n.is_finite()));
 }
 
@@ -170,7 +174,8 @@ fn a_sphere_too_deep_is_refused_before_it_is_built() {
 
 #[test]
 fn the_fourth_vertex_of_the_code_in_document_i_is_not_on_a_regular_tetrahedron() {
-    // Its text has z = -1/3 and its code +0.333333: with that, three of the six edges are shorter than the others.
+    // The text has z = -1/3 and the code +0.333333, which makes three of the six edges shorter than the
+    // others.
     let edges = |fourth: DVec3| {
         let sphere = shapes::tetrahedral_sphere(1.0, 0, false);
         let welded = weld_positions(&sphere.positions);

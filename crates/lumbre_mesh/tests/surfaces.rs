@@ -1,4 +1,5 @@
-//! Normals of surfaces by equation: closed forms, the implicit form against the parametric one, poles, and places without a normal.
+//! Normals of surfaces given by equations: closed forms, agreement of the implicit and parametric forms,
+//! poles, and places without a normal.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
@@ -18,7 +19,7 @@ const CYLINDER: Cylinder = Cylinder { radius: 0.5, height: 3.0 };
 const CONE: Cone = Cone { radius: 0.6, height: 1.7 };
 const TORUS: Torus = Torus { major_radius: 2.0, minor_radius: 0.3 };
 
-/// Only the points of a surface: partial derivatives and normals have to be found.
+/// Provides only the points of a surface, so that derivatives and normals are computed from differences.
 struct PointsOf<'a>(&'a dyn ParametricSurface);
 
 impl ParametricSurface for PointsOf<'_> {
@@ -38,7 +39,7 @@ impl ParametricSurface for PointsOf<'_> {
     }
 }
 
-/// The points and partial derivatives: the normal has to be found.
+/// Provides points and partial derivatives, so that the normal is computed from them.
 struct PartialsOf<'a>(&'a dyn ParametricSurface);
 
 impl ParametricSurface for PartialsOf<'_> {
@@ -56,7 +57,7 @@ impl ParametricSurface for PartialsOf<'_> {
     }
 }
 
-/// A surface of a function, over the unit square.
+/// The surface of a function over the square [-1, 1]².
 struct Patch<F>(F);
 
 impl<F: Fn(f64, f64) -> DVec3> ParametricSurface for Patch<F> {
@@ -118,12 +119,12 @@ fn implicit_and_parametric_forms_agree_and_differences_find_them() {
             "{name:9} forms {forms:.1e}, partials {from_partials:.1e}, points {from_points:.1e}, values {from_values:.1e}, \
              tangents {tangents:.1e}"
         );
-        // Both are exact: what is left is the rounding of sines and of the point.
+        // Both forms are exact, so only the rounding of sines and of the point remains.
         assert!(forms < 4e-15, "{name}: {forms}");
-        // Exact but at the sphere's poles, where the limit of document [I]'s product is extrapolated.
+        // Exact except at the sphere's poles, where the limit of document [I]'s product is extrapolated.
         assert!(from_partials < if name == "sphere" { 2e-8 } else { 1e-15 }, "{name}: {from_partials}");
-        // Second-order differences with a step of 6e-6 of the width: (6e-6)^2 (2 pi)^3 / 3 radii and as much rounding; at the
-        // poles divided by the distance of 1/2000.
+        // Second-order differences with a step of 6e-6 of the width: an error of (6e-6)^2 (2 pi)^3 / 3 radii
+        // plus as much rounding, and at the poles divided by the distance of 1/2000.
         assert!(tangents < 3e-8, "{name}: {tangents}");
         assert!(from_points < if name == "sphere" { 2e-6 } else { 1e-8 }, "{name}: {from_points}");
         assert!(from_values < 1e-9, "{name}: {from_values}");
@@ -136,12 +137,13 @@ fn known_normals() {
     assert!(angle(TORUS.normal(0.0, FRAC_PI_4).unwrap(), diagonal) < 1e-15);
     assert!(angle(TORUS.normal(FRAC_PI_2, PI).unwrap(), DVec3::Z) < 1e-15, "the hole's side faces the axis");
     assert!(angle(CYLINDER.normal(FRAC_PI_2, 1.0).unwrap(), DVec3::NEG_Z) < 1e-15);
-    // The side of a cone is at right angles to its ruling.
+    // The normal on the side of a cone is perpendicular to its ruling.
     let ruling = CONE.point(1.0, 1.0) - CONE.point(1.0, 0.0);
     assert!(CONE.normal(1.0, 0.4).unwrap().dot(ruling).abs() < 1e-15);
     assert_eq!(SPHERE.normal(2.0, 0.0), Ok(DVec3::NEG_Y));
     assert_eq!(SPHERE.normal(2.0, PI), Ok(DVec3::Y));
-    // Document [I]'s sphere: p = (cos u sin v, cos u cos v, sin u), the product of its partial derivatives is (cos u) p.
+    // Document [I]'s sphere: p = (cos u sin v, cos u cos v, sin u); the product of its partial derivatives is
+    // (cos u) p.
     let p = |u: f64, v: f64| DVec3::new(u.cos() * v.sin(), u.cos() * v.cos(), u.sin());
     let (u, v) = (0.7f64, 0.4f64);
     let along_u = DVec3::new(-u.sin() * v.sin(), -u.sin() * v.cos(), u.cos());
@@ -160,14 +162,14 @@ fn shapes_are_meshes_of_these_surfaces() {
     for (mesh, surface) in forms {
         for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
             let exact = implicit_normal(surface, position.as_dvec3()).unwrap();
-            // The position's rounding to f32, over the smallest radius, and the normal's own.
+            // The rounding of the position to f32 over the smallest radius, plus the rounding of the normal.
             assert!(
                 angle(exact, normal.as_dvec3()) < 2.4 * 6e-8 / 0.3 + 1e-7,
                 "{position}: {normal} is not {exact}"
             );
         }
     }
-    // Sides of cylinder and cone, caps apart.
+    // The sides of cylinder and cone, without caps.
     let sides: [(_, &dyn ImplicitSurface); 2] = [
         (shapes::cylinder(0.5, 3.0, 20), &CYLINDER),
         (shapes::cone(0.6, 1.7, 20), &Cone { radius: f64::from(0.6f32), height: f64::from(1.7f32) }),
@@ -190,7 +192,7 @@ fn shapes_are_meshes_of_these_surfaces() {
 
 #[test]
 fn a_mesh_of_any_surface_closes_its_seams_and_faces_the_normal() {
-    // A sphere squeezed to an ellipsoid: normals by differences, poles by their limit.
+    // A sphere scaled to an ellipsoid, with normals from differences and from the limit at the poles.
     struct Ellipsoid;
     impl ParametricSurface for Ellipsoid {
         fn domain(&self) -> [DVec2; 2] {
@@ -246,13 +248,13 @@ fn poles_have_the_normal_of_the_limit_and_apexes_none() {
     assert!(implicit_normal(&SPHERE, DVec3::ZERO).is_err());
     assert!(implicit_normal(&TORUS, DVec3::Y * 0.3).is_err());
 
-    // Parameters that stand still on a smooth surface: both, and one along a line.
+    // Derivatives that vanish on a smooth surface: both of them, and one along a line.
     let still = Patch(|u: f64, v: f64| DVec3::new(u * u * u, v * v * v, 0.0));
     assert!(angle(parametric_normal(&still, 0.0, 0.0).unwrap(), DVec3::Z) < 1e-9);
     let saddle = Patch(|u: f64, v: f64| DVec3::new(u.powi(3), v, 0.3 * (u.powi(6) - v * v)));
     let exact = DVec3::new(0.0, 0.6 * 0.5, 1.0);
     assert!(angle(parametric_normal(&saddle, 0.0, 0.5).unwrap(), exact) < 1e-7);
-    // A fold, where the front turns over; a line, which has no front; a point.
+    // A fold, where the front changes sides; a line, which has no front; a point.
     let fold = Patch(|u: f64, v: f64| DVec3::new(u * u, v, 0.0));
     assert!(matches!(parametric_normal(&fold, 0.0, 0.0), Err(SurfaceError::NoTangentPlane { .. })));
     let line = Patch(|u: f64, v: f64| DVec3::X * (u + v));
@@ -265,7 +267,7 @@ fn poles_have_the_normal_of_the_limit_and_apexes_none() {
 
 #[test]
 fn differences_keep_their_digits_at_any_size_and_place() {
-    // A sphere of any radius, also one far from the origin, by its equation and a scale.
+    // A sphere of any radius, also far from the origin, given by its equation and a scale.
     struct Placed(f64, DVec3);
     impl ImplicitSurface for Placed {
         fn value(&self, point: DVec3) -> f64 {
@@ -287,7 +289,8 @@ fn differences_keep_their_digits_at_any_size_and_place() {
             }
         }
     }
-    // At the edge of a square root's range only one side has a value: y = sqrt(1 - x^2) - 1/2 at x = 1 has an infinite slope.
+    // At the edge of a square root's domain f is finite on one side only: y - sqrt(1 - x^2) has an infinite
+    // slope at x = 1.
     let edge = |p: DVec3| p.y - (1.0 - p.x * p.x).sqrt();
     let found = implicit_normal(&edge, DVec3::X).unwrap();
     assert!(angle(found, DVec3::X) < 0.01, "{found}");
@@ -331,18 +334,19 @@ proptest! {
         exponent in -200i32..200,
     ) {
         prop_assume!(along.length() > 1e-3);
-        // Whole multiples of a vector with few digits: exactly on a line.
+        // Integer multiples of a vector with few digits lie exactly on a line.
         let along = (along * 1024.0).round();
         let a = (a * 1024.0).round();
         let scale = 2f64.powi(exponent);
         let line = [a, a + along, a + along * f64::from(step)].map(|point| point * scale);
         prop_assert_eq!(plane_normal(&line), Err(SurfaceError::Collinear));
-        // A millionth beside it: a plane, whose normal is at right angles to both.
+        // A point at a millionth of the length beside the line gives a plane, whose normal is perpendicular
+        // to both vectors.
         let aside = along.any_orthonormal_vector();
         let apart = along.length() * 1e-6;
         let beside = [a, a + along, a + along * 0.5 + aside * apart].map(|point| point * scale);
         let normal = plane_normal(&beside).expect("a plane");
-        // Rounding of the points, 2^-53 of their size, over the distance from the line.
+        // The rounding of the points, 2^-53 of their size, over the distance from the line.
         let bound = 4.0 * f64::EPSILON * (a.length() + along.length()) / apart;
         prop_assert!(angle(normal, along.cross(aside)) < bound, "{normal}, {bound}");
     }
@@ -361,7 +365,8 @@ proptest! {
         let ellipsoid = |p: DVec3| p.dot(form * p) - 1.0;
         let exact = form * point;
         let found = implicit_normal(&ellipsoid, point).unwrap();
-        // Central differences of a quadratic cut nothing off; rounding costs 2^-53 of the terms, up to (3 / 0.2)^2, over the step.
+        // Central differences of a quadratic have no truncation error; rounding costs 2^-53 of the terms, up
+        // to (3 / 0.2)^2, over the step.
         prop_assert!(angle(found, exact) < 225.0 * 2.3e-16 * 8.0 / (6e-6 * exact.length()), "{found} is not {exact}");
     }
 }

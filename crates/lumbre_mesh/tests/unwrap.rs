@@ -1,4 +1,5 @@
-//! Lightmap charts: injective, apart by the gap, with the density asked for, on shapes and on a scanned mesh.
+//! Lightmap charts are injective, separated by the gap and of the requested density, for shapes and for a
+//! scanned mesh.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ fn unwrapped(mesh: &TriangleMesh, density: f64, options: UnwrapOptions) -> Unwra
     unwrapped
 }
 
-/// Area of a triangle's coordinates in texels, positive where they run counter-clockwise.
+/// Signed area of a triangle's coordinates in texels; positive if counter-clockwise.
 fn texel_area(unwrapped: &Unwrapped, triangle: [u32; 3]) -> f64 {
     let size = Vec2::new(unwrapped.width as f32, unwrapped.height as f32).as_dvec2();
     let [a, b, c] = triangle.map(|v| unwrapped.mesh.uv1[v as usize].as_dvec2() * size);
@@ -24,10 +25,10 @@ fn area(mesh: &TriangleMesh, triangle: [u32; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// What holds of every unwrapping.
+/// Checks what must hold for every result.
 fn check(mesh: &TriangleMesh, unwrapped: &Unwrapped, density: f64, options: UnwrapOptions) {
     let Unwrapped { mesh: result, vertex_sources, width, height, charts } = unwrapped;
-    // The same triangles in the same places.
+    // The triangles are the same, at the same positions.
     assert_eq!(result.indices.len(), mesh.indices.len());
     assert_eq!(vertex_sources.len(), result.positions.len());
     for (&new, &old) in result.indices.iter().zip(&mesh.indices) {
@@ -37,14 +38,14 @@ fn check(mesh: &TriangleMesh, unwrapped: &Unwrapped, density: f64, options: Unwr
             mesh.positions[old as usize].to_array().map(f32::to_bits)
         );
     }
-    // Every triangle in one chart.
+    // Every triangle is in exactly one chart.
     let mut all: Vec<u32> = charts.iter().flat_map(|chart| chart.triangles.iter().copied()).collect();
     all.sort_unstable();
     assert_eq!(all, (0..mesh.triangle_count() as u32).collect::<Vec<_>>());
-    // No two triangles own a texel.
+    // No two triangles own the same texel.
     let report = validate_uv1(result, *width, *height).expect("what was unwrapped can be checked");
     assert!(report.is_sound(), "{report:?}");
-    // Chart rectangles, widened by the gap, are disjoint and within the page: checked by painting them.
+    // Chart rectangles extended by the gap are disjoint and within the page; checked by painting them.
     let mut painted = vec![false; *width as usize * *height as usize];
     for chart in charts {
         assert!(chart.x + chart.width <= *width && chart.y + chart.height <= *height);
@@ -61,7 +62,8 @@ fn check(mesh: &TriangleMesh, unwrapped: &Unwrapped, density: f64, options: Unwr
     for chart in charts {
         for &triangle in &chart.triangles {
             let triangle = triangles[triangle as usize];
-            // All of it half a texel inside the rectangle; f32 at this page size is good to 1e-3 texels.
+            // All coordinates are at least half a texel inside the rectangle; f32 is accurate to 1e-3 texels
+            // at this page size.
             for vertex in triangle {
                 let texel = result.uv1[vertex as usize] * Vec2::new(*width as f32, *height as f32);
                 let low = texel - Vec2::new(chart.x as f32, chart.y as f32) - 0.5;
@@ -69,7 +71,8 @@ fn check(mesh: &TriangleMesh, unwrapped: &Unwrapped, density: f64, options: Unwr
                 assert!(low.min_element() > -1e-3 && high.min_element() > -1e-3 || chart.width == 1);
             }
             if chart.normal != Vec3::ZERO {
-                // The density is met, up to the tilt within a chart and the rounding of coordinates to f32.
+                // The density is reached, up to the tilt within a chart and the rounding of coordinates to
+                // f32.
                 let wanted = area(result, triangle) * density * density * cosine;
                 assert!(texel_area(unwrapped, triangle) > wanted * (1.0 - 1e-3) - 1e-2);
             }
@@ -83,10 +86,11 @@ fn a_box_has_six_charts_that_lie_along_the_axes() {
     let result = unwrapped(&mesh, 10.0, UnwrapOptions::default());
     let mut sizes: Vec<_> = result.charts.iter().map(|chart| (chart.width, chart.height)).collect();
     sizes.sort_unstable();
-    // 4 x 3, 4 x 2 and 3 x 2 metres at 10 texels, and one more for the border.
+    // 4 x 3, 4 x 2 and 3 x 2 metres with 10 texels per metre, plus one texel for the border.
     assert_eq!(sizes, [(31, 21), (31, 21), (41, 21), (41, 21), (41, 31), (41, 31)]);
     for triangle in result.mesh.triangles() {
-        // Whole texels fit: the density is met exactly, to the rounding of f32 coordinates.
+        // The sides are whole numbers of texels, so the density is exact up to the rounding of f32
+        // coordinates.
         assert!((texel_area(&result, triangle) / (area(&result.mesh, triangle) * 100.0) - 1.0).abs() < 1e-3);
         let [a, b, c] = triangle.map(|v| result.mesh.uv1[v as usize]);
         let along = |p: Vec2, q: Vec2| (p.x - q.x).abs() < 1e-5 || (p.y - q.y).abs() < 1e-5;
@@ -122,7 +126,8 @@ fn curved_shapes() {
     }
 }
 
-/// A strip that winds up twice about an axis, almost flat: its normals fit one chart, its projection does not.
+/// A nearly flat strip that winds twice around an axis: its normals fit into one chart, but its projection
+/// overlaps.
 fn spiral() -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let steps = 80u32;
@@ -178,7 +183,7 @@ fn what_cannot_be_unwrapped_is_an_error() {
     for density in [1e6, 1e300] {
         assert!(matches!(attempt(&mesh, density, default), Err(UnwrapError::TooLarge { .. })));
     }
-    // Each face fits, the six together do not.
+    // Each face fits, but all six together do not.
     let small = UnwrapOptions { max_size: 64, ..default };
     assert!(matches!(attempt(&shapes::cuboid(Vec3::ONE, 1), 60.0, small), Err(UnwrapError::TooLarge { .. })));
     let angle = UnwrapOptions { chart_angle: 90.0, ..default };
@@ -224,7 +229,8 @@ fn a_scanned_bunny_in_under_two_seconds() {
         result.height,
         used * 100.0
     );
-    // The clock is a promise of optimized builds on an idle machine: ten times as long is a fault everywhere.
+    // Two seconds is the goal for optimized builds on an idle machine; ten times as long is a fault on any
+    // machine.
     assert!(seconds < 20.0, "{seconds} s");
     assert!(triangles > 60_000 && charts < triangles / 50, "{charts} charts of {triangles} triangles");
 }

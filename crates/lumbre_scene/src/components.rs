@@ -1,4 +1,5 @@
-//! What an entity can be, beside the lights and materials of `lumbre_optics`: a mesh, a camera, a lightmapped surface.
+//! Components of scene entities: meshes, textures, cameras, baked light and markers. Lights and materials are
+//! in `lumbre_optics`.
 
 use std::sync::Arc;
 
@@ -8,8 +9,8 @@ use lumbre_mesh::TriangleMesh;
 
 use crate::{Image, LightmapImage, TextureReference, Transform};
 
-/// The geometry of an entity. Entities that share the `Arc` share the GPU's copy.
-/// To change a mesh, put another `Arc` in its place.
+/// The geometry of an entity. Entities that share the `Arc` also share the GPU buffers. To change a mesh,
+/// replace the `Arc`.
 #[derive(Component, Clone, Debug)]
 #[require(Transform, lumbre_optics::Material)]
 pub struct Mesh(pub Arc<TriangleMesh>);
@@ -20,26 +21,28 @@ impl From<TriangleMesh> for Mesh {
     }
 }
 
-/// Textures that modulate an entity's `Material`. An entity without this component has none, and no texture code runs for it.
+/// Textures that modulate an entity's `Material`. An entity without this component is untextured and uses a
+/// shader variant without texture code.
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct MaterialTextures {
     /// Multiplies ambient, diffuse and alpha (sRGB).
     pub base_color: Option<TextureReference>,
     /// Multiplies emission (sRGB).
     pub emissive: Option<TextureReference>,
-    /// Green is roughness, blue is metallic (linear); present only for glTF materials without Phong coefficients.
+    /// Green is roughness, blue is metallic (linear). Present only for glTF materials without Phong
+    /// coefficients.
     pub metallic_roughness: Option<MetallicRoughnessTexture>,
-    /// Turns the normal of every fragment under Phong shading (linear).
+    /// Perturbs the normal per fragment under Phong shading (linear).
     pub normal: Option<NormalTexture>,
-    /// Weakens indirect light: ambient terms and lightmaps (red, linear).
+    /// Attenuates indirect light: ambient terms and lightmaps (red, linear).
     pub occlusion: Option<OcclusionTexture>,
 }
 
 impl MaterialTextures {
-    /// How many textures a material may have.
+    /// Number of texture slots of a material.
     pub const SLOTS: usize = 5;
 
-    /// Its textures: base colour, emissive, metallic-roughness, normal, occlusion.
+    /// The textures in slot order: base colour, emissive, metallic-roughness, normal, occlusion.
     pub fn slots(&self) -> [Option<&TextureReference>; Self::SLOTS] {
         let Self { base_color, emissive, metallic_roughness, normal, occlusion } = self;
         [
@@ -51,22 +54,22 @@ impl MaterialTextures {
         ]
     }
 
-    /// Which of its slots are filled: bit i for slot i.
+    /// A bit mask of the filled slots: bit i for slot i.
     pub fn slot_mask(&self) -> u8 {
         mask(self.slots().map(|slot| slot.is_some()))
     }
 
-    /// Which of its slots read the second set of texture coordinates: bit i for slot i.
+    /// A bit mask of the slots that read the second set of texture coordinates: bit i for slot i.
     pub fn second_set_mask(&self) -> u8 {
         mask(self.slots().map(|slot| slot.is_some_and(|texture| texture.tex_coord != 0)))
     }
 
-    /// The textures that there are.
+    /// The textures of all filled slots, in slot order.
     pub fn references(&self) -> impl Iterator<Item = &TextureReference> {
         self.slots().into_iter().flatten()
     }
 
-    /// The textures that there are, to be changed.
+    /// Mutable references to the textures of all filled slots, in slot order.
     pub fn references_mut(&mut self) -> impl Iterator<Item = &mut TextureReference> {
         let Self { base_color, emissive, metallic_roughness, normal, occlusion } = self;
         let slots = [
@@ -80,32 +83,34 @@ impl MaterialTextures {
     }
 }
 
-/// Bit i for truth i.
+/// Packs the flags into a bit mask: bit i for flag i.
 fn mask(bits: [bool; MaterialTextures::SLOTS]) -> u8 {
     (0..).zip(bits).map(|(place, bit)| u8::from(bit) << place).sum()
 }
 
-/// A tangent-space normal map: red points along the mesh's tangents, green against v, blue along the normal (glTF's convention).
+/// A tangent-space normal map: red points along the mesh's tangents, green against v, blue along the normal
+/// (glTF's convention).
 ///
-/// A mesh that has no tangents gets those of MikkTSpace when it is first drawn, over the coordinates that the texture reads.
+/// A mesh without tangents gets MikkTSpace tangents when it is first drawn, computed from the texture
+/// coordinates that the texture reads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalTexture {
     /// The texture.
     pub texture: TextureReference,
-    /// Factor of red and green after decoding; any number that is finite.
+    /// Factor of red and green after decoding; any finite number.
     pub scale: f32,
 }
 
-/// How much of the indirect light reaches each texel, in red.
+/// An occlusion map: red is the fraction of the indirect light that reaches the texel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OcclusionTexture {
     /// The texture.
     pub texture: TextureReference,
-    /// 0 for no occlusion, 1 for all of it.
+    /// How strongly the map applies: 0 ignores it, 1 applies it fully.
     pub strength: f32,
 }
 
-/// A metallic-roughness texture with the factors that the per-texel mapping to Phong needs.
+/// A metallic-roughness texture, with the factors needed to convert each texel to Phong coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetallicRoughnessTexture {
     /// The texture.
@@ -116,55 +121,63 @@ pub struct MetallicRoughnessTexture {
     pub metallic: f32,
     /// Factor of the green channel, [0, 1].
     pub roughness: f32,
-    /// k_s where nothing is metal: .04, unless a file states an index of refraction or a specular colour.
+    /// Specular coefficient k_s of the non-metallic part: 0.04, unless the file gives an index of refraction
+    /// or a specular colour.
     pub dielectric: glam::Vec3,
 }
 
-/// An entity whose indirect (and static direct) light comes from a baked texture through the mesh's `uv1`.
+/// Baked light of an entity, read through the mesh's `uv1`: the indirect light and the direct light of static
+/// lights.
 #[derive(Component, Clone, Debug)]
 pub struct Lightmap {
-    /// E/π per texel, shared by the entities of one map.
+    /// E/π per texel. Entities that share one map share the `Arc`.
     pub image: Arc<LightmapImage>,
 }
 
-/// The light of an entity's [`Lightmap`] in two maps of the same size and coordinates, which add up to it within the rounding of numbers. A baker makes
-/// it on request; saving writes both beside the map, as `<map>.direct.exr` and `<map>.bounced.exr`, which no file names. Frames do not read it.
+/// The light of an entity's [`Lightmap`] split into two maps of the same size and coordinates, whose sum is
+/// the lightmap up to rounding. The baker makes it on request. Saving writes both next to the lightmap, as
+/// `<map>.direct.exr` and `<map>.bounced.exr`; the glTF file does not refer to them, and rendering does not
+/// read them.
 ///
-/// Where seams were closed or values carried past a border, both follow in the proportion of their light there.
+/// Where the baker closed seams or padded chart borders, the corrected light is split in the ratio of the two
+/// parts at that texel.
 #[derive(Component, Clone, Debug)]
 pub struct SeparateLight {
-    /// What arrives straight from lamps, shining surfaces and the sky. E/π.
+    /// Light that arrives directly from lights, emissive surfaces and the sky, as E/π.
     pub direct: Arc<LightmapImage>,
-    /// What arrives by bounces. E/π.
+    /// Light that arrives after at least one bounce, as E/π.
     pub bounced: Arc<LightmapImage>,
 }
 
-/// Says that an entity never moves: the baker lights it. Set by the importer on every mesh that is not under a
-/// [`DynamicObject`].
+/// Marks an entity that never moves, so that the baker includes it and lights it. The importer sets it on
+/// every mesh that is not below a [`DynamicObject`].
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StaticObject;
 
-/// An entity that moves in the game: the baker leaves it (and what hangs below it) out.
+/// Marks an entity that moves at run time. The baker leaves it and its descendants out.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DynamicObject;
 
-/// Texels along one metre of an entity's lightmap, relative to the rest of the scene: a positive finite factor, 1 without it. What is looked at closely
-/// gets more, what nobody comes near gets less. Read by the baker; primitives that share a map get the largest.
+/// Lightmap texels per metre of this entity relative to the rest of the scene: a positive finite factor, 1
+/// without this component. Use larger values for surfaces that are seen up close and smaller ones for those
+/// that are not. Read by the baker; primitives that share a map use the largest of their factors.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct LightmapScale(pub f64);
 
-/// Asks that an entity's emissive faces light other objects in real time: each becomes a polygon light. Without it emission adds a
-/// colour and lights nothing in a frame (in the baker it always does).
+/// Makes an entity's emissive faces light other objects in real time: each face becomes a polygon light.
+/// Without it, emission only adds to the surface's own colour in a frame; the baker always treats emissive
+/// surfaces as light sources.
 ///
-/// The front shines with the front's emission; the back only if the material is double-sided and its back is a surface of its own,
-/// as in the baker. Faces shine evenly: an emissive texture is averaged over each. Alpha does not weaken them. An emitter does not
-/// light itself.
+/// The front emits the front's emission. The back emits only if the material is double-sided and has a back
+/// material, as in the baker. Radiance is constant over a face: an emissive texture is averaged over it.
+/// Alpha does not reduce the emitted light, and an emitter does not light itself.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EmissiveLight;
 
 impl EmissiveLight {
-    /// Radiance of the front and the back of faces of this material without its texture, W/(m² sr). Channels that are negative or hold
-    /// no number are 0; none is above 10³⁰.
+    /// Radiance of the front and the back of faces with this material, without its emissive texture, in W/(m²
+    /// sr). Negative and NaN channels become 0, larger ones are clamped to 10³⁰. An unlit material emits
+    /// nothing.
     pub fn radiance(material: &lumbre_optics::Material) -> [Vec3; 2] {
         let back = material.back.as_ref().filter(|_| material.double_sided);
         let clean = |color: Vec3| {
@@ -178,40 +191,44 @@ impl EmissiveLight {
     }
 }
 
-/// Hides the mesh of an entity, and those of all that hangs from it. Lights shine on, but for glowing faces that are hidden.
+/// Hides the meshes of an entity and of all its descendants. Lights below it stay on, except for hidden
+/// meshes with [`EmissiveLight`].
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hidden;
 
-/// The `extras` of a glTF node: data of the application, kept from import to export.
+/// The `extras` of a glTF node: application data that is kept from import to export.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct Extras(pub serde_json::Value);
 
-/// One primitive of a glTF mesh; a child of the node's entity. On export the primitives of a node become one mesh again.
+/// One primitive of a glTF mesh, as a child of the node's entity. Export merges the primitives of a node into
+/// one mesh again.
 #[derive(Component, Clone, Debug, PartialEq, Eq)]
 pub struct Primitive {
-    /// Place in the mesh's list of primitives.
+    /// Index in the mesh's list of primitives.
     pub index: usize,
-    /// Name of the glTF mesh, or the node's.
+    /// Name of the glTF mesh, or of the node if the mesh has none.
     pub mesh: Arc<str>,
-    /// Name of the glTF material, empty without one.
+    /// Name of the glTF material; empty if it has none.
     pub material: Arc<str>,
 }
 
-/// The lens of a camera; it looks along its entity's -Z with +Y up.
+/// The projection of a camera, which looks along its entity's -Z with +Y up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// A pinhole.
+    /// A perspective (pinhole) projection.
     Perspective {
         /// Vertical field of view in radians, in (0, π).
         vertical_fov: f64,
-        /// Width by height as the file gave it, kept for export: a frame has its target's.
+        /// Aspect ratio (width / height) from the file, kept for export only: frames use the aspect of their
+        /// target.
         aspect: Option<f64>,
-        /// Near plane in metres, greater than 0. There is no far plane (reversed-Z, infinite); `far` is kept for export only.
+        /// Near plane in metres, greater than 0. Frames have no far plane (infinite reversed-Z); `far` is
+        /// kept for export only.
         near: f64,
-        /// Far distance as the file gave it, if it did.
+        /// Far plane in metres from the file, if it states one.
         far: Option<f64>,
     },
-    /// Parallel rays.
+    /// An orthographic projection.
     Orthographic {
         /// Half width in metres.
         half_width: f64,
@@ -225,24 +242,26 @@ pub enum Projection {
 }
 
 impl Projection {
-    /// A pinhole with a vertical field of view in radians, in (0, π), and a near plane at 1 cm.
+    /// A perspective projection with a vertical field of view in radians, in (0, π), and the near plane at 1
+    /// cm.
     pub fn perspective(vertical_fov: f64) -> Self {
         Self::Perspective { vertical_fov, aspect: None, near: 0.01, far: None }
     }
 
-    /// Parallel rays onto a frame of twice these half sides in metres, from the camera to `far` metres before it.
+    /// An orthographic projection with these half extents in metres, from the camera to a far plane at `far`
+    /// metres.
     pub fn orthographic(half_width: f64, half_height: f64, far: f64) -> Self {
         Self::Orthographic { half_width, half_height, near: 0.0, far }
     }
 }
 
-/// A camera.
+/// A camera: a projection and an exposure.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 #[require(Transform)]
 pub struct Camera {
-    /// The lens.
+    /// The projection.
     pub projection: Projection,
-    /// Factor from radiance to display values, greater than 0.
+    /// Exposure: the factor from radiance to display values, greater than 0.
     pub exposure: f32,
 }
 
@@ -253,24 +272,24 @@ impl Default for Camera {
     }
 }
 
-/// The camera that frames are drawn from, if there are several. The first one otherwise.
+/// Marks the camera that frames are drawn from if there are several. Without it, the first camera is used.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ActiveCamera;
 
-/// An axis-aligned box in the world, metres.
+/// An axis-aligned bounding box in world space, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Smallest corner.
+    /// Minimum corner.
     pub min: DVec3,
-    /// Largest corner.
+    /// Maximum corner.
     pub max: DVec3,
 }
 
 impl Bounds {
-    /// Holds nothing; grows from here.
+    /// The empty box, to be grown with [`include`](Self::include).
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
-    /// Grows to hold a point; points that are not finite are ignored.
+    /// Grows the box to contain a point. Points that are not finite are ignored.
     pub fn include(&mut self, point: DVec3) {
         if point.is_finite() {
             self.min = self.min.min(point);
@@ -278,17 +297,17 @@ impl Bounds {
         }
     }
 
-    /// Whether it holds nothing.
+    /// Returns true if the box contains no point.
     pub fn is_empty(&self) -> bool {
         !(self.min.cmple(self.max).all())
     }
 
-    /// Its middle; the origin if it is empty.
+    /// The centre; the origin if the box is empty.
     pub fn center(&self) -> DVec3 {
         if self.is_empty() { DVec3::ZERO } else { 0.5 * self.min + 0.5 * self.max }
     }
 
-    /// Half its diagonal in metres; 0 if it is empty.
+    /// Half the diagonal in metres; 0 if the box is empty.
     pub fn radius(&self) -> f64 {
         if self.is_empty() { 0.0 } else { 0.5 * (self.max - self.min).length() }
     }

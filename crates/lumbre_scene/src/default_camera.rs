@@ -1,10 +1,13 @@
-//! A camera for files without one: from outside, into the open side of a room. Not a camera path.
+//! A camera for files without one: outside of the scene, looking into the open side of a room. Not a camera
+//! path.
 //!
-//! Among the six views along the axes the one is chosen from which most of the scene is seen. Parallel rays on a regular grid enter the box
-//! around the scene at its near face; how deep they go until they meet the first triangle, as a part of the box's depth, is averaged over the
-//! grid, rays that meet nothing aside. A closed side stops them at once (0), the open side of a room lets them through to its back wall
-//! (nearly 1), and a single object stops them halfway from every side. Views from a side win over those from above or below unless these see
-//! much more, and among equals the first of +Z, +X, -X, -Z, +Y, -Y wins: +Z is what glTF calls the front.
+//! Of the six views along the axes, the one that sees deepest into the scene is chosen. Parallel rays on a
+//! regular grid enter the bounding box of the scene at its near face. The depth at which they hit the first
+//! triangle, as a fraction of the depth of the box, is averaged over the grid without the rays that miss. A
+//! closed side stops the rays at once (0), the open side of a room lets them reach its back wall (nearly 1),
+//! and a single object stops them halfway from every side. Horizontal views are preferred to those from above
+//! or below unless the latter see much deeper, and among equals the first of +Z, +X, -X, -Z, +Y, -Y wins: +Z
+//! is what glTF calls the front.
 
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, DVec3};
@@ -12,22 +15,23 @@ use lumbre_optics::Material;
 
 use crate::{Bounds, Camera, GlobalTransform, Mesh, Projection, Transform, hidden_entities, scene_bounds};
 
-/// Rays along each side of the grid: enough to see a door, few enough that large meshes take no time.
+/// Rays along each side of the grid: enough to find a door, few enough to stay fast for large meshes.
 const GRID: usize = 24;
 /// Vertical field of view in radians.
 const VERTICAL_FOV: f64 = 0.7;
-/// Air around the scene.
+/// Factor on the distance that leaves a margin around the scene.
 const MARGIN: f64 = 1.05;
-/// How much deeper a view has to see than those before it in the list to be preferred: a view that is merely a little better
-/// is no reason to leave the front.
+/// How much deeper than the best view before it a horizontal view must see to replace it, so that a small
+/// gain does not move the camera away from the front.
 const ADVANTAGE: f64 = 0.1;
 /// The same for views from above and below.
 const VERTICAL_ADVANTAGE: f64 = 0.4;
 
-/// The viewing directions in the order of preference; the camera stands on the other side.
+/// The viewing directions in order of preference; the camera is on the opposite side of the scene.
 const DIRECTIONS: [DVec3; 6] = [DVec3::NEG_Z, DVec3::NEG_X, DVec3::X, DVec3::Z, DVec3::NEG_Y, DVec3::Y];
 
-/// A camera that frames the scene at a width by height of `aspect`. Global transforms must be up to date.
+/// A camera that frames the scene for the aspect ratio `aspect` (width / height). Global transforms must be
+/// up to date.
 ///
 /// An empty scene gives a camera at (0, 0, 5) that looks at the origin.
 pub fn default_camera(world: &mut World, aspect: f64) -> (Transform, Camera) {
@@ -52,7 +56,8 @@ fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) 
     let right = direction.cross(up);
     let extent = |axis: DVec3| half.dot(axis.abs());
     let tangent = (0.5 * VERTICAL_FOV).tan();
-    // The near face is the larger in the picture. A scene without extent is looked at from where it can be seen.
+    // The near face of the box decides, as it appears largest. A scene without extent still gets a positive
+    // distance.
     let needed = (extent(up) / tangent).max(extent(right) / (tangent * aspect)) * MARGIN;
     let size = bounds.radius().max(1e-3);
     let distance = (needed + extent(direction)).max(1.1 * extent(direction) + 0.01 * size).max(size);
@@ -63,10 +68,10 @@ fn frame(bounds: &Bounds, direction: DVec3, aspect: f64) -> (Transform, Camera) 
     (transform, Camera { projection, exposure: 1.0 })
 }
 
-/// The mean depth that the first hits have from each direction, 0 to 1.
+/// The mean depth of the first hits for each viewing direction, from 0 to 1.
 fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
     let size = (bounds.max - bounds.min).max(DVec3::splat(f64::MIN_POSITIVE));
-    // The box as [0, 1]³, so that one grid serves all directions.
+    // Maps the bounding box to [0, 1]³, so that one grid serves all directions.
     let unit = DAffine3::from_scale(size.recip()) * DAffine3::from_translation(-bounds.min);
     let mut first = vec![[f64::INFINITY; GRID * GRID]; 6];
     let hidden = hidden_entities(world);
@@ -84,7 +89,8 @@ fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
             }
             let normal = (b - a).cross(c - a);
             for (direction, depths) in DIRECTIONS.iter().zip(&mut first) {
-                // Back faces that are not drawn block nothing: rooms are often modelled so.
+                // Back faces that are not drawn do not block the view: rooms are often modelled with
+                // one-sided walls.
                 if double_sided || normal.dot(*direction) < 0.0 {
                     splat([a, b, c], *direction, depths);
                 }
@@ -97,14 +103,14 @@ fn depths(world: &mut World, bounds: &Bounds) -> [f64; 6] {
     })
 }
 
-/// Lowers the depth of every grid ray that a triangle in the unit cube stops.
+/// Rasterizes a triangle in the unit cube into the grid of rays and keeps the smaller depths.
 fn splat(corners: [DVec3; 3], direction: DVec3, depths: &mut [f64; GRID * GRID]) {
     let axis = direction.abs().max_position();
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let flat = corners.map(|corner| DVec2::new(corner[u], corner[v]));
     let depth = corners.map(|corner| if direction[axis] > 0.0 { corner[axis] } else { 1.0 - corner[axis] });
     let area = (flat[1] - flat[0]).perp_dot(flat[2] - flat[0]);
-    // Seen edge on, or not a number.
+    // The triangle is seen edge-on, or has a NaN coordinate.
     if area.is_nan() || area == 0.0 {
         return;
     }
@@ -137,7 +143,7 @@ mod tests {
     use super::*;
     use crate::update_transforms;
 
-    /// The walls of a unit cube as a double-sided mesh, but for the one in direction `open`.
+    /// The walls of a unit cube as a double-sided mesh, without the one in direction `open`.
     fn room(open: Option<DVec3>) -> World {
         let mut mesh = TriangleMesh::default();
         for direction in DIRECTIONS {

@@ -1,5 +1,5 @@
-//! A light for files without one: a key and a fill that travel with the camera, so that no picture is black for want of a lamp. Not lights
-//! of the scene.
+//! A light for files without one: a key light and a fill light attached to the camera, so that a scene
+//! without lights is not drawn black. They are not part of the scene.
 
 use bevy_ecs::prelude::*;
 use glam::{DQuat, EulerRot, Vec3};
@@ -12,15 +12,18 @@ use crate::{
 
 /// Radiance of a white surface that faces the key light.
 const KEY: f32 = 0.75;
-/// Of one that faces the fill light.
+/// Radiance of a white surface that faces the fill light.
 const FILL: f32 = 0.25;
-/// Of every white surface; metals, which reflect no light diffusely, show their colour by it.
+/// Ambient radiance of every white surface. Metals, which have no diffuse reflection, show their colour by
+/// it.
 const AMBIENT: f32 = 0.2;
 
-/// Whether a frame of a World would be black where it should show surfaces: a mesh is shown that takes light, and there is none.
+/// Returns true if a frame of a World would show its surfaces black: a lit mesh is visible, and nothing
+/// lights it.
 ///
-/// Light is a `Light` that is on and not black, global ambient light, a sky, a lightmap, or a mesh with [`EmissiveLight`]. Emission alone
-/// lights nothing else in a frame; it does in a bake.
+/// Sources of light are an enabled `Light` that is not black, global ambient light, a sky, a lightmap, an
+/// irradiance volume, or a mesh with [`EmissiveLight`]. Emission without that component lights nothing else
+/// in a frame, although it does in a bake.
 pub fn is_without_light(world: &mut World) -> bool {
     let shines = |color: Vec3| color.max_element() > 0.0;
     let lamp = |light: &Light| {
@@ -37,7 +40,8 @@ pub fn is_without_light(world: &mut World) -> bool {
     {
         return false;
     }
-    // What glows as a whole shows itself; a texture may glow in few places.
+    // A mesh that glows all over is visible by itself; with an emissive texture it may glow in few places
+    // only.
     let hidden = hidden_entities(world);
     let takes_light = |(entity, material, textures): (Entity, &Material, Option<&MaterialTextures>)| {
         let glows = shines(material.front.emission) && textures.is_none_or(|own| own.emissive.is_none());
@@ -47,8 +51,8 @@ pub fn is_without_light(world: &mut World) -> bool {
     objects.iter(world).any(takes_light)
 }
 
-/// Hangs a key light, from above the viewer's left shoulder, and a fill light from the right on a camera. Global transforms are up to date
-/// afterwards.
+/// Attaches a key light from above the viewer's left shoulder and a fill light from the right to a camera.
+/// Updates the global transforms.
 pub fn add_default_light(world: &mut World, camera: Entity) {
     let light =
         |strength: f32| Light { bake: BakeMode::Dynamic, ..Light::directional(Vec3::splat(strength)) };

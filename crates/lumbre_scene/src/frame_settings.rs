@@ -1,37 +1,44 @@
-//! What a level asks of every frame that shows it: samples, where lights end, how finely shadows are drawn. Prices, and no part of the light: bakes and rays do not read them.
+//! Quality settings that a level requests for its frames: multisampling, where lights end, and shadow
+//! resolution and filter. They trade quality for speed in the rasterizer only; the baker and the ray tracer
+//! do not read them.
 
-/// How frames of a scene are drawn, where a program leaves it open. The default is the most accurate but for the samples.
+/// How frames of a scene are drawn where the program does not decide. The defaults are the most accurate
+/// choices, except that multisampling is left to the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameSettings {
-    /// Whether a pixel has four samples instead of one; the program's choice if there is none.
+    /// Four samples per pixel (true) or one (false); `None` leaves the choice to the program.
     pub multisample: Option<bool>,
-    /// Radiance, W/(m² sr), that a lamp gives a white surface that faces it, below which it ends: nearer lamps with a range end where they ended before. 0: lamps
-    /// without a range have no end.
+    /// Cut-off for the range of point lights and spotlights, as radiance in W/(m² sr): a light ends at the
+    /// distance where the strongest channel of a white surface facing it falls to this radiance, or at its own
+    /// range if that is shorter. With 0, lights without a range are unbounded.
     pub light_threshold: f32,
-    /// Texels of a shadow map beside the usual number, along a side: 1 for shadows about as sharp as the picture, 0.5 for half as many each way.
-    /// From [`SHADOW_RESOLUTIONS`](Self::SHADOW_RESOLUTIONS).
+    /// Factor on the default side length of a shadow map in texels: 1 makes shadows about as sharp as the
+    /// picture, 0.5 halves the texels along each side. Clamped to
+    /// [`SHADOW_RESOLUTIONS`](Self::SHADOW_RESOLUTIONS).
     pub shadow_resolution: f32,
-    /// How a surface reads a shadow map.
+    /// How shadow maps are filtered.
     pub shadow_filter: ShadowFilter,
 }
 
-/// How many texels of a shadow map a surface looks at, and over which width.
+/// How many texels of a shadow map are sampled per shaded point, and over which width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum ShadowFilter {
-    /// One: edges have the steps of the map.
+    /// One sample: shadow edges show the texels of the map.
     Hard,
-    /// Nine about the point, weighed (percentage-closer filtering; Reeves, Salesin and Cook, SIGGRAPH 1987): edges are a texel wide, whatever size a light has.
+    /// Nine weighted samples around the point (percentage-closer filtering; Reeves, Salesin and Cook,
+    /// SIGGRAPH 1987): edges are one texel wide, whatever the size of the light.
     PercentageCloser,
-    /// As many as the light's size asks for, 44 (percentage-closer soft shadows; Fernando, SIGGRAPH sketches 2005); the nine for a light without a size.
+    /// 44 samples over a width that follows the size of the light (percentage-closer soft shadows; Fernando,
+    /// SIGGRAPH sketches 2005); the nine samples of `PercentageCloser` for lights without a size.
     #[default]
     Soft,
 }
 
 impl FrameSettings {
-    /// The least and the largest resolution of shadows.
+    /// The smallest and the largest factor for the shadow resolution.
     pub const SHADOW_RESOLUTIONS: [f32; 2] = [0.0625, 4.0];
 
-    /// The resolution of shadows, within [`SHADOW_RESOLUTIONS`](Self::SHADOW_RESOLUTIONS); NaN is 1.
+    /// The shadow resolution clamped to [`SHADOW_RESOLUTIONS`](Self::SHADOW_RESOLUTIONS); NaN becomes 1.
     pub fn shadow_resolution(&self) -> f32 {
         let [least, most] = Self::SHADOW_RESOLUTIONS;
         if self.shadow_resolution.is_nan() { 1.0 } else { self.shadow_resolution.clamp(least, most) }
@@ -50,7 +57,7 @@ impl Default for FrameSettings {
 }
 
 impl ShadowFilter {
-    /// Every choice, the cheapest first.
+    /// Every filter, the cheapest first.
     pub const ALL: &'static [Self] = &[Self::Hard, Self::PercentageCloser, Self::Soft];
 
     /// The name in files and on the command line.
@@ -62,7 +69,7 @@ impl ShadowFilter {
         }
     }
 
-    /// The choice with that name.
+    /// The filter with this name, or `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|filter| filter.name() == name)
     }

@@ -1,5 +1,7 @@
-//! Spotlights that shading per vertex or per face does not show: the axis of a cone meets a triangle inside, and no point where that
-//! triangle is lit is in the cone. Correct for such shading, and a surprise: so it is said. Not a measure of the whole picture's error.
+//! Finds spotlights that per-vertex or per-face shading misses: the axis of the cone hits the inside of a
+//! triangle, but no point at which the lighting of that triangle is evaluated lies in the cone. The result is
+//! correct for such shading but surprising, so it is reported. This does not measure the error of the whole
+//! picture.
 
 use bevy_ecs::name::NameOrEntity;
 use bevy_ecs::prelude::*;
@@ -9,17 +11,17 @@ use serde::Serialize;
 
 use crate::{Bounds, ChildOf, GlobalTransform, Mesh, Name, SceneSettings, hidden_entities};
 
-/// Triangles that are looked at in all, so that an answer comes within a second.
+/// Most triangles that are tested in all, so that the search ends within a second.
 const MOST_TRIANGLES: usize = 20_000_000;
-/// Cones that are named.
+/// Most cones that are reported.
 const MOST_CONES: usize = 20;
 
-/// A cone that lights the inside of a triangle and none of the points where it is evaluated.
+/// A cone that hits the inside of a triangle but contains none of the points where its lighting is evaluated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HiddenCone {
-    /// Name of the light, or its entity.
+    /// Name of the light, or its entity id.
     pub light: String,
-    /// Name of the object, or its entity.
+    /// Name of the object or of its parent, or its entity id.
     pub object: String,
     /// How the object is shaded.
     pub shading: &'static str,
@@ -40,8 +42,9 @@ impl std::fmt::Display for HiddenCone {
     }
 }
 
-/// The cones of a World that fall between the vertices (Gouraud) or beside the points (flat) where its objects are lit. At most
-/// twenty, in the order of their entities; transforms have to be propagated.
+/// The spotlights whose cone falls between the points where an object's lighting is evaluated: its vertices
+/// (Gouraud) or the point of the flat rule (flat). Returns at most twenty and stops after twenty million
+/// triangle tests. Global transforms must be up to date.
 pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     let cones = cones(world);
@@ -58,7 +61,7 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
     let shown = query.iter(world).filter(|object| !hidden.contains(&object.0.entity));
     for (name, parent, mesh, material, transform, shading) in shown {
         let shading = shading.copied().unwrap_or(settings.shading);
-        // Where shading is by need, a cone that falls between vertices is a need for Phong.
+        // Shading by need switches to Phong where a cone falls between vertices.
         let per_fragment = matches!(shading, Shading::Phong | Shading::Auto { .. });
         if per_fragment || material.unlit || !transform.0.is_finite() {
             continue;
@@ -82,7 +85,7 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
                 missed.then_some((distance, longest_edge(&corners)))
             });
             if let Some((distance, edge)) = hidden {
-                // A primitive of a file has the name of its node.
+                // A primitive from a file has no name of its own; its node does.
                 let of_parent = parent.and_then(|parent| world.get::<Name>(parent.parent()));
                 let named = name.name.or(of_parent).map(ToString::to_string);
                 let (light, object) = (cone.light.clone(), named.unwrap_or_else(|| name.entity.to_string()));
@@ -94,7 +97,7 @@ pub fn hidden_cones(world: &mut World) -> Vec<HiddenCone> {
     found
 }
 
-/// Where a triangle is lit.
+/// The points at which the lighting of a triangle is evaluated.
 fn evaluated(shading: Shading, rule: FlatRule, corners: [DVec3; 3]) -> [DVec3; 3] {
     match (shading, rule) {
         (Shading::Flat, FlatRule::Centroid) => [(corners[0] + corners[1] + corners[2]) / 3.0; 3],
@@ -108,7 +111,7 @@ fn longest_edge([a, b, c]: &[DVec3; 3]) -> f64 {
     (*b - *a).length().max((*c - *b).length()).max((*a - *c).length())
 }
 
-/// A cone in the world.
+/// The cone of a spotlight in world space.
 struct Cone {
     light: String,
     apex: DVec3,
@@ -124,7 +127,8 @@ fn cones(world: &mut World) -> Vec<Cone> {
         let spot = light.spot.filter(|spot| !spot.is_everywhere() && light.kind == LightKind::Point)?;
         let cosine = spot.cosines().outer;
         let usable = light.enabled && transform.0.is_finite() && light.validate("").is_ok();
-        // A cutoff of 90 degrees has a tangent without end, and misses no vertex before it.
+        // Half-angles of 90 degrees and more have no finite tangent, and contain every vertex in front of the
+        // light.
         (usable && cosine > 0.0).then(|| Cone {
             light: name.to_string(),
             apex: transform.translation(),
@@ -143,11 +147,12 @@ impl Cone {
         away.dot(self.axis) > self.cosine * away.length()
     }
 
-    /// Whether the axis meets a box.
+    /// Returns true if the axis hits a box.
     fn meets(&self, bounds: &Bounds) -> bool {
         let (mut from, mut to) = (0.0_f64, f64::MAX);
         for side in 0..3 {
-            // Parallel to a side this is infinite, or no number on it, which `max` and `min` pass over.
+            // For an axis parallel to the slab these are infinite, or NaN on its boundary, which `max` and
+            // `min` ignore.
             let (a, b) = (
                 (bounds.min[side] - self.apex[side]) / self.axis[side],
                 (bounds.max[side] - self.apex[side]) / self.axis[side],
@@ -158,7 +163,7 @@ impl Cone {
         from <= to
     }
 
-    /// The distance at which the axis meets a triangle, if that is within the range (Möller and Trumbore 1997).
+    /// The distance at which the axis hits a triangle, if it is within the range (Möller and Trumbore 1997).
     fn pierces(&self, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
         let (first, second, to) = (*b - *a, *c - *a, self.apex - *a);
         let across = self.axis.cross(second);
@@ -185,7 +190,8 @@ mod tests {
     use super::*;
     use crate::{Transform, propagate_transforms};
 
-    /// A floor of so many squares along each side of 2 m, and a lamp 1 m over the middle of one of their triangles.
+    /// A floor of 2 m with `squares` squares along each side, and a lamp 1 m above the inside of one of their
+    /// triangles.
     fn lit(squares: u32, shading: Shading, cone: SpotCone) -> Vec<HiddenCone> {
         let mut world = World::new();
         world.spawn((Mesh(Arc::new(shapes::plane(2.0, 2.0, squares, squares))), shading, Name::new("floor")));
@@ -222,7 +228,7 @@ mod tests {
 
     #[test]
     fn flat_shading_is_asked_at_the_centroid() {
-        // Wide enough for the near corner of the square, and not for the middle of the triangle.
+        // Wide enough for the near corner of the square, but not for the centroid of the triangle.
         assert_eq!(lit(1, Shading::Flat, SpotCone::Smooth { inner: 0.0, outer: 0.05 }).len(), 1);
     }
 }

@@ -1,10 +1,11 @@
-//! Pixels in memory: material textures and lightmaps. Not their GPU copies.
+//! Images in CPU memory: material textures, lightmaps and how textures are sampled. GPU copies are made
+//! elsewhere.
 
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-/// A decoded texture image, RGBA, top row first.
+/// A decoded RGBA image with the top row first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// Name or file name, for messages and export.
@@ -13,26 +14,28 @@ pub struct Image {
     pub width: u32,
     /// Height in texels, at least 1.
     pub height: u32,
-    /// `4 * width * height` bytes. Colours are sRGB-encoded where the slot says so; 16-bit sources are rounded.
+    /// `4 * width * height` bytes. Colours are sRGB-encoded for the slots that glTF defines so; 16-bit
+    /// sources are rounded.
     pub rgba: Vec<u8>,
 }
 
-/// A lightmap: E/π per texel, linear RGB, top row first (v = 0 is the top row, as glTF has it).
+/// A lightmap: E/π per texel, linear RGB, top row first (v = 0 is the top row, as in glTF).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightmapImage {
-    /// File name of the OpenEXR image beside the glTF file.
+    /// File name given by the baker, or the path relative to the glTF file that the image was loaded from. Used
+    /// in messages, and to keep the names of atlases on export.
     pub name: String,
     /// Width in texels.
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// `width * height` values.
+    /// `width * height` texels.
     pub texels: Vec<Vec3>,
     /// How it is stored on disk and on the GPU.
     pub encoding: LightmapEncoding,
 }
 
-/// Storage of a lightmap.
+/// Storage format of a lightmap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum LightmapEncoding {
     /// f32 per channel.
@@ -40,45 +43,45 @@ pub enum LightmapEncoding {
     /// f16 per channel.
     #[default]
     Rgb16Float,
-    /// Shared exponent, 9 bits each.
+    /// RGB9E5: 9-bit mantissas with a shared exponent.
     Rgb9E5,
 }
 
-/// How a texture repeats outside [0, 1].
+/// How texture coordinates outside [0, 1] are mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Wrap {
-    /// Tiles.
+    /// The image repeats.
     #[default]
     Repeat,
-    /// Tiles, every other one mirrored.
+    /// The image repeats, mirrored every other time.
     MirroredRepeat,
-    /// The border goes on.
+    /// The edge texels are extended.
     ClampToEdge,
 }
 
-/// Texture filtering.
+/// Filtering and wrapping of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Sampler {
-    /// Along u.
+    /// Wrap mode along u.
     pub wrap_u: Wrap,
-    /// Along v.
+    /// Wrap mode along v.
     pub wrap_v: Wrap,
-    /// Bilinear when magnified (else nearest).
+    /// Bilinear magnification (otherwise nearest).
     pub magnify_linear: bool,
-    /// Bilinear when minified (else nearest).
+    /// Bilinear minification (otherwise nearest).
     pub minify_linear: bool,
-    /// Mip levels: none, the nearest one, or blended.
+    /// How mip levels are used.
     pub mipmap: Mipmap,
 }
 
 /// Use of mip levels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Mipmap {
-    /// Only the full image.
+    /// Only the full-resolution level.
     None,
-    /// The nearest level.
+    /// The nearest mip level.
     Nearest,
-    /// Two levels blended.
+    /// Linear interpolation between two mip levels.
     #[default]
     Linear,
 }
@@ -95,28 +98,30 @@ impl Default for Sampler {
     }
 }
 
-/// A texture as a material uses it: image, sampler, coordinates (KHR_texture_transform).
+/// A texture as a material refers to it: image, sampler, set of coordinates and their transform
+/// (KHR_texture_transform).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureReference {
     /// The pixels.
     pub image: Arc<Image>,
-    /// Filtering.
+    /// Filtering and wrapping.
     pub sampler: Sampler,
-    /// 0 for `uv0`, 1 for `uv1`.
+    /// The set of coordinates: 0 for `uv0`, 1 for `uv1`.
     pub tex_coord: u32,
-    /// Added after scale and rotation.
+    /// Translation, applied after scale and rotation.
     pub offset: Vec2,
     /// Counter-clockwise rotation in radians about the origin.
     pub rotation: f32,
-    /// Factor per axis.
+    /// Scale factor per axis, applied first.
     pub scale: Vec2,
 }
 
 impl TextureReference {
-    /// The rows of its transform: u' = row · (u, v, 1). `KHR_texture_transform`: scaled, then rotated, then moved; v runs down, so that the rotation's matrix
-    /// looks clockwise.
+    /// The rows of the 2x3 coordinate transform: u' = row · (u, v, 1). As in `KHR_texture_transform`,
+    /// coordinates are scaled, then rotated, then translated. v points down, so the rotation matrix looks
+    /// clockwise.
     pub fn transform(&self) -> [Vec3; 2] {
-        // Most are not turned, and a bake asks for each of its rays.
+        // Skip the trigonometry for the common case: a bake evaluates this for each of its rays.
         let (sine, cosine) = if self.rotation == 0.0 { (0.0, 1.0) } else { self.rotation.sin_cos() };
         let Self { scale, offset, .. } = self;
         [
@@ -125,7 +130,7 @@ impl TextureReference {
         ]
     }
 
-    /// Where it reads for these coordinates of a mesh.
+    /// The transformed coordinates at which the texture is sampled.
     pub fn transformed(&self, uv: Vec2) -> Vec2 {
         let [u, v] = self.transform();
         Vec2::new(u.dot(uv.extend(1.0)), v.dot(uv.extend(1.0)))

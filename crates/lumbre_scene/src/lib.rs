@@ -1,4 +1,5 @@
-//! Scenes: components, transform hierarchy, glTF in and out, and the census. No GPU, no lighting equations.
+//! The scene model of Lumbre: ECS components, the transform hierarchy, glTF import and export, and the census
+//! of effects that a scene uses. It contains no GPU code and no lighting equations.
 //!
 //! ```text
 //!  .glb, .gltf ──► load ──► World ──► save ──► .glb, .gltf (+ .bin, lightmaps as .exr, .ktx2)
@@ -11,11 +12,11 @@
 //!                             │
 //!                             ├──► propagate_transforms ──► GlobalTransform
 //!                             ├──► scene_bounds, default_camera
-//!                             └──► Census: what the scene calls for, and what it does not
+//!                             └──► Census: which effects the scene uses, and which it does not
 //! ```
 //!
-//! Everything that a file says is checked before the World is touched; what is wrong with it is a [`LoadError`] that names the place, what
-//! was repaired or left out a [`Note`].
+//! Loading validates the whole file before it changes the World. An invalid file gives a [`LoadError`] that
+//! names the offending place; anything that was repaired or skipped is reported as a [`Note`].
 //!
 //! ```
 //! use bevy_ecs::prelude::*;

@@ -1,21 +1,25 @@
-//! What is behind a surface that lets light through, beside its coefficient of transmission and its index of refraction. Read by the
-//! tracer and by frames. Not the refraction itself: that is `lumbre_optics::transmitted_direction`.
+//! The medium behind a transmissive surface: thin or solid, Fresnel reflection and absorption. Read by the
+//! ray tracer and by frames. The coefficient of transmission and the index of refraction are in the material;
+//! refraction itself is `lumbre_optics::transmitted_direction`.
 
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 
-/// How an entity whose material has a coefficient of transmission (k_t above 0) passes light on. Without this component it is solid, absorbs
-/// nothing inside, and divides no light by Fresnel's equations: the documents' model.
+/// How an entity whose material transmits light (k_t above 0) passes that light on. Without this component
+/// the entity is a solid that does not absorb and does not split light by the Fresnel equations, which is the
+/// model of the documents.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct Medium {
-    /// The surface is a sheet without an inside: light goes straight on. Else its front is the outside of a solid, and light is refracted.
+    /// True: the surface is a thin sheet, and light passes straight through. False: it bounds a solid and
+    /// refracts light.
     pub thin: bool,
-    /// Of the light that k_t lets through, the part that Fresnel's equations say is reflected is reflected. Without it all of it passes,
-    /// unless total reflection forbids it.
+    /// True: the Fresnel equations decide which part of the light that k_t passes is reflected instead.
+    /// False: all of it passes, except under total internal reflection.
     pub fresnel: bool,
-    /// What is left of white light after [`attenuation_distance`](Self::attenuation_distance) inside, linear RGB in [0, 1].
+    /// The fraction of white light that remains after [`attenuation_distance`](Self::attenuation_distance)
+    /// inside, linear RGB in [0, 1].
     pub attenuation_color: Vec3,
-    /// Metres, greater than 0; infinite where nothing is absorbed.
+    /// In metres, greater than 0; infinite if nothing is absorbed.
     pub attenuation_distance: f32,
 }
 
@@ -30,11 +34,13 @@ impl Default for Medium {
     }
 }
 
-/// A channel that would be black after the stated distance keeps this part, so that the law of Beer and Lambert has a coefficient.
+/// Smallest remaining fraction of a channel, so that a black attenuation colour still gives a finite
+/// coefficient in the Beer-Lambert law.
 const DARKEST: f64 = 1e-30;
 
 impl Medium {
-    /// The coefficient of absorption σ per channel, 1/m: after x metres exp(-σ x) of the light is left (Beer and Lambert).
+    /// The absorption coefficient σ per channel, 1/m: exp(-σ x) of the light remains after x metres
+    /// (Beer-Lambert law).
     pub fn absorption(&self) -> DVec3 {
         let distance = f64::from(self.attenuation_distance);
         if !(distance > 0.0 && distance.is_finite()) {
@@ -45,7 +51,7 @@ impl Medium {
         DVec3::new(channel(color.x), channel(color.y), channel(color.z))
     }
 
-    /// What is wrong with it, as field, value and remedy.
+    /// The first invalid field as (field name, value, remedy), or `None` if the medium is valid.
     pub fn fault(&self) -> Option<(&'static str, String, &'static str)> {
         let color = self.attenuation_color;
         if !(color.min_element() >= 0.0 && color.max_element() <= 1.0) {

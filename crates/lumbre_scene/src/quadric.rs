@@ -1,75 +1,79 @@
-//! Exact surfaces: planes, spheres, cylinders, cones and general quadrics in place of an entity's mesh, for whoever intersects rays. The mesh
-//! beside it is what a rasterizer draws. Not the intersection itself: that is the tracer's.
+//! Exact surfaces for the ray tracer: planes, spheres, cylinders, cones and general quadrics that replace an
+//! entity's mesh. The rasterizer draws the mesh instead. Ray intersection is in the tracer.
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
 use thiserror::Error;
 
-/// The exact surface of an entity, in its own space: its transform places, scales and shears it.
+/// The exact surface of an entity in its local space; the entity's transform applies, including scale and
+/// shear.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct Quadric {
-    /// The equation.
+    /// The shape.
     pub shape: QuadricShape,
-    /// Smallest and largest corner of the box outside of which the surface is cut away, in the entity's own space.
+    /// Minimum and maximum corner of a box in local space; the surface outside of it is cut away.
     pub trim: Option<[DVec3; 2]>,
 }
 
-/// Which surface. Each has its front outside, and the y axis as its own.
+/// The shape of a quadric, in canonical position: fronts face outwards, and the axis of revolution is the y
+/// axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum QuadricShape {
-    /// y = 0, its front above.
+    /// The plane y = 0, with its front towards +y.
     Plane,
-    /// About the origin.
+    /// A sphere about the origin.
     Sphere {
-        /// Metres, greater than 0.
+        /// Radius in metres, greater than 0.
         radius: f64,
     },
-    /// From y = -height/2 to height/2.
+    /// A cylinder from y = -height/2 to y = height/2.
     Cylinder {
-        /// Metres, greater than 0.
+        /// Radius in metres, greater than 0.
         radius: f64,
-        /// Metres, greater than 0.
+        /// Height in metres, greater than 0.
         height: f64,
-        /// Whether discs close its ends.
+        /// Whether its ends are closed by discs.
         closed: bool,
     },
-    /// Its base at y = -height/2, its apex at height/2.
+    /// A cone with its base at y = -height/2 and its apex at y = height/2.
     Cone {
-        /// Of the base, metres, greater than 0.
+        /// Radius of the base in metres, greater than 0.
         radius: f64,
-        /// Metres, greater than 0.
+        /// Height in metres, greater than 0.
         height: f64,
-        /// Whether a disc closes its base.
+        /// Whether its base is closed by a disc.
         closed: bool,
     },
-    /// a x² + b y² + c z² + d xy + e yz + f xz + g x + h y + i z + j = 0, its front where that is greater than 0.
+    /// a x² + b y² + c z² + d xy + e yz + f xz + g x + h y + i z + j = 0; the front is where the left side is
+    /// positive.
     General {
-        /// a to j.
+        /// The coefficients a to j.
         coefficients: [f64; 10],
     },
 }
 
-/// Why a surface is none.
+/// Why a quadric is invalid.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum QuadricError {
-    /// A length that is none.
+    /// A length is not a positive finite number.
     #[error("{field} is {value}; give metres greater than 0")]
     Length {
-        /// Which.
+        /// The name of the field.
         field: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
-    /// No equation.
+    /// The coefficients of a general quadric define no surface: a to i are all 0, or one of a to j is not
+    /// finite.
     #[error("coefficients are all 0, or not all finite, but for the last; give an equation that has points")]
     NoSurface,
-    /// A box that holds nothing.
+    /// The trim box is empty.
     #[error("the trim's min is not below its max; give min and max of a box")]
     Trim,
 }
 
 impl Quadric {
-    /// A whole surface.
+    /// A shape without a trim box.
     pub fn new(shape: QuadricShape) -> Self {
         Self { shape, trim: None }
     }
@@ -79,10 +83,10 @@ impl Quadric {
         Self::new(QuadricShape::Sphere { radius })
     }
 
-    /// Whether it has points.
+    /// Checks the lengths or coefficients of the shape, and the trim box.
     ///
     /// # Errors
-    /// [`QuadricError`], the first fault.
+    /// [`QuadricError`] for the first fault found.
     pub fn validate(&self) -> Result<(), QuadricError> {
         let length = |field: &'static str, value: f64| match value > 0.0 && value.is_finite() {
             true => Ok(()),
@@ -108,7 +112,8 @@ impl Quadric {
         }
     }
 
-    /// The smallest box of its own that holds it, by its equation and its trim; infinite where neither bounds it.
+    /// A bounding box of the trimmed surface in local space; infinite along axes that neither shape nor trim
+    /// bounds. A general quadric is bounded by its trim only.
     pub fn bounds(&self) -> [DVec3; 2] {
         let about = |half: DVec3| [-half, half];
         let own = match self.shape {

@@ -1,35 +1,35 @@
-//! Where things are: local and global transforms, and their propagation down the hierarchy. Not the hierarchy itself:
-//! that is bevy_ecs' `ChildOf` and `Children`.
+//! Local and global transforms, and their propagation down the hierarchy. The hierarchy itself is bevy_ecs'
+//! `ChildOf` and `Children`.
 
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-/// Position, rotation and scale relative to the parent (`ChildOf`), or to the world without one.
+/// Translation, rotation and scale relative to the parent (`ChildOf`), or to the world if there is no parent.
 ///
-/// f64, so that a level ten thousand kilometres from the origin still stands still: the renderer subtracts the camera before it
-/// rounds to f32.
+/// Stored in f64 so that a level ten thousand kilometres from the origin does not jitter: the renderer
+/// subtracts the camera position before it rounds to f32.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 #[require(GlobalTransform)]
 pub struct Transform {
-    /// Metres.
+    /// In metres.
     pub translation: DVec3,
     /// Unit quaternion.
     pub rotation: DQuat,
-    /// Factor per axis; negative mirrors, zero flattens.
+    /// Factor per axis. A negative factor mirrors, zero flattens.
     pub scale: DVec3,
 }
 
 impl Transform {
-    /// The transform that changes nothing.
+    /// The identity transform.
     pub const IDENTITY: Self =
         Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
 
-    /// A translation in metres.
+    /// A translation by a vector in metres.
     pub fn from_translation(translation: DVec3) -> Self {
         Self { translation, ..Self::IDENTITY }
     }
 
-    /// A translation in metres, from components.
+    /// A translation by x, y and z in metres.
     pub fn from_xyz(x: f64, y: f64, z: f64) -> Self {
         Self::from_translation(DVec3::new(x, y, z))
     }
@@ -39,23 +39,24 @@ impl Transform {
         Self { rotation, ..Self::IDENTITY }
     }
 
-    /// A scale, the same along all axes.
+    /// A uniform scale.
     pub fn from_scale(factor: f64) -> Self {
         Self { scale: DVec3::splat(factor), ..Self::IDENTITY }
     }
 
-    /// The same with another rotation.
+    /// Returns this transform with its rotation replaced.
     pub fn with_rotation(self, rotation: DQuat) -> Self {
         Self { rotation, ..self }
     }
 
-    /// The same with another scale.
+    /// Returns this transform with its scale replaced.
     pub fn with_scale(self, scale: DVec3) -> Self {
         Self { scale, ..self }
     }
 
-    /// The same place, with -Z pointing at `target` and +Y as near to `up` as possible. A target at the place itself, or in
-    /// line with `up`, still gives a rotation: some perpendicular axis stands in.
+    /// Returns this transform rotated so that -Z points at `target` and +Y is as close to `up` as possible.
+    /// If the target coincides with the translation, -Z stays; if it is in line with `up`, an arbitrary
+    /// perpendicular axis becomes +X.
     pub fn looking_at(self, target: DVec3, up: DVec3) -> Self {
         let back = (self.translation - target).try_normalize().unwrap_or(DVec3::Z);
         let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
@@ -63,13 +64,13 @@ impl Transform {
         Self { rotation, ..self }
     }
 
-    /// The matrix.
+    /// The transform as an affine matrix.
     pub fn affine(&self) -> DAffine3 {
         DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
 
-    /// Decomposes an affine matrix. Zero columns (flattened axes) and mirrored bases are kept; the second value is false
-    /// if the matrix holds a shear, which a translation, rotation and scale cannot express.
+    /// Decomposes an affine matrix. Zero columns (flattened axes) and mirrored bases are preserved. The
+    /// second value is false if the matrix has a shear, which translation, rotation and scale cannot express.
     pub fn from_affine(affine: DAffine3) -> (Self, bool) {
         let m = affine.matrix3;
         let mut scale = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
@@ -86,14 +87,14 @@ impl Transform {
             (None, None, Some(z)) => (z.any_orthonormal_vector(), DVec3::ZERO, z),
             (None, None, None) => (DVec3::X, DVec3::Y, DVec3::Z),
         };
-        // Gram-Schmidt on whatever is left, so that the quaternion is always a rotation.
+        // Gram-Schmidt on the remaining axes, so that the quaternion is always a rotation.
         let x = x.try_normalize().unwrap_or(DVec3::X);
         let y = if y == DVec3::ZERO { z.cross(x) } else { y };
         let y = (y - x * x.dot(y)).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y))).normalize();
         let result = Self { translation: affine.translation, rotation, scale };
         let size = m.x_axis.abs().max(m.y_axis.abs()).max(m.z_axis.abs()).max_element();
-        // Files hold f32: a few of its roundings are no shear.
+        // Files store f32, so a deviation of a few f32 roundings is not a shear.
         let faithful = result.affine().matrix3.abs_diff_eq(m, 1e-5 * size.max(f64::MIN_POSITIVE));
         (result, faithful)
     }
@@ -105,7 +106,7 @@ impl Default for Transform {
     }
 }
 
-/// The transform from an entity's space to the world, written by [`propagate_transforms`].
+/// The transform from an entity's local space to world space, written by [`propagate_transforms`].
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct GlobalTransform(pub DAffine3);
 
@@ -115,14 +116,15 @@ impl GlobalTransform {
         self.0.translation
     }
 
-    /// The unit vector of the entity's -Z axis in the world: where a light shines and a camera looks. A flattened axis
-    /// gives -Z.
+    /// The unit vector of the entity's -Z axis in world space: the direction in which a light shines or a
+    /// camera looks. Returns world -Z if that axis is flattened.
     pub fn forward(&self) -> DVec3 {
         (-self.0.matrix3.z_axis).try_normalize().unwrap_or(DVec3::NEG_Z)
     }
 
-    /// Transforms normals under any scale, mirrored or singular too: the cofactor matrix of the linear part times the
-    /// determinant's sign, which is |det| times the inverse transpose where there is one. Normalize the result.
+    /// The matrix that transforms normals, valid for mirrored and singular transforms too: the cofactor
+    /// matrix of the linear part times the sign of the determinant, which equals |det| times the inverse
+    /// transpose where that exists. The transformed normals need normalization.
     pub fn normal_matrix(&self) -> DMat3 {
         let m = self.0.matrix3;
         let side = if self.mirrors() { -1.0 } else { 1.0 };
@@ -133,7 +135,7 @@ impl GlobalTransform {
         )
     }
 
-    /// Whether counter-clockwise triangles become clockwise: the determinant is negative.
+    /// Returns true if the transform reverses the winding of triangles, i.e. its determinant is negative.
     pub fn mirrors(&self) -> bool {
         self.0.matrix3.determinant() < 0.0
     }
@@ -145,33 +147,34 @@ impl Default for GlobalTransform {
     }
 }
 
-/// Runs [`propagate_transforms`] once, for code without a schedule.
+/// Runs [`propagate_transforms`] once, for code that has no schedule.
 pub fn update_transforms(world: &mut World) {
     let mut state = bevy_ecs::system::SystemState::<(
         Query<Root<'static>, RootFilter>,
         Query<Node<'static>, With<ChildOf>>,
         Query<&Children>,
     )>::new(world);
-    // Queries are there in every World; only resources may be missing.
+    // Fetching queries cannot fail; only a missing resource would be an error.
     if let Ok((roots, nodes, children)) = state.get_mut(world) {
         propagate_transforms(roots, nodes, children);
     }
 }
 
-/// A place in the world, and what it comes to.
+/// The local transform of an entity and its global transform to be written.
 type Node<'w> = (&'w Transform, &'w mut GlobalTransform);
-/// An entity at the top of a hierarchy, with a place or without.
+/// The root entity of a hierarchy, which may lack a transform.
 type Root<'w> = (Entity, Option<Node<'w>>);
 type RootFilter = (Without<ChildOf>, Or<(With<Transform>, With<Children>)>);
 
-/// Writes every [`GlobalTransform`] from the [`Transform`]s above it. An entity without a `Transform` stands where its parent does, and so its children are
-/// placed as if they were its parent's. Entities whose value does not change are not marked as changed, so that only what moved is uploaded.
+/// Computes every [`GlobalTransform`] from the [`Transform`]s on the path to its root. An entity without a
+/// `Transform` counts as the identity: its children are placed relative to its parent. Values that do not
+/// change are not marked as changed, so that only moved objects are uploaded again.
 pub fn propagate_transforms(
     mut roots: Query<Root<'_>, RootFilter>,
     mut nodes: Query<Node<'_>, With<ChildOf>>,
     children: Query<&Children>,
 ) {
-    // Below nothing that has a place, a place is one in the world.
+    // `None` while no ancestor has a transform: the local transform is then the global one.
     let place = |node: Option<(&Transform, Mut<GlobalTransform>)>, parent: Option<DAffine3>| {
         let Some((transform, mut global)) = node else { return parent };
         let affine = transform.affine();

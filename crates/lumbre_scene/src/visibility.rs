@@ -1,19 +1,20 @@
-//! What is hidden: a [`Hidden`] entity and all that hangs from it. Not what lies outside of a view.
+//! Which entities are hidden by a [`Hidden`] component of their own or of an ancestor. This is not view
+//! culling.
 
 use bevy_ecs::entity::EntityHashSet;
 use bevy_ecs::prelude::*;
 
 use crate::Hidden;
 
-/// The entities whose meshes are hidden: those with [`Hidden`], and all below them in the hierarchy.
+/// The entities with [`Hidden`], and all their descendants.
 pub fn hidden_entities(world: &mut World) -> EntityHashSet {
     let mut state =
         bevy_ecs::system::SystemState::<(Query<Entity, With<Hidden>>, Query<&Children>)>::new(world);
-    // Queries are there in every World; only resources may be missing.
+    // Fetching queries cannot fail; only a missing resource would be an error.
     state.get(world).map(|(hidden, children)| with_descendants(hidden.iter(), &children)).unwrap_or_default()
 }
 
-/// These entities and all that hang from them.
+/// These entities and all their descendants.
 pub fn with_descendants(
     entities: impl Iterator<Item = Entity>,
     children: &Query<&Children>,

@@ -1,5 +1,5 @@
-//! An irradiance volume in its place: whether it can be used there, and the light that it gives a point, in f64. Not its file, and not its
-//! baking.
+//! An irradiance volume placed in the world: whether it is usable there, and the light it gives at a point,
+//! in f64. Its file format and its baking are elsewhere.
 
 use bevy_ecs::prelude::*;
 use glam::{BVec3, DVec3, DVec4, UVec3};
@@ -7,48 +7,50 @@ use lumbre_optics::{ambient_cube, probe_grid_cell};
 
 use crate::{GlobalTransform, IrradianceVolume};
 
-/// Cells of a texture along x, y and z, of which the grid's sides take one, two and three: what every GPU takes.
+/// The largest side of a 3D texture that every GPU supports. The six sides of the cubes take 1 x 2 x 3 times
+/// the texels of the grid along x, y and z.
 const MOST_TEXELS: u32 = 2048;
-/// A cell is at least this long, in metres: coordinates in cells then stay within f32 wherever a camera can be.
+/// Smallest length of a cell in metres. Coordinates in cells then stay within f32 wherever a camera can be.
 const SHORTEST_CELL: f64 = 1e-9;
-/// What is off the axes of a transform without a rotation, of its largest part: roundings of a file's f32.
+/// Largest off-diagonal part of a matrix relative to its largest entry that still counts as unrotated: the
+/// f32 rounding of a file.
 const ROTATION: f64 = 1e-5;
 
-/// Why an irradiance volume gives no light.
+/// Why an irradiance volume is unusable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IrradianceVolumeError {
-    /// Not a cube for each cell, or no cells.
+    /// The number of ambient cubes does not match the number of cells, or there are no cells.
     #[error("it has {found} ambient cubes for {resolution} cells; give it one for each, and at least one")]
     Cubes {
-        /// Cubes there are.
+        /// Number of cubes.
         found: usize,
         /// Cells along x, y and z.
         resolution: UVec3,
     },
-    /// More cells along an axis than a texture has room for.
+    /// There are more cells along an axis than a texture has room for.
     #[error("it has {resolution} cells, and a texture has room for 2048, 1024 and 682; give it fewer")]
     TooManyCells {
         /// Cells along x, y and z.
         resolution: UVec3,
     },
-    /// The marks of the probes inside of geometry are not those of its cells.
+    /// The number of `inside` flags does not match the number of cells.
     #[error("its `inside` has {found} entries for {cells} probes; give one for each of them, or none")]
     Inside {
-        /// Marks there are.
+        /// Number of flags.
         found: usize,
-        /// Cells there are.
+        /// Number of cells.
         cells: usize,
     },
-    /// Light that is no number, or infinite.
+    /// A cube holds light that is infinite or NaN.
     #[error("its ambient cube {cube} holds {light}; all light must be finite")]
     NotFinite {
         /// Index of the cube.
         cube: usize,
-        /// What it holds.
+        /// Its value.
         light: glam::Vec3,
     },
-    /// It stands nowhere.
+    /// It has no finite transform.
     #[error("it has no place: give it a finite Transform")]
     NoPlace,
     /// It is rotated or sheared.
@@ -56,65 +58,67 @@ pub enum IrradianceVolumeError {
         "it is rotated; volumes lie along the world's axes: remove the rotation of its node and of the nodes above it"
     )]
     Rotated,
-    /// Its box has no thickness.
+    /// Its box has no thickness along an axis.
     #[error(
         "its box measures {size} m, and every cell must be at least a nanometre thick: give its Transform a scale"
     )]
     Flat {
-        /// Sides of the box, metres.
+        /// Side lengths of the box in metres.
         size: DVec3,
     },
 }
 
-/// Where the cells of a volume lie: along each axis, cell = scale · point + offset.
+/// The mapping from world space to cell coordinates of a volume: along each axis, cell = scale · point +
+/// offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumePlace {
     /// Cells per metre; negative where the volume is mirrored.
     pub scale: DVec3,
-    /// Cells at the origin of the world.
+    /// Cell coordinates of the world origin.
     pub offset: DVec3,
     /// Cells along x, y and z.
     pub resolution: UVec3,
 }
 
 impl VolumePlace {
-    /// Coordinates in cells: 0 and the resolution at the faces of the box.
+    /// The cell coordinates of a world point: 0 and the resolution at the faces of the box.
     pub fn cells(&self, point: DVec3) -> DVec3 {
         self.scale * point + self.offset
     }
 
-    /// The same place for points that are given from an origin.
+    /// The same mapping for points that are given relative to `origin`.
     pub fn seen_from(&self, origin: DVec3) -> Self {
         Self { offset: self.cells(origin), ..*self }
     }
 
-    /// How far a point is from the box, metres; 0 inside of it.
+    /// Distance from a point to the box in metres; 0 inside of it.
     pub fn distance(&self, point: DVec3) -> f64 {
         let cells = self.cells(point);
         let outside = (-cells).max(cells - self.resolution.as_dvec3()).max(DVec3::ZERO);
         (outside / self.scale).length()
     }
 
-    /// Cubic metres of a cell.
+    /// Volume of a cell in m³.
     pub fn cell_size(&self) -> f64 {
         1.0 / self.scale.abs().element_product()
     }
 }
 
 impl IrradianceVolume {
-    /// What a probe inside of geometry counts beside one in the open: so little that its light, which is what the bake put in place of none, shows only
-    /// where there is no other.
+    /// Interpolation weight of a probe inside geometry, relative to 1 in the open. The light of such a probe
+    /// is a substitute made by the bake; the weight is so small that it shows only where all neighbouring
+    /// probes are inside geometry.
     pub const INSIDE: f32 = 1.0 / 1024.0;
 
-    /// How much a probe counts: 1 in the open, [`INSIDE`](Self::INSIDE) inside of geometry.
+    /// The weight of a probe: 1 in the open, [`INSIDE`](Self::INSIDE) inside geometry.
     pub fn openness(&self, probe: usize) -> f32 {
         if self.inside.get(probe).copied().unwrap_or(false) { Self::INSIDE } else { 1.0 }
     }
 
-    /// Whether its numbers are what they should be, wherever it stands.
+    /// Checks the resolution, cubes and flags of the volume, independent of its transform.
     ///
     /// # Errors
-    /// [`IrradianceVolumeError`].
+    /// [`IrradianceVolumeError`] for the first fault found.
     pub fn validate(&self) -> Result<(), IrradianceVolumeError> {
         let (resolution, found) = (self.resolution, self.cubes.len());
         let cells: u128 = resolution.to_array().into_iter().map(u128::from).product();
@@ -136,10 +140,12 @@ impl IrradianceVolume {
         Ok(())
     }
 
-    /// Where the cells of a volume with so many of them lie under a transform, which maps the unit cube around the origin to the grid.
+    /// The mapping from world space to the cells of a volume with this resolution under a transform, which
+    /// maps the unit cube around the origin to the grid.
     ///
     /// # Errors
-    /// [`IrradianceVolumeError`] for a transform that rotates or flattens the box, or is not there or not finite.
+    /// [`IrradianceVolumeError`] if the transform is missing or not finite, or rotates, shears or flattens
+    /// the box.
     pub fn place(
         resolution: UVec3,
         transform: Option<&GlobalTransform>,
@@ -166,10 +172,11 @@ impl IrradianceVolume {
         Ok(VolumePlace { scale, offset: 0.5 * cells - scale * affine.translation, resolution })
     }
 
-    /// E/π at a point of the world for a surface with this unit normal, from the open probes around it: trilinear between them, and outside of
-    /// the box of probes that of the nearest point of it.
+    /// E/π at a world point for a surface with this unit normal: trilinear interpolation between the probes,
+    /// each weighted by its [`openness`](Self::openness). Points outside of the box of probe centres are
+    /// clamped to it.
     ///
-    /// Valid volumes only; others give no light.
+    /// The volume must be valid; if cubes are missing, the result is black.
     pub fn light(&self, place: &VolumePlace, point: DVec3, normal: DVec3) -> DVec3 {
         let size = self.resolution.as_dvec3();
         let cell = probe_grid_cell(point, place.scale, place.offset, size) - DVec3::splat(0.5);
@@ -179,7 +186,7 @@ impl IrradianceVolume {
         for corner in 0..8u32 {
             let step = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
             let weight = (DVec3::ONE - part + step * (2.0 * part - DVec3::ONE)).element_product();
-            // Beside the last probe the weight is 0.
+            // Beyond the last probe the weight is 0.
             let at = (low + step).min(size - DVec3::ONE).max(DVec3::ZERO).as_uvec3();
             let probe = ((at.z * self.resolution.y + at.y) * self.resolution.x + at.x) as usize;
             let Some(cube) = self.cubes.get(probe) else { return DVec3::ZERO };
@@ -193,8 +200,9 @@ impl IrradianceVolume {
     }
 }
 
-/// The volume that lights an object with this middle: the nearest one, of those that it is inside of the one with the smallest cells, of several of these the first.
-/// An object that goes from one to another takes the other's light when its middle does.
+/// The volume that lights an object with this centre: the nearest one; among volumes that contain the centre,
+/// the one with the smallest cells; among equals, the first. An object that moves from one volume to another
+/// switches when its centre does.
 pub fn nearest_volume<T>(volumes: &[T], place: impl Fn(&T) -> &VolumePlace, middle: DVec3) -> Option<&T> {
     let distance = |volume: &T| (place(volume).distance(middle), place(volume).cell_size());
     volumes.iter().min_by(|a, b| {
@@ -203,7 +211,7 @@ pub fn nearest_volume<T>(volumes: &[T], place: impl Fn(&T) -> &VolumePlace, midd
     })
 }
 
-/// How many irradiance volumes of a World can be used. Global transforms must be up to date.
+/// Number of irradiance volumes of a World that are valid and placed. Global transforms must be up to date.
 pub fn usable_irradiance_volumes(world: &mut World) -> usize {
     let mut query = world.query::<(&IrradianceVolume, Option<&GlobalTransform>)>();
     let is_usable = |(volume, transform): &(&IrradianceVolume, Option<&GlobalTransform>)| {
@@ -244,7 +252,8 @@ mod tests {
             (place.distance(DVec3::new(12.0, 0.5, 0.0)), place.distance(DVec3::new(18.0, 0.0, 5.0))),
             (0.0, 20f64.sqrt())
         );
-        // Inside of a wall, and bright: what is beside it does not see it, what is within it does.
+        // Probe 1 is inside a wall, and bright: beside it its light is all but ignored, and at the probe
+        // itself it is used.
         volume.inside = vec![false, true, false];
         assert!((light(&volume, 12.0) - 1.0).abs() < 3e-3 && (light(&volume, 14.0) - 7.0).abs() < 5e-3);
         assert!((light(&volume, 13.0) - 3.0).abs() < 1e-12);
@@ -269,7 +278,7 @@ mod tests {
             let transform = at(DVec3::splat(side), DVec3::X * x);
             IrradianceVolume::place(UVec3::splat(2), Some(&transform)).unwrap()
         };
-        // A hall, an alcove in it, a shed beside it.
+        // A hall, an alcove in it, and a shed next to it.
         let volumes = [place(20.0, 0.0), place(4.0, 0.0), place(4.0, 30.0)];
         let chosen = |x: f64| {
             let nearest = nearest_volume(&volumes, |place| place, DVec3::X * x).unwrap();
@@ -288,7 +297,7 @@ mod tests {
         assert!(matches!(empty.validate(), Err(Fault::Cubes { found: 0, .. })));
         let short = IrradianceVolume { resolution: UVec3::splat(2), ..fine.clone() };
         assert!(matches!(short.validate(), Err(Fault::Cubes { found: 2, .. })));
-        // Products beyond any number of cells.
+        // The product of the sizes overflows 64 bits.
         let huge = IrradianceVolume { resolution: UVec3::MAX, ..fine.clone() };
         assert!(matches!(huge.validate(), Err(Fault::Cubes { .. })));
         let long = volume(&vec![1.0; 2049]);

@@ -1,4 +1,5 @@
-//! EXT_meshopt_compression in whole files: decoded, bounded, and refused where it is damaged. The codec has tests of its own.
+//! EXT_meshopt_compression in whole files: decoding, limits, and errors for damaged data. The codec has its
+//! own unit tests.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -8,7 +9,8 @@ use lumbre_scene::*;
 use serde_json::json;
 use support::{File, load_bytes};
 
-/// Sixteen vertices of four bytes, (n, 2n, 8n) beside a zero, as meshoptimizer's encoder writes them (js/meshopt_decoder.test.js, MIT licence).
+/// Sixteen vertices of four bytes (0, n, 2n, 8n), as meshoptimizer's encoder writes them
+/// (js/meshopt_decoder.test.js, MIT licence).
 const VERTICES: [u8; 65] = {
     let mut bytes = [0; 65];
     let start = [
@@ -27,7 +29,7 @@ const TRIANGLES: [u8; 27] = [
     0xa9, 0x86, 0x65, 0x89, 0x68, 0x98, 0x01, 0x69, 0x00, 0x00,
 ];
 
-/// A mesh of four triangles whose positions and indices are compressed; the second buffer is what they would be.
+/// A mesh of four triangles with compressed positions and indices. The second buffer is the fallback.
 fn file() -> File {
     let mut file = File::new();
     let mut view = |bytes: &[u8], count: usize, stride: usize, mode: &str, offset: usize| {
@@ -66,7 +68,7 @@ fn bytes(mut file: File) -> Vec<u8> {
 fn a_compressed_mesh_is_decoded() {
     let (mut world, _) = load_bytes(&bytes(file())).unwrap();
     let mesh = world.query::<&Mesh>().single(&world).unwrap().0.clone();
-    // Without normals every corner is a vertex of its own.
+    // The mesh has no normals, so every corner becomes a vertex of its own.
     let order = [0u8, 1, 2, 2, 1, 3, 4, 6, 5, 7, 8, 9];
     let expected: Vec<[f32; 3]> = order.iter().map(|&n| [0.0, f32::from(n), f32::from(2 * n)]).collect();
     assert_eq!(mesh.positions.iter().map(|position| position.to_array()).collect::<Vec<_>>(), expected);
@@ -101,7 +103,7 @@ fn damaged_compression_is_refused_by_its_place() {
     assert!(matches!(problem(|file| extension(file)["filter"] = "BLUR".into()), LoadProblem::Value { .. }));
     assert!(matches!(problem(|file| extension(file)["count"] = 17.into()), LoadProblem::Value { .. }));
     assert!(matches!(problem(|file| extension(file)["buffer"] = 9.into()), LoadProblem::Reference { .. }));
-    // A few bytes cannot claim the memory.
+    // A small file must not be able to claim a large allocation.
     let claims = problem(|file| {
         let count = 1u64 << 40;
         extension(file)["count"] = count.into();
@@ -120,7 +122,7 @@ fn no_mutant_of_a_compressed_file_panics() {
         let mut mutant = original.clone();
         for _ in 0..3 {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            // Most of the changes are in the compressed data.
+            // Most changes are in the compressed data.
             let at =
                 if random >> 62 == 0 { 20 } else { start } + (random >> 33) as usize % (mutant.len() - start);
             if let Some(byte) = mutant.get_mut(at) {

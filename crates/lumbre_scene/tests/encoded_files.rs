@@ -1,5 +1,6 @@
-//! What artists have: Draco meshes, KTX2 and WebP pictures. Files of the reference encoders against what the reference decoders find in them,
-//! faults by their place, and mutants. `encoded/make.mjs` makes the files.
+//! Encoded files as artists have them: Draco meshes, KTX2 and WebP images. Files made by the reference
+//! encoders are compared with the results of the reference decoders; damaged files must give errors that name
+//! the place, or load without harm. `encoded/make.mjs` makes the files.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 #![allow(clippy::print_stdout, reason = "what became of the mutants is what one wants to see of them")]
@@ -19,7 +20,7 @@ use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::File;
 
-/// Held by whoever measures, so that another test's memory is not counted with it.
+/// Locked while memory is measured, so that allocations of other tests are not counted.
 static MEASURING: Mutex<()> = Mutex::new(());
 
 fn numbers(value: &Value) -> Vec<f32> {
@@ -46,7 +47,7 @@ fn draco_meshes_are_what_the_reference_decoder_finds() {
         assert_eq!(positions, of("POSITION"), "{name}");
         let coordinates: Vec<f32> = flat(mesh.uv0.iter().map(|v| v.to_array().to_vec()).collect());
         assert_eq!(coordinates, of("TEXCOORD_0"), "{name}");
-        // Eight bits of an octahedron leave normals that are not of unit length to the last digit.
+        // Normals with eight bits per octahedral coordinate are not exactly of unit length.
         for (ours, theirs) in mesh.normals.iter().zip(of("NORMAL").chunks(3)) {
             assert!((*ours - glam::Vec3::from_slice(theirs)).length() < 1e-6, "{name}: {ours} {theirs:?}");
         }
@@ -75,7 +76,7 @@ fn pictures_are_what_the_reference_decoders_find() {
     }
 }
 
-/// A KTX2 file of plain bytes, written by hand.
+/// An uncompressed or Zstandard KTX2 file written by hand, and its texels.
 fn plain_ktx2(format: u32, channels: usize, zstandard: bool) -> (Vec<u8>, Vec<u8>) {
     let (width, height) = (5u32, 3u32);
     let texels: Vec<u8> = (0..width as usize * height as usize * channels).map(|at| (7 * at) as u8).collect();
@@ -153,7 +154,7 @@ fn damaged_files_are_refused_by_their_place() {
         let text = problem(change).to_string();
         assert!(text.contains(said), "{said}: {text}");
     }
-    // A few bytes cannot claim the memory.
+    // A small file must not be able to claim a large allocation.
     let claims = problem(&|file| {
         for accessor in 0..7 {
             file.root["accessors"][accessor]["count"] = (3u64 << 40).into();
@@ -200,7 +201,7 @@ fn instances_are_nodes() {
         .map(|transform| transform.0.transform_point3(glam::DVec3::X))
         .collect();
     seen.sort_by(|a, b| a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x)));
-    // The node of the instances stands at (0, 1, 0); a quarter turn about y takes x to -z.
+    // The instanced node is at (0, 1, 0); a quarter turn about y takes x to -z.
     let expected = [(1., 1., 0.), (5., 1., -1.), (1., 8., 0.)].map(glam::DVec3::from);
     assert_eq!(seen.len(), 3);
     for (seen, expected) in seen.iter().zip(expected) {
@@ -227,7 +228,7 @@ fn instances_are_nodes() {
     assert!(matches!(problem, LoadProblem::TooLarge { .. }), "{problem}");
 }
 
-/// SplitMix64.
+/// SplitMix64 pseudo-random numbers.
 fn next(state: &mut u64) -> usize {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let mut z = *state;
@@ -236,7 +237,7 @@ fn next(state: &mut u64) -> usize {
     ((z ^ (z >> 31)) >> 1) as usize
 }
 
-/// Cut and with bytes flipped.
+/// A copy that is truncated or has bytes changed.
 fn mutant(original: &[u8], seed: u64) -> Vec<u8> {
     let mut state = seed;
     let mut bytes = original.to_vec();
@@ -251,8 +252,9 @@ fn mutant(original: &[u8], seed: u64) -> Vec<u8> {
     bytes
 }
 
-/// What one load may hold at once: vertices and indices 64 MiB and 64 times the file (`LoadLimits`), and pictures, which are limited to 256
-/// texels per side here, 4 bytes a texel several times over. A VP8 frame keeps its rows beside that.
+/// Most bytes that one load may hold at once: vertices and indices of 64 MiB plus 64 times the file
+/// (`LoadLimits`), and images, which are limited here to 256 texels per side, with 4 bytes per texel several
+/// times over. A VP8 frame keeps its rows in addition.
 const BOUND: usize = 96 << 20;
 const SLOWEST: Duration = Duration::from_secs(5);
 
@@ -261,14 +263,15 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
     load_mutants(0..3_500);
 }
 
-/// Of each file as many as are asked of a decoder: most have a path through it of their own.
+/// Runs as many mutants of every file as is required for a decoder, since most files take a path of their own
+/// through it.
 #[test]
 #[ignore = "slow: scripts/test --all runs it"]
 fn none_of_ten_thousand_mutants_of_each_file_does() {
     load_mutants(0..10_000);
 }
 
-/// Loads mutants of every file, of these seeds.
+/// Loads mutants of every file, made with these seeds.
 fn load_mutants(seeds: std::ops::Range<u64>) {
     let [plain, plain_zstandard] = [false, true].map(|zstandard| plain_ktx2(37, 4, zstandard).0);
     let instances = instanced(&[0.0; 9], &[0.0, 0.0, 0.0, 1.0].repeat(3)).glb();

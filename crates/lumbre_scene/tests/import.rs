@@ -11,7 +11,7 @@ use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::{File, png};
 
-/// The only component of a kind, of those that a file gives.
+/// The only component of a type in the World.
 fn only<T: Component + Clone>(world: &mut World) -> T {
     let found: Vec<T> = world.query::<&T>().iter(world).cloned().collect();
     let [one] = found.as_slice() else { panic!("{} instead of one", found.len()) };
@@ -41,7 +41,7 @@ const FIVE: [f32; 15] = [0., 0., 0., 1., 0., 0., 0., 1., 0., 1., 1., 0., 0., 2.,
 fn primitive_modes() {
     assert_eq!(mesh_of(None, None, &FIVE).indices, [0, 1, 2]);
     assert_eq!(mesh_of(Some(4), Some(&[2, 0, 1, 1, 3, 2]), &FIVE).indices, [2, 0, 1, 1, 3, 2]);
-    // A strip turns every other triangle; one that repeats a vertex only joins.
+    // Every other triangle of a strip is reversed; a triangle with a repeated vertex only connects.
     assert_eq!(mesh_of(Some(5), None, &FIVE).indices, [0, 1, 2, 1, 3, 2, 2, 3, 4]);
     assert_eq!(mesh_of(Some(5), Some(&[0, 1, 2, 2, 3, 4]), &FIVE).indices, [0, 1, 2, 2, 4, 3]);
     assert_eq!(mesh_of(Some(6), None, &FIVE).indices, [1, 2, 0, 2, 3, 0, 3, 4, 0]);
@@ -95,7 +95,7 @@ fn broken_normals_are_repaired_and_the_mesh_is_named_once() {
 fn normalized_integers_and_strides() {
     let mut file = File::new();
     file.square(|file, primitive| {
-        // Two u16 and four u8 side by side, 8 bytes per vertex.
+        // Two u16 and four u8 interleaved, 8 bytes per vertex.
         let mut bytes = Vec::new();
         for (u, v) in [(0u16, 65535u16), (65535, 0), (13107, 0), (0, 0)] {
             bytes.extend(u.to_le_bytes());
@@ -139,7 +139,7 @@ fn sparse_accessors() {
 fn nodes_with_matrices_and_mirrors() {
     let mut file = File::new();
     let child = file.push("nodes", json!({"name": "child", "translation": [0, 1, 0]}));
-    // Columns: x mirrored and doubled, y to z, z to -y, then the place.
+    // Columns: x mirrored and doubled, y to z with factor 3, z to -y, then the translation.
     let matrix = json!([-2, 0, 0, 0, 0, 0, 3, 0, 0, -1, 0, 0, 10, 20, 30, 1]);
     file.node(json!({"name": "parent", "matrix": matrix, "children": [child], "extras": {"key": 7}}));
     let sheared = json!([1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
@@ -245,7 +245,7 @@ fn materials_by_metallic_roughness() {
         diffuse: Vec3::new(0.25, 0.125, 0.5),
         specular: (Vec3::splat(0.04) + Vec3::new(0.5, 0.25, 1.0)) * 0.5,
         emission: Vec3::new(4.0, 8.0, 0.0),
-        // alpha = 1/4, n = 2 * 16 - 2
+        // alpha = roughness² = 1/4, exponent n = 2 / alpha² - 2 = 2 * 16 - 2
         shininess: 30.0,
     };
     assert_eq!(
@@ -289,7 +289,7 @@ fn materials_by_phong() {
     let fresnel = Fresnel::Conductor { eta: Vec3::new(0.2, 0.4, 1.4), absorption: Vec3::new(3.0, 2.5, 2.0) };
     let rest = Material::default();
     assert_eq!(all, Material { front, back, mirror, transmission, ior, distribution, fresnel, ..rest });
-    // One part of the index alone: the other is that of air.
+    // If only one part of the index is given, the other is that of air.
     let (eta, absorption) = (Vec3::new(1.5, 2.0, 2.5), Vec3::new(3.0, 2.5, 2.0));
     let half = phong(json!({"eta": [1.5, 2, 2.5]}));
     assert_eq!(half.fresnel, Fresnel::Conductor { eta, absorption: Vec3::ZERO });
@@ -297,7 +297,7 @@ fn materials_by_phong() {
     assert_eq!(half.fresnel, Fresnel::Conductor { eta: Vec3::ONE, absorption });
     let named = phong(json!({"fresnel": "normal-reflectance", "distribution": "cosine-power"}));
     assert_eq!((named.fresnel, named.distribution), (Fresnel::NormalReflectance, Distribution::CosinePower));
-    // What glTF itself says: k_s is the reflectance at normal incidence.
+    // Plain glTF: k_s is the reflectance at normal incidence.
     let plain = material(json!({"pbrMetallicRoughness": {"metallicFactor": 0.5}}));
     assert_eq!(plain.fresnel, Fresnel::NormalReflectance);
 }
@@ -350,7 +350,7 @@ fn textures() {
         (slot.metallic, slot.roughness, slot.base_color, slot.texture.sampler),
         (0.5, 0.25, Vec3::ONE, Sampler::default())
     );
-    // A grey JPEG block comes back within its rounding.
+    // A grey JPEG block is decoded within its rounding.
     for (found, expected) in slot.texture.image.rgba[..4].iter().zip([200, 100, 50, 255]) {
         assert!(found.abs_diff(expected) <= 4, "{:?}", &slot.texture.image.rgba[..4]);
     }
@@ -410,7 +410,7 @@ fn who_moves() {
     assert_eq!(world.query::<(&Mesh, &DynamicObject)>().iter(&world).count(), 2);
     assert!(world.get::<DynamicObject>(report.nodes[cart]).is_some());
     assert!(world.get::<DynamicObject>(report.nodes[still]).is_none());
-    // One mesh on three nodes is one mesh.
+    // Three nodes with one mesh share it.
     let meshes: Vec<_> =
         world.query::<&Mesh>().iter(&world).map(|mesh| std::sync::Arc::as_ptr(&mesh.0)).collect();
     assert!(meshes.iter().all(|mesh| *mesh == meshes[0]));
@@ -454,7 +454,7 @@ fn who_lights_others() {
     }
     let (mut world, _) = file.load().unwrap();
     assert_eq!(world.query::<(&Mesh, &EmissiveLight)>().iter(&world).count(), 2);
-    // Two emit, two ask, one does both.
+    // Two meshes emit, two have the component, and one has both.
     let census = Census::of(&mut world);
     assert_eq!((census.emissive, census.emissive_lights), (2, 1));
 }

@@ -1,4 +1,5 @@
-//! Faults that other viewers repair: repaired with a note that names the place, and refused where that is asked for.
+//! Faults that other viewers repair: they are repaired with a note that names the place, and refused without
+//! `lenient`.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -10,7 +11,8 @@ use lumbre_scene::*;
 use serde_json::json;
 use support::{File, png};
 
-/// The World and the notes of a file that is only loaded where faults are repaired.
+/// Checks that a file loads only with repairs, and returns its World and report. `said` must occur in the
+/// notes.
 fn repaired(bytes: &[u8], said: &str) -> (World, LoadReport) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("level.glb");
@@ -25,7 +27,7 @@ fn repaired(bytes: &[u8], said: &str) -> (World, LoadReport) {
     let report = load_with(&mut world, &path, &lenient).unwrap();
     let notes: Vec<String> = report.notes.iter().map(ToString::to_string).collect();
     assert!(notes.iter().any(|note| note.contains(said)), "{said:?} is not in {notes:#?}");
-    // Also where a bake keeps the file.
+    // `SourceFile`, as used for baking, repairs it as well.
     assert!(SourceFile::read(&path, &lenient).unwrap().load_into(&mut World::new()).is_ok());
     (world, report)
 }
@@ -36,7 +38,7 @@ fn parent(world: &World, report: &LoadReport, node: usize) -> Option<Entity> {
 
 #[test]
 fn nodes_that_are_listed_twice() {
-    // Below two others: the first has it.
+    // A child of two nodes belongs to the first.
     let mut file = File::new();
     let child = file.push("nodes", json!({"name": "cup"}));
     let first = file.node(json!({"children": [child]}));
@@ -45,7 +47,7 @@ fn nodes_that_are_listed_twice() {
         repaired(&file.glb(), "nodes[0] (cup): is listed by nodes[1].children and by nodes[2].children");
     assert_eq!(parent(&world, &report, child), Some(report.nodes[first]));
 
-    // A root that is another's child stays below it, where its parent's transform holds.
+    // A scene root that is also a child stays below its parent and keeps its parent's transform.
     let mut file = File::new();
     let child = file.node(json!({"name": "cup", "translation": [1, 0, 0]}));
     let table = file.node(json!({"children": [child], "translation": [0, 2, 0]}));
@@ -54,7 +56,7 @@ fn nodes_that_are_listed_twice() {
     let place = world.get::<GlobalTransform>(report.nodes[child]).unwrap().translation();
     assert_eq!(place, DVec3::new(1.0, 2.0, 0.0));
 
-    // One whose parent is in no scene is shown by itself.
+    // A scene root whose parent is not in the scene becomes a root.
     let mut file = File::new();
     let child = file.node(json!({"name": "cup"}));
     file.push("nodes", json!({"children": [child]}));
@@ -62,7 +64,7 @@ fn nodes_that_are_listed_twice() {
     assert_eq!(parent(&world, &report, child), None);
     assert!(report.nodes[child] != Entity::PLACEHOLDER && report.nodes[1] == Entity::PLACEHOLDER);
 
-    // Twice in the scene, and twice below one node.
+    // A node listed twice by the scene, and one listed twice by its parent.
     let mut file = File::new();
     let twice = file.push("nodes", json!({"name": "spoon"}));
     let node = file.node(json!({"name": "cup", "children": [twice, twice]}));
@@ -85,7 +87,7 @@ fn cycles_are_refused_all_the_same() {
     assert!(matches!(*error.problem, LoadProblem::Cycle { .. }), "{error}");
 }
 
-/// A square with a base colour texture of such an image.
+/// A square with a base colour texture; `change` damages the file.
 fn textured(change: impl FnOnce(&mut File)) -> Vec<u8> {
     let mut file = File::new();
     let view = file.view(&png(4, 4));
@@ -105,7 +107,7 @@ fn textured(change: impl FnOnce(&mut File)) -> Vec<u8> {
 #[test]
 fn textures_that_cannot_be_decoded_are_white() {
     for change in [
-        // Damaged, of another kind, missing, and without any data.
+        // A damaged image, another format, a missing file, no data at all, and a dangling index.
         (|file: &mut File| file.binary[8..16].fill(0)) as fn(&mut File),
         |file| file.binary[..8].copy_from_slice(b"GIF89a  "),
         |file| file.root["images"][0] = json!({"name": "wall", "uri": "missing.png"}),
@@ -141,7 +143,7 @@ fn a_compressed_picture_that_cannot_be_decoded_makes_way_for_the_plain_one() {
         let image = |textures: &MaterialTextures| textures.base_color.as_ref().unwrap().image.clone();
         textures.iter(world).map(|own| (image(own).width, image(own).height)).collect()
     };
-    // The identifier of KTX2, and nothing that follows it.
+    // The identifier of KTX2 without a valid header.
     let damaged: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n0000";
     let said = "images[1] (packed): cannot be decoded as KTX2";
     let (mut world, report) = repaired(&ktx2(damaged, |_| {}), said);
@@ -152,7 +154,7 @@ fn a_compressed_picture_that_cannot_be_decoded_makes_way_for_the_plain_one() {
         "{notes:?}"
     );
 
-    // A second texture has no other: white.
+    // A second texture has no alternative source, so it becomes white.
     let (mut world, _) = repaired(
         &ktx2(damaged, |file| {
             file.push("textures", json!({"extensions": {"KHR_texture_basisu": {"source": 1}}}));
@@ -165,15 +167,15 @@ fn a_compressed_picture_that_cannot_be_decoded_makes_way_for_the_plain_one() {
     );
     assert_eq!(sizes(&mut world), [(4, 4), (1, 1)]);
 
-    // An index of none.
+    // An image index that is out of range.
     let none = textured(|file| file.root["textures"][0] = basis(7));
     assert_eq!(sizes(&mut repaired(&none, "images[7]").0), [(4, 4)]);
 
-    // Both are damaged.
+    // Both images are damaged.
     let both = ktx2(damaged, |file| file.binary[8..16].fill(0));
     assert_eq!(sizes(&mut repaired(&both, "images[0] (wall): ").0), [(1, 1)]);
 
-    // One that is whole is taken, and the other is not looked at.
+    // The preferred image is intact, so the other one is not read.
     let whole: &[u8] = include_bytes!("encoded/uastc.ktx2");
     let bytes = ktx2(whole, |file| file.binary[8..16].fill(0));
     let (mut world, report) = support::load_bytes(&bytes).unwrap();
@@ -190,7 +192,7 @@ fn versions_and_padding_that_are_missing() {
         root["asset"] = asset;
         repaired(&File { root, binary: file.binary.clone() }.glb(), "asset.version");
     }
-    // Version 1 has objects for lists, and a version that is stated is believed.
+    // Version 1 has objects instead of lists, and a stated version is believed.
     for change in
         [json!({"asset": {}, "nodes": {"a": {}}}), json!({"asset": {"version": "1.0"}, "nodes": []})]
     {
@@ -202,7 +204,8 @@ fn versions_and_padding_that_are_missing() {
         assert!(matches!(*error.problem, LoadProblem::Version { .. }), "{error}");
     }
 
-    // A buffer of two bytes beyond a multiple of four, cut off after them; the length in its header says four.
+    // The binary data ends two bytes after a multiple of four. The file is cut there, though its headers
+    // include the padding.
     let mut file = File::new();
     file.square(|file, primitive| {
         primitive["indices"] = file.indices(&[0, 1, 2]).into();
@@ -245,7 +248,7 @@ fn indices_of_what_is_not_drawn() {
     );
     let (mut world, _) = repaired(&file(|file| file.root["scene"] = 4.into()), "scene");
     assert_eq!(world.query::<&Mesh>().iter(&world).count(), 1);
-    // What is drawn has to be there.
+    // An index of something that is drawn must be valid.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("level.glb");
     std::fs::write(&path, file(|file| file.root["nodes"][0]["mesh"] = 7.into())).unwrap();

@@ -1,4 +1,5 @@
-//! Lightmap files against readers that are not ours: the `image` and `exr` crates, the `ktx2` crate, and the bytes themselves.
+//! Checks lightmap files with independent readers: the `image` and `ktx2` crates, and a decoding of the bytes
+//! by hand.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -10,7 +11,7 @@ use half::f16;
 use lumbre_mesh::TriangleMesh;
 use lumbre_scene::*;
 
-/// Texels log-uniform in [2^-8, 2^8), every channel by itself.
+/// An image whose channels are independent and log-uniform in [2^-8, 2^8).
 fn light(width: u32, height: u32) -> LightmapImage {
     let mut state = 0x2545_f491_4f6c_dd1du64;
     let mut channel = || {
@@ -29,7 +30,7 @@ fn by_the_image_crate(bytes: &[u8]) -> Vec<Vec3> {
     image.to_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect()
 }
 
-/// The value of an attribute of an OpenEXR header: name, type, size, value.
+/// The value of an attribute in an OpenEXR header, which stores name, type, size and value.
 fn attribute<'a>(file: &'a [u8], name: &str, kind: &str) -> &'a [u8] {
     let key: Vec<u8> = [name.as_bytes(), &[0], kind.as_bytes(), &[0]].concat();
     let at = file.windows(key.len()).position(|window| window == key).unwrap() + key.len();
@@ -44,7 +45,8 @@ fn open_exr_is_read_by_others() {
         let (bytes, error) = lightmap_to_open_exr(&image, encoding).unwrap();
         let half = encoding == LightmapEncoding::Rgb16Float;
         let expected = |texel: &Vec3| match half {
-            // Nearest, ties to even, by integers: 13 bits fewer than a float has.
+            // Round to nearest, ties to even, in integer arithmetic: a half has 13 mantissa bits fewer than a
+            // float.
             true => Vec3::from_array(texel.to_array().map(|channel| {
                 let bits = channel.to_bits();
                 let up = (bits & 0x1fff) + (bits >> 13 & 1) > 0x1000;
@@ -54,7 +56,8 @@ fn open_exr_is_read_by_others() {
         };
         let expected: Vec<Vec3> = image.texels.iter().map(expected).collect();
         assert_eq!(by_the_image_crate(&bytes), expected);
-        // The header by hand: magic number, version 2 without flags, ZIP with 16 lines, channels in the order of their names.
+        // Check the header: magic number, version 2 without flags, ZIP with 16 lines, channels in
+        // alphabetical order.
         assert_eq!(bytes[..8], [0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0]);
         assert_eq!(attribute(&bytes, "compression", "compression"), [3]);
         assert_eq!(attribute(&bytes, "lineOrder", "lineOrder"), [0]);
@@ -81,7 +84,8 @@ fn mean(image: &LightmapImage) -> f64 {
     sum.element_sum() / (3 * image.texels.len()) as f64
 }
 
-/// The texels of a file: header, level and descriptor by the `ktx2` crate, Zstandard by the reference library.
+/// The header and texels of a file. The `ktx2` crate parses it, and the reference library decompresses
+/// Zstandard.
 fn by_the_ktx2_crate(bytes: &[u8]) -> (ktx2::Header, Vec<u32>) {
     let reader = ktx2::Reader::new(bytes).unwrap();
     let level = reader.levels().next().unwrap();
@@ -97,14 +101,14 @@ fn by_the_ktx2_crate(bytes: &[u8]) -> (ktx2::Header, Vec<u32>) {
     (reader.header(), words)
 }
 
-/// Colours of 32 bits by the words of the Vulkan specification, with numbers of their own.
+/// Decodes 32-bit colours by the text of the Vulkan specification, independently of the crate.
 fn unpacked(format: PackedFormat, word: u32) -> Vec3 {
     match format {
         PackedFormat::Rgb9E5 => {
             let scale = 2f32.powi((word >> 27) as i32 - 15 - 9);
             Vec3::new((word & 511) as f32, (word >> 9 & 511) as f32, (word >> 18 & 511) as f32) * scale
         }
-        // An unsigned float of 11 or 10 bits is a half float without its sign and last bits.
+        // An unsigned float of 11 or 10 bits is a half float without the sign and the lowest bits.
         PackedFormat::B10G11R11 => Vec3::new(
             f16::from_bits((word as u16 & 0x7ff) << 4).to_f32(),
             f16::from_bits(((word >> 11) as u16 & 0x7ff) << 4).to_f32(),
@@ -161,8 +165,9 @@ fn ktx2_is_read_by_others() {
     }
 }
 
-/// Neither up nor down on average: the mean signed error is within five standard errors of 0. Texels are uniform in [1, 2), where each
-/// format has steps of one size: the half step that is rounded down at 1 is as long as the one that is rounded up at 2.
+/// Rounding must be unbiased: the mean signed error is within five standard errors of 0. The texels are
+/// uniform in [1, 2), where each format has a constant step, so the half step rounded down at 1 balances the
+/// one rounded up at 2.
 #[test]
 fn rounding_keeps_the_energy() {
     let mut image = light(512, 512);
@@ -247,7 +252,7 @@ fn saving_with_choices() {
     }
     let half = loaded_lightmap(&path);
     assert_eq!(half.encoding, LightmapEncoding::Rgb16Float);
-    // A level that names the KTX2 image instead shows the same light.
+    // A level that refers to the KTX2 image instead shows the same light.
     let text = std::fs::read_to_string(&path)
         .unwrap()
         .replace("level.lightmaps/floor.exr", "level.lightmaps/floor.ktx2");
@@ -260,8 +265,9 @@ fn saving_with_choices() {
     }
 }
 
-/// Bevy's shader (`irradiance_volume.wgsl`) at the centre of a cell: three texels of an atlas of (Rx, 2 Ry, 3 Rz), the lower half of the
-/// rows where a component of the normal is negative, weighted by the squares of the components.
+/// Evaluates Bevy's shader (`irradiance_volume.wgsl`) at the centre of a cell: three texels of an atlas of
+/// (Rx, 2 Ry, 3 Rz), in the second half of the rows where a component of the normal is negative, weighted by
+/// the squares of the components.
 fn as_bevy_samples(header: &ktx2::Header, words: &[u32], cell: [u32; 3], normal: Vec3) -> Vec3 {
     let (width, height, depth) = (header.pixel_width, header.pixel_height, header.pixel_depth);
     (0..3u32)

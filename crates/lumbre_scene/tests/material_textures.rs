@@ -1,4 +1,4 @@
-//! Normal and occlusion textures of a file, its tangents, and the extensions that state how a dielectric reflects.
+//! Import of normal and occlusion textures, tangents, and the extensions for the reflectance of dielectrics.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -11,7 +11,7 @@ use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::{File, png};
 
-/// A square of one material with coordinates, normals and one image.
+/// A square with one material, texture coordinates, normals and one image.
 fn square(material: Value, change: impl FnOnce(&mut File, &mut Value)) -> File {
     let mut file = File::new();
     let image = png(2, 2);
@@ -57,7 +57,7 @@ fn normal_and_occlusion_textures_are_read_with_their_numbers() {
     assert_eq!((occlusion.strength, occlusion.texture.tex_coord), (0.25, 0));
     assert!(std::sync::Arc::ptr_eq(&normal.texture.image, &occlusion.texture.image), "decoded once");
     assert!(!noted(&report, "texture"), "{:?}", report.notes);
-    // What is not said is 1.
+    // Both factors default to 1.
     let material = json!({"normalTexture": {"index": 0}, "occlusionTexture": {"index": 0}});
     let (mut world, _) = square(material, |_, _| {}).load().unwrap();
     let textures: MaterialTextures = only(&mut world);
@@ -101,7 +101,7 @@ fn tangents_are_unit_or_none() {
     let expected = [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 1.0, 0.0, -1.0), Vec4::ZERO, Vec4::ZERO];
     assert_eq!(mesh.tangents, expected);
     assert!(noted(&report, "2 tangents were zero or NaN"), "{:?}", report.notes);
-    // As the specification asks, tangents without normals are ignored.
+    // The specification requires tangents without normals to be ignored.
     let file = square(json!({"normalTexture": {"index": 0}}), |file, primitive| {
         primitive["attributes"]["TANGENT"] = file.floats("VEC4", 4, &tangents).into();
         primitive["attributes"].as_object_mut().unwrap().remove("NORMAL");
@@ -143,7 +143,7 @@ fn a_normal_map_that_cannot_be_decoded_is_left_out_and_not_white() {
     let options = LoadOptions { lenient: true, ..LoadOptions::default() };
     load_with(&mut world, &path, &options).unwrap();
     let textures: MaterialTextures = only(&mut world);
-    // White is a slope to a normal map; to an occlusion texture it is none.
+    // White would tilt the normals of a normal map, but has no effect in an occlusion texture.
     assert_eq!(textures.normal, None);
     assert_eq!(textures.occlusion.unwrap().texture.image.rgba, [255; 4]);
 }
@@ -184,15 +184,15 @@ fn dielectrics_reflect_what_their_extensions_say() {
     let specular =
         json!({"KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1.0, 0.5, 50.0]}});
     let (tinted, _) = read(specular.clone(), 0.0);
-    // The colour's product is at most 1 before the factor.
+    // The tinted reflectance is clamped to 1 before the factor is applied.
     near(tinted.front.specular, Vec3::new(0.02, 0.01, 0.5));
-    // Half metal: half of it is the base colour's.
+    // With a metallic factor of 0.5, half of it is the base colour.
     near(read(specular, 0.5).0.front.specular, Vec3::new(0.26, 0.13, 0.75));
     let textured = json!({"KHR_materials_specular": {"specularTexture": {"index": 0}}});
     assert!(noted(&read(textured, 0.0).1, "specularTexture is not read"));
     let (glass, report) = read(json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}}), 0.0);
     assert_eq!(glass.transmission, Vec3::new(0.25, 0.125, 0.5));
     assert!(noted(&report, "KHR_materials_transmission is kept"), "{:?}", report.notes);
-    // glTF mixes what passes with what is scattered back.
+    // glTF blends transmission with diffuse reflection.
     assert_eq!(glass.front.diffuse, Vec3::new(0.25, 0.125, 0.5));
 }

@@ -1,4 +1,5 @@
-//! Ten thousand and more damaged files: loading each ends, without panic and within a bound on what is allocated.
+//! Loads more than ten thousand damaged files: each load must end without a panic and within a bound on
+//! memory.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -16,13 +17,15 @@ use lumbre_scene::{
 use serde_json::json;
 use support::{File, png};
 
-/// What one load may hold at once. The default limit on decoded data for these files is 64 MiB and 64 times their 3 kB, images of
-/// at most 300 bytes may unpack to 33,000 bytes per byte in 4 bytes a texel, twice while they are converted: 20 MB; the rest is the JSON.
+/// Most bytes that one load may hold at once. The default limit on decoded data for these files is 64 MiB
+/// plus 64 times their 3 kB. Images of at most 300 bytes may expand to 33,000 bytes per byte with 4 bytes per
+/// texel, and exist twice during conversion: 20 MB. The rest is for the JSON.
 const BOUND: usize = 96 << 20;
-/// What one load may take. Even a decoded scene at the limit takes a fraction of a second; a hang takes forever.
+/// Longest time for one load. Decoding a scene at the limit takes a fraction of a second; anything longer is
+/// a hang.
 const SLOWEST: Duration = Duration::from_secs(5);
 
-/// Textures, a sparse accessor, a strip, vertex colours, an external-looking name.
+/// Textures, a sparse accessor, a strip and vertex colours.
 fn textured() -> Vec<u8> {
     let mut file = File::new();
     let view = file.view(&png(5, 4));
@@ -56,7 +59,7 @@ fn textured() -> Vec<u8> {
     file.glb()
 }
 
-/// Lights of every kind, a camera, a hierarchy with a matrix, every extension of the scene.
+/// Lights of every kind, a camera, a hierarchy with a matrix, and every scene extension.
 fn lit() -> Vec<u8> {
     let mut file = File::new();
     file.light(json!({"type": "spot", "intensity": 30, "range": 4, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.5}}));
@@ -85,7 +88,7 @@ fn lit() -> Vec<u8> {
     file.glb()
 }
 
-/// Text with its data inline, missing normals, a fan, animations.
+/// A .gltf with inline data, no normals, a fan and animations.
 fn text() -> Vec<u8> {
     let mut file = File::new();
     let node = file.square(|file, primitive| {
@@ -96,7 +99,7 @@ fn text() -> Vec<u8> {
     file.gltf()
 }
 
-/// SplitMix64: small, and the same everywhere.
+/// SplitMix64 pseudo-random numbers, identical on all platforms.
 struct Random(u64);
 
 impl Random {
@@ -132,7 +135,7 @@ const EXTREMES: [&str; 16] = [
     "0.5",
 ];
 
-/// Where the digits of a number begin and end, near a random place.
+/// The range of digits of a number near a random position.
 fn some_number(bytes: &[u8], random: &mut Random) -> Option<(usize, usize)> {
     let start = random.below(bytes.len());
     let begin = start + bytes[start..].iter().position(u8::is_ascii_digit)?;
@@ -158,13 +161,13 @@ fn mutant(original: &[u8], random: &mut Random) -> Vec<u8> {
             }
             2 => bytes.truncate(random.below(bytes.len())),
             3 if bytes.len() > 20 => {
-                // The lengths of file and chunk.
+                // The length fields of the file and the JSON chunk.
                 let at = [8, 12][random.below(2)];
                 let value = [0, 1, 4, u32::MAX, 1 << 31, random.next() as u32 % 8192][random.below(6)];
                 bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
             }
             4 => {
-                // Part of the file again, or away.
+                // Insert a copy of a part of the file.
                 let (at, end) = (random.below(bytes.len()), random.below(bytes.len()));
                 let part = bytes[at.min(end)..at.max(end)].to_vec();
                 let to = random.below(bytes.len());
@@ -175,7 +178,7 @@ fn mutant(original: &[u8], random: &mut Random) -> Vec<u8> {
                     let removed = end - begin;
                     let extreme = EXTREMES[random.below(EXTREMES.len())];
                     bytes.splice(begin..end, extreme.bytes());
-                    // Keep a .glb whole around it, so that the number is reached.
+                    // Update the lengths in a .glb, so that the parser reaches the number.
                     if bytes.starts_with(b"glTF") && begin >= 20 {
                         for at in [8, 12] {
                             let length =
@@ -223,7 +226,7 @@ fn no_mutant_panics_hangs_or_fills_the_memory() {
         "{loaded} loaded, {refused} refused in {:?}; slowest {slowest:?}, largest {largest} bytes",
         begin.elapsed()
     );
-    // A mutation that is always caught at the door, or never noticed, tests nothing.
+    // If the mutations were always refused, or never, the test would not test anything.
     assert!(
         loaded + refused >= 10_000 && loaded > 1_000 && refused > 1_000,
         "{loaded} loaded, {refused} refused"
@@ -235,7 +238,7 @@ fn no_damaged_lightmap_panics() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = File::new();
     file.square(|_, _| {});
-    // What it is shows in its bytes, not in its name.
+    // The format is recognized by the first bytes, not by the name.
     file.root["nodes"][0]["extensions"] = json!({"LUMBRE_lightmap": {"image": "l.exr"}});
     let file = file.glb();
     let path = folder.path().join("l.exr");

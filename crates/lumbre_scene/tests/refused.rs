@@ -1,4 +1,4 @@
-//! Malformed files: each gives the error of its kind, which names the place.
+//! Malformed files: each gives the expected kind of error, which names the place.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -14,7 +14,7 @@ fn square() -> File {
     file
 }
 
-/// A square whose JSON is changed.
+/// The error for a square with one changed JSON value.
 fn changed(path: &str, value: Value) -> LoadProblem {
     let mut file = square();
     let (parent, key) = path.rsplit_once('/').expect("a JSON pointer");
@@ -109,11 +109,11 @@ fn accessors() {
         changed("/meshes/0/primitives/0/attributes/POSITION", json!(99)),
         LoadProblem::Reference { index: 99, .. }
     );
-    // No buffer view means zeros, and 2^31 of them fit into no limit.
+    // An accessor without a buffer view is all zeros, but 2^31 of them exceed the limit.
     let mut file = square();
     file.root["accessors"][0] = json!({"componentType": 5126, "count": 1u64 << 31, "type": "VEC3"});
     assert_matches!(file.problem(), LoadProblem::TooLarge { .. });
-    // An index that no vertex has.
+    // An index of a vertex that does not exist.
     let mut file = square();
     file.root["meshes"][0]["primitives"][0]["indices"] = json!(file.indices(&[0, 1, 4]));
     assert_matches!(file.problem(), LoadProblem::Accessor { problem, .. } if problem.contains("index 2 is 4"));
@@ -130,7 +130,7 @@ fn accessors() {
     file.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] =
         json!(file.floats("VEC2", 2, &[0.0; 6]));
     assert_matches!(file.problem(), LoadProblem::Accessor { .. });
-    // Sparse: an index outside, and more of them than elements.
+    // A sparse index out of range, and more replacements than elements.
     for (count, index) in [(1, 4u8), (5, 0)] {
         let mut file = square();
         let (at, new) = (file.view(&[index; 5]), file.view(&[0; 60]));
@@ -163,7 +163,7 @@ fn hierarchies() {
     assert_matches!(file.problem(), LoadProblem::Reference { list: "scenes", .. });
     assert_matches!(changed("/nodes/0/rotation", json!([0, 0, 0, 0])), LoadProblem::Value { field, .. } if field == "rotation");
     assert_matches!(changed("/nodes/0/scale", json!([1e300, 0, 0])), LoadProblem::Value { .. });
-    // A tree as deep as a file can make it is no stack overflow.
+    // A very deep tree must not overflow the stack.
     let mut file = File::new();
     file.node(json!({"children": [1]}));
     for node in 1..50_000 {
@@ -261,7 +261,7 @@ fn images() {
     let refused = |bytes: &[u8]| *image(bytes).expect_err("it has to be refused").problem;
     assert_matches!(refused(b"no image"), LoadProblem::Image { place, .. } if place.contains("map"));
     assert_matches!(refused(&good[..good.len() / 2]), LoadProblem::Image { .. });
-    // 16384 x 16384 in a hundred bytes, with the checksum that the header then needs.
+    // A header that claims 16384 x 16384 texels in about a hundred bytes, with a valid checksum.
     let mut bomb = good;
     bomb[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
     let crc = !bomb[12..29].iter().fold(!0u32, |crc, &byte| {

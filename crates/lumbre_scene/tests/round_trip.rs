@@ -1,4 +1,4 @@
-//! World to file to World gives the same World; other readers accept the file.
+//! Saving and loading a World gives the same World, and other readers accept the files.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -56,7 +56,7 @@ fn texture(image: &Arc<Image>) -> TextureReference {
     }
 }
 
-/// One of everything.
+/// A World with at least one of every component that a file stores.
 fn everything() -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings {
@@ -217,7 +217,7 @@ fn everything_comes_back() {
         let report = save(&mut original, &path).unwrap();
         assert_eq!(report.notes, []);
         assert_eq!(report.files.last(), Some(&path));
-        // The lightmap once, the data of a .gltf, and nothing temporary.
+        // One lightmap folder, the .bin of a .gltf, and no temporary files.
         let bin = if name.ends_with(".gltf") { 1 } else { 0 };
         assert_eq!(names_in(folder.path()).len(), 2 + bin, "{:?}", names_in(folder.path()));
         assert!(folder.path().join("level one.lightmaps/crate.exr").is_file());
@@ -231,12 +231,12 @@ fn everything_comes_back() {
         }
         assert_eq!(found.lines().count(), expected.lines().count());
 
-        // Meshes, images and lightmaps are still shared: 2 meshes in 7 primitives, 3 pictures in 10 slots.
+        // Meshes, images and lightmaps are still shared: 2 meshes in 7 primitives, 3 images in 10 slots.
         let census = Census::of(&mut again);
         assert_eq!(census, Census::of(&mut original));
         assert_eq!((census.meshes, shared(&mut again)), (6, [2, 3, 1]));
 
-        // And once more: what is written no longer changes.
+        // Saving and loading again changes nothing.
         let second = folder.path().join(format!("again {name}"));
         save(&mut again, &second).unwrap();
         let mut third = World::new();
@@ -245,7 +245,7 @@ fn everything_comes_back() {
     }
 }
 
-/// How many different meshes, pictures and lightmaps what is shown shares.
+/// The numbers of distinct meshes, images and lightmaps among the entities that are not hidden.
 fn shared(world: &mut World) -> [usize; 3] {
     let hidden = lumbre_scene::hidden_entities(world);
     let (mut meshes, mut pictures, mut lightmaps) = (HashSet::new(), HashSet::new(), HashSet::new());
@@ -286,7 +286,7 @@ fn another_reader_accepts_the_files() {
 fn a_world_made_in_code() {
     let mut world = World::new();
     let mesh = triangle(0.0);
-    // Meshes directly on entities, without Primitive, Name or GlobalTransform that is up to date.
+    // Meshes directly on entities, without Primitive or Name and with outdated GlobalTransforms.
     world.spawn((Mesh(mesh.clone()), Transform::from_xyz(1.0, 2.0, 3.0)));
     world.spawn((Mesh(mesh), Transform::from_xyz(4.0, 2.0, 3.0), Light::point(Vec3::ONE)));
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What rays read of a file and frames do not: media behind see-through surfaces, and exact surfaces. In, out and in again.
+//! Import and export of the media of transmissive surfaces and of exact surfaces.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use lumbre_mesh::shapes;
 use lumbre_scene::{Material, Medium, Mesh, Name, Quadric, QuadricShape, load_slice, save};
 
-/// A triangle with a material and a node's extensions, as a .gltf.
+/// A .gltf with one triangle; `material` and `node` are the extensions of its material and node.
 fn file(material: &str, node: &str) -> Vec<u8> {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],

@@ -1,4 +1,4 @@
-//! Every model of the shared folder loads; skips loudly where the folder is missing.
+//! Every model in the shared folder must load. Prints a message and passes if the folder is missing.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -52,7 +52,7 @@ fn the_cornell_box_is_seen_from_its_open_side() {
     load(&mut world, &shared.join("models/cornell_box.glb")).unwrap();
     let bounds = scene_bounds(&mut world);
     let (transform, _) = default_camera(&mut world, 1.0);
-    // The box is open towards +Z; its walls are at the other five sides.
+    // The box is open towards +Z; the other five sides are walls.
     let side = (transform.translation - bounds.center()).normalize();
     assert!(side.dot(DVec3::Z) > 0.99, "the camera is towards {side}");
 }

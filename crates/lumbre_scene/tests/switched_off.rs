@@ -1,5 +1,6 @@
-//! Decoders that were left out: a file that requires one is refused by its name, with the feature that brings it and a command that converts.
-//! `cargo test -p lumbre_scene --no-default-features --test switched_off`; with the decoders there is nothing to refuse.
+//! Builds without optional decoders: a file that requires one is refused with the name of the extension, the
+//! cargo feature that enables it, and a command for conversion. Run by `cargo test -p lumbre_scene
+//! --no-default-features --test switched_off`; empty if a decoder is compiled in.
 
 #![cfg(not(any(feature = "basisu", feature = "draco", feature = "webp")))]
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]

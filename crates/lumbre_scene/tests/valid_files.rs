@@ -1,5 +1,5 @@
-//! Two faults that the Khronos validator finds in files, looked for in what is written: a second set of texture coordinates without a first, and
-//! normals without a direction. The validator itself is run by `scripts/validate`.
+//! Two faults that the Khronos validator reports, checked in saved files: TEXCOORD_1 without TEXCOORD_0, and
+//! zero normals. The validator itself is run by `scripts/validate`.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -22,7 +22,7 @@ fn parts(path: &Path) -> (Value, Vec<u8>) {
     (serde_json::from_slice(&bytes[20..end]).unwrap(), bytes[end + 8..].to_vec())
 }
 
-/// The normals of a file's only primitive, as numbers.
+/// The normals of the only primitive of a file.
 fn normals(path: &Path) -> Vec<Vec3> {
     let (root, chunk) = parts(path);
     let accessor = root["meshes"][0]["primitives"][0]["attributes"]["NORMAL"].as_u64().unwrap() as usize;
@@ -87,13 +87,13 @@ fn a_lightmap_s_coordinates_are_never_alone() {
     baked(file, &path);
     assert!(set(&path, "TEXCOORD_1").is_number());
     assert_eq!(set(&path, "TEXCOORD_0"), set(&path, "TEXCOORD_1"));
-    // Here the mesh has no coordinates of its own, as before.
+    // On import, the mesh still has no texture coordinates of its own.
     let mut world = World::new();
     load(&mut world, &path).unwrap();
     let mesh = world.query::<&Mesh>().single(&world).unwrap().0.clone();
     assert!(mesh.uv0.is_empty() && !mesh.uv1.is_empty());
 
-    // Where it has some, they stay.
+    // Existing texture coordinates are kept.
     let mut file = File::new();
     file.square(|file, primitive| {
         primitive["attributes"]["TEXCOORD_0"] =
@@ -102,7 +102,7 @@ fn a_lightmap_s_coordinates_are_never_alone() {
     baked(file, &path);
     assert_ne!(set(&path, "TEXCOORD_0"), set(&path, "TEXCOORD_1"));
 
-    // A World that came from no file.
+    // A World that was not loaded from a file.
     let mut world = World::new();
     let mesh = TriangleMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
@@ -123,7 +123,8 @@ fn a_lightmap_s_coordinates_are_never_alone() {
 fn normals_that_are_written_anew_have_a_direction() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("baked.glb");
-    // Of four normals one is zero and one is no number; the faces look along z. Floats and normalized bytes.
+    // Of four normals one is zero and one is NaN; the faces point along z. Stored as floats and as normalized
+    // bytes.
     let float = |file: &mut File| {
         let values = [0., 0., 1., 0., 0., 0., f32::NAN, 0., 1., 0., 0., 1.];
         file.floats("VEC3", 3, &values)
@@ -144,14 +145,14 @@ fn normals_that_are_written_anew_have_a_direction() {
             "{what}: {notes:?}"
         );
     }
-    // Nothing is touched where nothing is wrong.
+    // Valid normals are left alone.
     let mut file = File::new();
     let normal = file.floats("VEC3", 3, &[0., 0., 1.].repeat(4));
     file.square(|_, primitive| primitive["attributes"]["NORMAL"] = normal.into());
     assert!(baked(file, &path).is_empty());
     assert_eq!(set(&path, "NORMAL"), normal);
 
-    // A World: a triangle without an area has no normal.
+    // A World with a degenerate triangle, which has no normal.
     let mut world = World::new();
     let mesh = TriangleMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::X],

@@ -1,12 +1,12 @@
-//! The plane and the box. Not shapes with curved sides: those are `revolution`.
+//! The plane and the box. Curved shapes are in `revolution` and `sphere`.
 
 use glam::{DVec3, Vec3};
 
 use crate::TriangleMesh;
 use crate::grid::{GridVertex, MAX_SEGMENTS};
 
-/// A rectangle in the xz plane that faces +y: `width` along x, `depth` along z, in metres, in `columns` by `rows`
-/// quads (1 to [`MAX_SEGMENTS`]).
+/// A rectangle in the xz plane that faces +y: `width` along x and `depth` along z in metres, with `columns`
+/// by `rows` quads (1 to [`MAX_SEGMENTS`]).
 pub fn plane(width: f32, depth: f32, columns: u32, rows: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let size = [DVec3::X * f64::from(width), DVec3::NEG_Z * f64::from(depth)];
@@ -14,7 +14,8 @@ pub fn plane(width: f32, depth: f32, columns: u32, rows: u32) -> TriangleMesh {
     mesh
 }
 
-/// A box of a size in metres; each face has `divisions` by `divisions` quads (1 to 256) and all of texture space.
+/// A box with side lengths `size` in metres. Each face has `divisions` by `divisions` quads (1 to 256) and
+/// covers the whole texture.
 pub fn cuboid(size: Vec3, divisions: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let size = size.as_dvec3();
@@ -40,7 +41,7 @@ pub fn cuboid(size: Vec3, divisions: u32) -> TriangleMesh {
     mesh
 }
 
-/// A rectangle about `centre` that spans `size` (right, up).
+/// Appends a rectangle around `centre`; `size` holds its two side vectors (right, up).
 fn push_rectangle(
     mesh: &mut TriangleMesh,
     centre: DVec3,

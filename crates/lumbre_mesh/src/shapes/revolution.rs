@@ -1,4 +1,5 @@
-//! Surfaces of revolution about the y axis: sphere by rings, cylinder, cone, torus. Not the recursive sphere.
+//! Surfaces of revolution about the y axis: sphere, cylinder, cone and torus. The subdivided sphere is in
+//! `sphere`.
 
 use glam::{DVec2, DVec3};
 
@@ -6,11 +7,12 @@ use super::MAX_SEGMENTS;
 use crate::TriangleMesh;
 use crate::surfaces::{Cone, Cylinder, ParametricSurface, Sphere, Torus, push_surface};
 
-/// A sphere of meridians and parallels: `segments` (3 to [`MAX_SEGMENTS`]) around, `rings` (2 to
-/// [`MAX_SEGMENTS`]) from pole to pole: 2 segments (rings - 1) triangles over segments (rings - 1) + 2 points.
+/// A sphere of meridians and parallels: `segments` (3 to [`MAX_SEGMENTS`]) around the axis and `rings` (2 to
+/// [`MAX_SEGMENTS`]) from pole to pole. It has 2 segments (rings - 1) triangles and segments (rings - 1) + 2
+/// points.
 ///
-/// 33 segments and 16 rings make the sphere of 990 triangles and 497 points on which document \[M\] compares the
-/// three shadings (table 1.1).
+/// With 33 segments and 16 rings this is the sphere of 990 triangles and 497 points on which document \[M\]
+/// compares the three shadings (table 1.1).
 pub fn uv_sphere(radius: f32, segments: u32, rings: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let rings = rings.clamp(2, MAX_SEGMENTS);
@@ -18,7 +20,8 @@ pub fn uv_sphere(radius: f32, segments: u32, rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// A closed cylinder; `segments` (3 to [`MAX_SEGMENTS`]) around. Its side's normals are radial, its caps' axial.
+/// A closed cylinder with `segments` (3 to [`MAX_SEGMENTS`]) around the axis. Normals are radial on the side
+/// and axial on the caps.
 pub fn cylinder(radius: f32, height: f32, segments: u32) -> TriangleMesh {
     let side = Cylinder { radius: radius.into(), height: height.into() };
     let segments = in_range(segments);
@@ -29,7 +32,8 @@ pub fn cylinder(radius: f32, height: f32, segments: u32) -> TriangleMesh {
     mesh
 }
 
-/// A closed cone, base below and apex above. The apex has one normal per segment, that of the segment's middle.
+/// A closed cone with its base below and its apex above. The apex has one normal per segment, that of the
+/// segment's middle.
 pub fn cone(radius: f32, height: f32, segments: u32) -> TriangleMesh {
     let side = Cone { radius: radius.into(), height: height.into() };
     let segments = in_range(segments);
@@ -39,8 +43,9 @@ pub fn cone(radius: f32, height: f32, segments: u32) -> TriangleMesh {
     mesh
 }
 
-/// A torus about the y axis: the tube's centre runs at `major_radius`, the tube has `minor_radius`;
-/// `segments` around the axis and `sides` around the tube (3 to [`MAX_SEGMENTS`] each).
+/// A torus about the y axis: the centre of the tube is at `major_radius` from the axis, the tube has the
+/// radius `minor_radius`, and there are `segments` around the axis and `sides` around the tube (3 to
+/// [`MAX_SEGMENTS`] each).
 pub fn torus(major_radius: f32, minor_radius: f32, segments: u32, sides: u32) -> TriangleMesh {
     let torus = Torus { major_radius: major_radius.into(), minor_radius: minor_radius.into() };
     let mut mesh = TriangleMesh::default();
@@ -52,11 +57,11 @@ fn in_range(segments: u32) -> u32 {
     segments.clamp(3, MAX_SEGMENTS)
 }
 
-/// A disc at a height, facing away from the origin.
+/// Appends a disc at height `y` that faces away from the origin.
 fn push_cap(mesh: &mut TriangleMesh, radius: f64, y: f64, segments: u32) {
     let first = mesh.positions.len() as u32;
     let normal = DVec3::Y * if y < 0.0 { -1.0 } else { 1.0 };
-    // The rim is that of a side of the same radius, to the bit.
+    // The rim is bitwise equal to that of a side with the same radius.
     let rim = Cylinder { radius: 1.0, height: 0.0 };
     for step in 0..=segments {
         // The last vertex is the centre.

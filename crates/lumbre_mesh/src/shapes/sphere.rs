@@ -1,4 +1,5 @@
-//! The sphere by recursive subdivision of a tetrahedron. Not the sphere by rings: that is `revolution`.
+//! The sphere by recursive subdivision of a tetrahedron. The sphere of meridians and parallels is in
+//! `revolution`.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -8,33 +9,35 @@ use glam::{DVec3, Vec2};
 use crate::TriangleMesh;
 use crate::flat::flat_shaded;
 
-/// Largest depth of subdivision: 4^12 triangles, 16.8 million, in half a gigabyte. One more would need two.
+/// Largest depth of subdivision: 4^12 triangles, 16.8 million, in half a gigabyte. One more level would need
+/// two.
 pub const MAX_DEPTH: u32 = 11;
 
-/// Why a shape cannot be made.
+/// Why a shape cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// Subdivided too often: every step takes four times the memory.
+    /// The depth of subdivision is too large: every step multiplies the memory by four.
     #[error(
         "a sphere subdivided {depth} times has 4^{depth} times 4 triangles; subdivide at most {MAX_DEPTH} times"
     )]
     TooDeep {
-        /// The depth asked for.
+        /// The requested depth.
         depth: u32,
     },
-    /// A size that is not a positive number of metres.
+    /// The radius is not a positive finite number.
     #[error("a radius of {radius} m; give a finite one above 0")]
     Radius {
-        /// The radius asked for.
+        /// The requested radius in metres.
         radius: f32,
     },
 }
 
-/// As [`tetrahedral_sphere`], but refuses what that clamps or lets pass.
+/// As [`tetrahedral_sphere`], but returns an error for arguments that it would clamp or accept unchecked.
 ///
 /// # Errors
-/// [`ShapeError::TooDeep`] beyond [`MAX_DEPTH`], before anything is allocated; [`ShapeError::Radius`].
+/// [`ShapeError::TooDeep`] for a depth above [`MAX_DEPTH`], before anything is allocated;
+/// [`ShapeError::Radius`].
 pub fn try_tetrahedral_sphere(radius: f32, depth: u32, flat: bool) -> Result<TriangleMesh, ShapeError> {
     if depth > MAX_DEPTH {
         return Err(ShapeError::TooDeep { depth });
@@ -45,14 +48,15 @@ pub fn try_tetrahedral_sphere(radius: f32, depth: u32, flat: bool) -> Result<Tri
     Ok(tetrahedral_sphere(radius, depth, flat))
 }
 
-/// A sphere of 4^(depth + 1) triangles over 2 * 4^depth + 2 points (`depth` 0 to [`MAX_DEPTH`]; 0 is the tetrahedron).
+/// A sphere of 4^(depth + 1) triangles and 2 * 4^depth + 2 points (`depth` 0 to [`MAX_DEPTH`]; 0 is the
+/// tetrahedron).
 ///
-/// Each step splits every triangle into four at the middles of its edges, moved out to the sphere. `flat` gives
-/// each triangle its own vertices with the face's normal; else the normals are those of the sphere.
-/// The tetrahedron's first vertex is at +z; the other three lie at z = -1/3.
+/// Each step splits every triangle into four at its edge midpoints, which are projected onto the sphere. With
+/// `flat`, each triangle has its own vertices with the face normal; otherwise the normals are those of the
+/// sphere. The tetrahedron's first vertex is at +z; the other three lie at z = -1/3.
 ///
-/// Source: document \[I\], Aproximación de una esfera por subdivisión recursiva. Its code gives the fourth vertex z = +0.333333,
-/// which is not on the sphere's regular tetrahedron; its text has -1/3.
+/// Source: document \[I\], Aproximación de una esfera por subdivisión recursiva. Its code gives the fourth
+/// vertex z = +0.333333, which does not belong to a regular tetrahedron; its text has -1/3.
 pub fn tetrahedral_sphere(radius: f32, depth: u32, flat: bool) -> TriangleMesh {
     let root_2 = 2f64.sqrt();
     let root_6 = 6f64.sqrt();
@@ -82,9 +86,9 @@ pub fn tetrahedral_sphere(radius: f32, depth: u32, flat: bool) -> TriangleMesh {
     if flat { flat_shaded(&mesh) } else { mesh }
 }
 
-/// Longitude about +z as u, latitude as v; vertices are split where u jumps from 1 to 0 (a triangle across the
-/// seam goes on past 1: sample with repeat) and at the poles, where u has no value of its own. The lower pole lies
-/// inside a triangle; a texture is twisted across that one.
+/// Adds texture coordinates: u is the longitude about +z and v the latitude. Vertices are split where u jumps
+/// from 1 to 0 (a triangle across the seam continues past 1, so sample with repeat) and at the poles, where u
+/// is undefined. The lower pole lies inside a triangle, across which a texture is distorted.
 fn with_texture_seam(points: &[DVec3], faces: &[[u32; 3]], radius: f64) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut split: HashMap<(u32, u32), u32> = HashMap::with_capacity(points.len());

@@ -1,4 +1,4 @@
-//! The side of a cone about the y axis, by its equation and by angle and height. Not its base.
+//! The side of a cone about the y axis, in implicit and parametric form, without its base.
 
 use std::f64::consts::TAU;
 
@@ -6,15 +6,15 @@ use glam::{DVec2, DVec3};
 
 use super::{ImplicitSurface, ParametricSurface, SurfaceError, around, direction};
 
-/// Base of radius r at y = -h/2, apex at y = h/2.
+/// A cone with its base of radius r at y = -h/2 and its apex at y = h/2.
 ///
-/// f(p) = x² + z² - (r/h)² (h/2 - y)², which has a second half above the apex; p(u, v) with u the angle from +x towards -z and v the
-/// part of the way from the base to the apex. The apex has no normal.
+/// f(p) = x² + z² - (r/h)² (h/2 - y)², which has a second half above the apex; p(u, v) with u the angle from
+/// +x towards -z and v the fraction of the way from the base to the apex. The apex has no normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
-    /// Of the base, in metres, greater than 0.
+    /// Radius r of the base in metres, greater than 0.
     pub radius: f64,
-    /// In metres, greater than 0.
+    /// Height h in metres, greater than 0.
     pub height: f64,
 }
 

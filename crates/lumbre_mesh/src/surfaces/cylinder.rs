@@ -1,4 +1,4 @@
-//! The side of a cylinder about the y axis, by its equation and by angle and height. Not its caps.
+//! The side of a cylinder about the y axis, in implicit and parametric form, without its caps.
 
 use std::f64::consts::TAU;
 
@@ -6,12 +6,13 @@ use glam::{DVec2, DVec3};
 
 use super::{ImplicitSurface, ParametricSurface, SurfaceError, around};
 
-/// f(p) = x² + z² - r², without an end; p(u, v) with u the angle from +x towards -z and v the height, half of it each way.
+/// f(p) = x² + z² - r², which is infinitely long; p(u, v) with u the angle from +x towards -z and v the
+/// height, from -h/2 to h/2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
-    /// In metres, greater than 0.
+    /// Radius r in metres, greater than 0.
     pub radius: f64,
-    /// In metres, greater than 0.
+    /// Height h in metres, greater than 0.
     pub height: f64,
 }
 

@@ -1,21 +1,24 @@
-//! Surfaces f(p) = 0 and their normals, the gradient of f. Not the parametric form: that is `parametric`.
+//! Implicit surfaces f(p) = 0 and their normals, which are the gradients of f. Parametric surfaces are in
+//! `parametric`.
 
 use glam::DVec3;
 
 use super::{SurfaceError, direction};
 
-/// A surface f(p) = 0, negative inside and positive outside. Any `Fn(DVec3) -> f64` is one.
+/// A surface f(p) = 0, negative inside and positive outside. Implemented for every `Fn(DVec3) -> f64`.
 pub trait ImplicitSurface {
     /// f at a point in metres.
     fn value(&self, point: DVec3) -> f64;
 
-    /// Length in metres over which the surface bends: a radius, a wavelength. [`central_difference_gradient`] steps by a small part
-    /// of it, so it should be right to a factor of a hundred or so.
+    /// The length in metres over which the surface curves: a radius or a wavelength.
+    /// [`central_difference_gradient`] uses a small fraction of it as its step, so it should be right to
+    /// within a factor of a hundred or so.
     fn scale(&self) -> f64 {
         1.0
     }
 
-    /// The gradient of f, in units of f per metre; zero where f has none. From central differences unless the surface knows it.
+    /// The gradient of f, in units of f per metre; zero where f has none. Computed from central differences
+    /// unless overridden.
     fn gradient(&self, point: DVec3) -> DVec3 {
         central_difference_gradient(self, point)
     }
@@ -27,12 +30,14 @@ impl<F: Fn(DVec3) -> f64> ImplicitSurface for F {
     }
 }
 
-/// The unit normal of an implicit surface at a point on it: n = ∇f / |∇f|, outward where f grows outward.
+/// The unit normal of an implicit surface at a point on it: n = ∇f / |∇f|, in the direction in which f
+/// increases.
 ///
 /// Source: document \[I\], Vectores normales (for the sphere f = p·p - 1, ∇f = 2p).
 ///
 /// # Errors
-/// [`SurfaceError::NotFinite`] where the gradient is not; [`SurfaceError::Singular`] where it is zero.
+/// [`SurfaceError::NotFinite`] if the point or gradient is not finite; [`SurfaceError::Singular`] if the
+/// gradient is zero.
 pub fn implicit_normal<S: ImplicitSurface + ?Sized>(
     surface: &S,
     point: DVec3,
@@ -46,11 +51,13 @@ pub fn implicit_normal<S: ImplicitSurface + ?Sized>(
 
 /// The gradient from central differences, (f(p + h e) - f(p - h e)) / 2h along each axis e.
 ///
-/// The step balances the two errors: cutting off the series costs h² f'''/6, rounding costs 2^-53 |f| / h, so the best h is about
-/// (2^-52)^(1/3) = 6·10⁻⁶ times the [`scale`](ImplicitSurface::scale), and the error some 10⁻¹⁰ of the gradient. It is never less
-/// than 2^-26 of the coordinate, which leaves half the digits of p + h to tell it from p; and it is the difference of p ± h as
-/// rounded that is divided by, so that their rounding costs nothing. Where f is finite on one side only (the edge of a square
-/// root's range), the difference on that side alone is taken, with half the digits. NaN where f is finite on neither.
+/// The step balances two errors: truncating the series costs h² f'''/6, and rounding costs 2^-53 |f| / h, so
+/// the best h is about (2^-52)^(1/3) = 6·10⁻⁶ times the [`scale`](ImplicitSurface::scale), and the error
+/// about 10⁻¹⁰ of the gradient. The step is never less than 2^-26 of the coordinate, so that p + h and p
+/// differ in half of their digits. The difference is divided by the distance between p + h and p - h as
+/// rounded, so their rounding causes no error. Where f is finite on one side only (at the edge of a square
+/// root's domain), the one-sided difference is used, with half the digits. The result is NaN where f is
+/// finite on neither side.
 pub fn central_difference_gradient<S: ImplicitSurface + ?Sized>(surface: &S, point: DVec3) -> DVec3 {
     let along = |axis: DVec3| {
         let coordinate = point.dot(axis).abs();

@@ -1,4 +1,4 @@
-//! A mesh of a parametric surface: a grid over its parameters. Not of an implicit one.
+//! Meshes parametric surfaces with a grid over their parameters. Implicit surfaces are not meshed.
 
 use glam::{DVec2, DVec3};
 
@@ -6,16 +6,17 @@ use super::{ParametricSurface, SurfaceError};
 use crate::TriangleMesh;
 use crate::grid::{GridVertex, MAX_SEGMENTS};
 
-/// A mesh of a parametric surface in `columns` cells along u and `rows` along v, two triangles each, with the surface's own normals
-/// and with (u, v) as texture coordinates: u to the right, v upwards.
+/// Meshes a parametric surface with `columns` cells along u and `rows` along v, two triangles each. Normals
+/// are the surface's own, and (u, v) are the texture coordinates: u to the right, v upwards.
 ///
-/// Seams of closed parameters are the same bits on both sides; triangles that a pole leaves without area are left out, and a pole's
-/// vertices, one a column, take the texture coordinate of the column's middle. Where the surface has no normal a pole's vertex takes
-/// that of the column's middle just inside (a cone's apex), any other vertex zero.
+/// Positions on both sides of a seam of a closed parameter are bitwise equal. Triangles that degenerate at a
+/// pole are left out. A pole has one vertex per column, with the texture coordinate of the column's middle.
+/// Where the surface has no normal, a pole's vertex takes the normal of the column's middle just inside (e.g.
+/// at a cone's apex), and any other vertex gets zero.
 ///
 /// # Errors
-/// [`SurfaceError::Grid`] for 0 or more than [`MAX_SEGMENTS`] cells; [`SurfaceError::NotFinite`] where a point is not, or does not
-/// fit into f32.
+/// [`SurfaceError::Grid`] for 0 or more than [`MAX_SEGMENTS`] cells; [`SurfaceError::NotFinite`] if a point
+/// is not finite or does not fit into f32.
 pub fn parametric_mesh<S>(surface: &S, columns: u32, rows: u32) -> Result<TriangleMesh, SurfaceError>
 where
     S: ParametricSurface + ?Sized,
@@ -32,14 +33,16 @@ where
     }
 }
 
-/// As [`parametric_mesh`], of counts that are in range, appended to a mesh and unchecked.
+/// As [`parametric_mesh`], but appends to a mesh, requires counts in range, and does not check for finite
+/// points.
 pub(crate) fn push_surface<S>(mesh: &mut TriangleMesh, surface: &S, columns: u32, rows: u32)
 where
     S: ParametricSurface + ?Sized,
 {
     let [low, high] = surface.domain();
     let closed = surface.closed();
-    // The last step of a closed parameter is its first, and of an open one exactly its end.
+    // The last step of a closed parameter equals its first exactly, and that of an open one the end of the
+    // domain.
     let parameter = |axis: usize, step: f64, steps: u32| {
         let steps = f64::from(steps);
         let step = if closed[axis] { step % steps } else { step };
@@ -54,7 +57,8 @@ where
     };
     let poles = [is_pole(0), is_pole(rows)];
     let vertex = |column: u32, row: u32| {
-        // The one triangle that uses a pole's vertex goes on to the right of it below, and to the left of it above.
+        // The only triangle that uses a pole's vertex is in the cell to its right in the first row, and to
+        // its left in the last.
         let middle = match row {
             0 if poles[0] => 0.5,
             _ if row == rows && poles[1] => -0.5,
@@ -77,5 +81,5 @@ where
     mesh.append(if poles == [false; 2] { grid } else { grid.without_unused_vertices() });
 }
 
-/// How far inside a pole, as a part of a row, the normal of a column's middle is taken.
+/// Distance from a pole, as a fraction of a row, at which the normal of a column's middle is taken.
 const INSIDE: f64 = 1e-6;

@@ -1,5 +1,6 @@
-//! Surfaces by equation and their normals: the plane through three points, implicit surfaces, parametric surfaces, and the
-//! sphere, cylinder, cone and torus as both. Not meshes of them: those are [`shapes`](crate::shapes) and [`parametric_mesh`].
+//! Surfaces given by equations, and their normals: the plane through three points, implicit surfaces,
+//! parametric surfaces, and sphere, cylinder, cone and torus in both forms. Meshes of them are in
+//! [`shapes`](crate::shapes) and [`parametric_mesh`].
 //!
 //! ```text
 //!   plane_normal        three points       (p1 - p0) x (p2 - p0)                     [I] Vectores normales
@@ -8,7 +9,8 @@
 //!   averaged            a mesh             normals::compute_smooth_normals           [I] Gouraud, [M] 1.6.2, fig. 2.5
 //! ```
 //!
-//! All in f64, metres and radians; every normal is a unit vector or an error that says why there is none.
+//! Computations are in f64, in metres and radians. A normal is a unit vector, or an error that says why there
+//! is none.
 //!
 //! ```
 //! use glam::DVec3;
@@ -50,58 +52,61 @@ pub(crate) use mesher::push_surface;
 
 use glam::DVec3;
 
-/// Why a surface has no normal at a place, or no mesh.
+/// Why a surface has no normal at a place, or cannot be meshed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
-    /// Three points that span no plane.
+    /// Three points lie on one line.
     #[error("the three points lie on one line, so no plane goes through them alone; move one of them")]
     Collinear,
-    /// A coordinate or a value of the surface's function is infinite or not a number.
+    /// A coordinate or a value of the surface's function is infinite or NaN.
     #[error("the surface is not finite at {place}")]
     NotFinite {
         /// The point in metres, or (u, v, 0).
         place: DVec3,
     },
-    /// The gradient of an implicit surface vanishes: a centre, an apex, a crossing.
+    /// The gradient of an implicit surface vanishes, as at a centre, an apex or a self-intersection.
     #[error("the gradient vanishes at {point}: the surface has no tangent plane there")]
     Singular {
         /// The point in metres.
         point: DVec3,
     },
-    /// The partial derivatives span no plane, and the normals around do not agree on one: an apex, a crease.
+    /// The partial derivatives span no plane, and the normals nearby do not converge to one, as at an apex or
+    /// a crease.
     #[error("the surface has no tangent plane at u = {u}, v = {v}")]
     NoTangentPlane {
-        /// First parameter.
+        /// The parameter u.
         u: f64,
-        /// Second parameter.
+        /// The parameter v.
         v: f64,
     },
-    /// A grid without cells, or with more than a mesh may have.
+    /// A grid has no cells, or more than a mesh may have.
     #[error("a grid of {columns} by {rows} cells; both must be 1 to {largest}")]
     Grid {
         /// Cells along u.
         columns: u32,
         /// Cells along v.
         rows: u32,
-        /// Largest count of either.
+        /// Largest number of either.
         largest: u32,
     },
 }
 
-/// The direction of a vector of any finite length: scaled first, so that squares neither overflow nor vanish.
+/// The direction of a finite vector, or `None` if it is zero or not finite. The vector is scaled first, so
+/// that squares neither overflow nor underflow.
 fn direction(vector: DVec3) -> Option<DVec3> {
     let largest = vector.abs().max_element();
     if largest > 0.0 && vector.is_finite() { Some((vector / largest).normalize()) } else { None }
 }
 
-/// Distance from the y axis and direction away from it, +x where there is none.
+/// The distance of a point from the y axis and the unit direction away from it; +x on the axis itself.
 fn from_axis(point: DVec3) -> (f64, DVec3) {
     let distance = point.x.hypot(point.z);
     (distance, DVec3::new(point.x, 0.0, point.z).try_normalize().unwrap_or(DVec3::X))
 }
 
-/// The direction at an angle around the y axis, from +x towards -z, and how it turns with the angle.
+/// The unit direction at an angle around the y axis, from +x towards -z, and its derivative with respect to
+/// the angle.
 fn around(angle: f64) -> [DVec3; 2] {
     let (sin, cos) = angle.sin_cos();
     [DVec3::new(cos, 0.0, -sin), DVec3::new(-sin, 0.0, -cos)]

@@ -1,5 +1,5 @@
-//! Surfaces p(u, v) and their normals, the cross product of the partial derivatives. Not the poles, where that vanishes: those are
-//! `pole`.
+//! Parametric surfaces p(u, v) and their normals, the cross products of the partial derivatives. Where these
+//! vanish, as at poles, the normals are computed in `pole`.
 
 use glam::{DVec2, DVec3};
 
@@ -8,12 +8,12 @@ use super::{SurfaceError, direction};
 
 /// A surface p(u, v) over a rectangle of parameters.
 ///
-/// Its front is where ∂p/∂u × ∂p/∂v points.
+/// The front is the side to which ∂p/∂u × ∂p/∂v points.
 pub trait ParametricSurface {
-    /// The least and the greatest (u, v). Nothing is ever asked outside.
+    /// The smallest and largest (u, v). The surface is never evaluated outside.
     fn domain(&self) -> [DVec2; 2];
 
-    /// Whether the surface closes along u, along v: the same place at both ends, and smooth across.
+    /// Whether the surface is closed along u and along v, i.e. both ends are the same and joined smoothly.
     fn closed(&self) -> [bool; 2] {
         [false; 2]
     }
@@ -21,12 +21,12 @@ pub trait ParametricSurface {
     /// The point at (u, v), in metres.
     fn point(&self, u: f64, v: f64) -> DVec3;
 
-    /// ∂p/∂u and ∂p/∂v at (u, v). From differences unless the surface knows them.
+    /// ∂p/∂u and ∂p/∂v at (u, v). Computed from differences unless overridden.
     fn partials(&self, u: f64, v: f64) -> [DVec3; 2] {
         difference_partials(self, u, v)
     }
 
-    /// The unit normal at (u, v). From the partial derivatives unless the surface knows it.
+    /// The unit normal at (u, v). Computed from the partial derivatives unless overridden.
     ///
     /// # Errors
     /// As [`parametric_normal`].
@@ -35,22 +35,25 @@ pub trait ParametricSurface {
     }
 }
 
-/// Part of the larger partial derivative, each taken over the width of its parameter, below which the smaller one (or the sine
-/// between the two) counts as none. Above the error of [`difference_partials`], 10⁻¹⁰; what lies between takes the limit, which is
-/// the same normal.
+/// Threshold for degenerate derivatives, relative to the larger one, with both multiplied by the widths of
+/// their parameters: below it, the smaller one (or the sine of the angle between the two) counts as zero. It
+/// is above the error of [`difference_partials`], 10⁻¹⁰; derivatives in between use the limit, which is the
+/// same normal.
 const DEGENERATE: f64 = 1e-8;
 
 /// The unit normal of a parametric surface: n = ∂p/∂u × ∂p/∂v / |…|.
 ///
-/// Where the product vanishes because of the parameters (the poles of a sphere) the normal is the limit of those around, found by
-/// extrapolation from 1/1000 and 1/2000 of the parameters' widths; its error is of the order of 10⁻⁸. The normals around must agree
-/// to 10⁻³ radians, also those that the parameters call by another name (every longitude, at a pole).
+/// Where the product vanishes only because of the parametrization (at the poles of a sphere), the normal is
+/// the limit of those nearby, extrapolated from distances of 1/1000 and 1/2000 of the parameters' widths; its
+/// error is of the order of 10⁻⁸. The normals nearby must agree to 10⁻³ radians, including those around other
+/// parameters of the same point (every longitude, at a pole).
 ///
-/// Source: document \[I\], Vectores normales. (There the third component of the sphere's product is printed cos u sin v; it is
-/// cos u sin u.)
+/// Source: document \[I\], Vectores normales. (There the third component of the sphere's product is printed
+/// cos u sin v; it is cos u sin u.)
 ///
 /// # Errors
-/// [`SurfaceError::NotFinite`]; [`SurfaceError::NoTangentPlane`] where the surface itself has no normal, such as a cone's apex.
+/// [`SurfaceError::NotFinite`] if a derivative is not finite; [`SurfaceError::NoTangentPlane`] where the
+/// surface itself has no normal, such as at a cone's apex.
 pub fn parametric_normal<S>(surface: &S, u: f64, v: f64) -> Result<DVec3, SurfaceError>
 where
     S: ParametricSurface + ?Sized,
@@ -61,7 +64,7 @@ where
     }
 }
 
-/// The cross product's direction, or `None` where it vanishes.
+/// The direction of the cross product, or `None` where it vanishes.
 pub(super) fn regular_normal<S>(surface: &S, u: f64, v: f64) -> Result<Option<DVec3>, SurfaceError>
 where
     S: ParametricSurface + ?Sized,
@@ -82,11 +85,12 @@ where
     Ok(if normal.length() <= DEGENERATE * longer { None } else { direction(normal) })
 }
 
-/// ∂p/∂u and ∂p/∂v from differences of second order that stay within the domain: central ones inside, (-3 p0 + 4 p1 - p2) / 2h
-/// towards the inside at an end, and across the seam where the surface is closed.
+/// ∂p/∂u and ∂p/∂v from second-order differences that stay within the domain: central differences inside, (-3
+/// p0 + 4 p1 - p2) / 2h towards the inside at an end, and central differences across the seam of a closed
+/// parameter.
 ///
-/// The step is (2^-52)^(1/3) = 6·10⁻⁶ of the parameter's width, which balances what is cut off (h² p'''/6) with the rounding
-/// (2^-53 |p| / h): some 10⁻¹⁰ of p per width.
+/// The step is (2^-52)^(1/3) = 6·10⁻⁶ of the parameter's width, which balances truncation (h² p'''/6) and
+/// rounding (2^-53 |p| / h): an error of about 10⁻¹⁰ of p per width.
 pub fn difference_partials<S>(surface: &S, u: f64, v: f64) -> [DVec3; 2]
 where
     S: ParametricSurface + ?Sized,

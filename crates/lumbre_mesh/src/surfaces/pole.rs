@@ -1,18 +1,20 @@
-//! The normal of a parametric surface where its partial derivatives span no plane: the limit of the normals around.
+//! The normal of a parametric surface where its partial derivatives span no plane: the limit of the normals
+//! nearby.
 
 use glam::{DVec2, DVec3};
 
 use super::parametric::regular_normal;
 use super::{ParametricSurface, SurfaceError, direction};
 
-/// How far from the pole normals are taken, as a part of the parameters' widths. The extrapolation's error is of the order of its
-/// square times the curvature; differences still have five digits of the derivative there.
+/// Distance from the pole at which normals are taken, as a fraction of the parameters' widths. The error of
+/// the extrapolation is of the order of its square times the curvature; difference quotients still have five
+/// correct digits there.
 const DISTANCE: f64 = 1e-3;
-/// Cosine of the angle to which extrapolated normals must agree: 10⁻³ radians.
+/// Cosine of the largest angle between extrapolated normals that counts as agreement: 10⁻³ radians.
 const AGREEMENT: f64 = 1.0 - 0.5e-6;
-/// Other parameters that are tried for the same point.
+/// Number of other values per parameter that are tried to find the same point.
 const PLACES: u32 = 8;
-/// Directions in which a place is left.
+/// Number of directions in which normals are extrapolated.
 const DIRECTIONS: u32 = 8;
 
 pub(super) fn limit_normal<S>(surface: &S, u: f64, v: f64) -> Result<DVec3, SurfaceError>
@@ -35,7 +37,7 @@ where
     direction(sum).ok_or(none)
 }
 
-/// The parameters of the same point: these, and others with the same u or the same v.
+/// Parameters of the same point: the given ones, and others that differ in u or v only.
 fn places<S: ParametricSurface + ?Sized>(surface: &S, place: DVec2) -> Vec<DVec2> {
     let [low, high] = surface.domain();
     let point = surface.point(place.x, place.y);
@@ -49,8 +51,8 @@ fn places<S: ParametricSurface + ?Sized>(surface: &S, place: DVec2) -> Vec<DVec2
     std::iter::once(place).chain(same).collect()
 }
 
-/// The normal in the limit from one direction: linear extrapolation from two distances. `None` where that leads out of the domain or
-/// along a line of points without normals.
+/// The limit of the normal along one direction, by linear extrapolation from two distances. `None` if the
+/// direction leads out of the domain or along a line of points without normals.
 fn extrapolated<S>(surface: &S, place: DVec2, direction_of_step: DVec2) -> Result<Option<DVec3>, SurfaceError>
 where
     S: ParametricSurface + ?Sized,

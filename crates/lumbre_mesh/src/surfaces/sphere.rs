@@ -1,4 +1,4 @@
-//! The sphere about the origin, by its equation and by longitude and latitude.
+//! The sphere about the origin, in implicit form and parametrized by longitude and latitude.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,10 +8,10 @@ use super::{ImplicitSurface, ParametricSurface, SurfaceError, around};
 
 /// f(p) = p·p - r²; p(u, v) with u the longitude from +x towards -z and v the angle from the south pole (-y).
 ///
-/// Source: document \[I\], Vectores normales, there of radius 1 about z.
+/// Source: document \[I\], Vectores normales, there with radius 1 and about the z axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
-    /// In metres, greater than 0.
+    /// Radius r in metres, greater than 0.
     pub radius: f64,
 }
 
@@ -47,13 +47,14 @@ impl ParametricSurface for Sphere {
         [turn * (self.radius * sin), (out * cos + DVec3::Y * sin) * self.radius]
     }
 
-    /// At the poles too.
+    /// Exact, including at the poles.
     fn normal(&self, u: f64, v: f64) -> Result<DVec3, SurfaceError> {
         Ok(unit_point(u, v))
     }
 }
 
-/// Exact at both poles, where π's own rounding would leave a circle of 10⁻¹⁶.
+/// The point on the unit sphere. Exact at both poles, where the rounding of π would otherwise leave a circle
+/// of radius 10⁻¹⁶.
 fn unit_point(u: f64, v: f64) -> DVec3 {
     if v == PI {
         return DVec3::Y;

@@ -1,4 +1,4 @@
-//! The torus about the y axis, by its equation and by two angles.
+//! The torus about the y axis, in implicit form and parametrized by two angles.
 
 use std::f64::consts::TAU;
 
@@ -6,13 +6,13 @@ use glam::{DVec2, DVec3};
 
 use super::{ImplicitSurface, ParametricSurface, SurfaceError, around, from_axis};
 
-/// f(p) = (√(x² + z²) - R)² + y² - r², which has no gradient on the axis; p(u, v) with u the angle around the axis from +x towards
-/// -z and v the angle around the tube from the outside upwards.
+/// f(p) = (√(x² + z²) - R)² + y² - r², which has no gradient on the axis; p(u, v) with u the angle around the
+/// axis from +x towards -z and v the angle around the tube from the outside upwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Torus {
-    /// R: from the axis to the middle of the tube, in metres, greater than `minor_radius`.
+    /// R: the distance from the axis to the centre of the tube in metres, greater than `minor_radius`.
     pub major_radius: f64,
-    /// r: of the tube, in metres, greater than 0.
+    /// r: the radius of the tube in metres, greater than 0.
     pub minor_radius: f64,
 }
 
@@ -62,7 +62,7 @@ impl ParametricSurface for Torus {
     }
 }
 
-/// Away from the axis, and away from the middle of the tube.
+/// The unit directions away from the axis and away from the centre of the tube.
 fn directions(u: f64, v: f64) -> (DVec3, DVec3) {
     let (out, (sin, cos)) = (around(u)[0], v.sin_cos());
     (out, out * cos + DVec3::Y * sin)

@@ -1,4 +1,4 @@
-//! Which lights of a World shine, and how many there are of each kind. Not which of them reach what.
+//! Which lights of a World shine, and how many there are of each kind. It does not determine what they reach.
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use crate::GlobalTransform;
 
-/// Counts of lights that shine: those that are on, not black, and hold numbers that a file may have.
+/// Counts of the lights that shine: enabled, not black, and with valid parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LightCensus {
-    /// All that follow but `lights_off` are among them.
+    /// All lights that shine; the other counts except `lights_off` are subsets of them.
     pub lights: usize,
     /// Lights that do not shine.
     pub lights_off: usize,
@@ -22,13 +22,13 @@ pub struct LightCensus {
     pub point_lights: usize,
     /// Point and directional lights with a cone.
     pub spot_lights: usize,
-    /// Baked whole.
+    /// Lights whose direct and indirect light is baked.
     pub static_lights: usize,
-    /// Baked but for their direct light.
+    /// Lights of which only the indirect light is baked.
     pub mixed_lights: usize,
-    /// Not baked.
+    /// Lights that are not baked.
     pub dynamic_lights: usize,
-    /// Lights that ask for a shadow.
+    /// Lights that cast shadows.
     pub shadow_lights: usize,
 }
 
@@ -46,7 +46,7 @@ impl LightCensus {
         census
     }
 
-    /// Counts one more light that shines.
+    /// Counts one more light, which must shine.
     pub fn add(&mut self, light: &Light) {
         self.lights += 1;
         *match (light.kind, light.spot) {
@@ -64,12 +64,13 @@ impl LightCensus {
     }
 }
 
-/// Where a light stands; an ambient one needs no place.
+/// The transform of a light. An ambient light without one gets the identity, as it needs no position.
 pub fn light_place(light: &Light, transform: Option<&GlobalTransform>) -> Option<GlobalTransform> {
     transform.copied().or_else(|| (light.kind == LightKind::Ambient).then(GlobalTransform::default))
 }
 
-/// Whether a light adds anything to a frame: it is on, not black, stands somewhere, and holds numbers that a file may have.
+/// Returns true if a light can contribute to a frame: it is enabled, not black, has a finite transform
+/// (unless it is ambient) and valid parameters.
 pub fn shines(light: &Light, transform: Option<&GlobalTransform>) -> bool {
     let colors = [light.ambient, light.diffuse, light.specular];
     light.enabled

@@ -1,25 +1,25 @@
-//! The census in words: each effect that a frame may have, whether the scene calls for it, and why.
+//! The census in words: for each effect a frame may have, whether the scene uses it, and why.
 
 use lumbre_optics::ReflectionModel;
 use serde::Serialize;
 
 use super::Census;
 
-/// One effect, whether the scene calls for it, and why.
+/// One effect, whether the scene uses it, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CensusLine {
-    /// The effect.
+    /// Name of the effect.
     pub effect: &'static str,
-    /// Whether the scene calls for it.
+    /// Whether the scene uses it.
     pub called_for: bool,
-    /// How many things call for it.
+    /// How many lights, meshes or settings use it.
     pub count: usize,
-    /// Why, or why not.
+    /// Why it is used or not, as text.
     pub reason: String,
 }
 
 impl Census {
-    /// Irradiance volumes: what they light, or why there is none, and where one is missing.
+    /// The line on irradiance volumes: what they light, why there is none, or that one is missing.
     fn volumes(&self) -> CensusLine {
         let count = |count: usize, singular: &str, plural: &str| match count {
             1 => format!("1 {singular}"),
@@ -38,7 +38,7 @@ impl Census {
         CensusLine { effect: "irradiance volumes", called_for: count > 0, count, reason }
     }
 
-    /// Every effect that a frame may have, called for or not, in the order in which a frame is made.
+    /// One line for every effect a frame may have, used or not, in the order in which a frame is built.
     pub fn lines(&self) -> Vec<CensusLine> {
         let line = |effect, count: usize, singular: &str, plural: &str, none: &str| CensusLine {
             effect,

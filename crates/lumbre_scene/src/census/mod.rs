@@ -1,4 +1,5 @@
-//! What a World calls for: the one record that decides which passes and shader variants exist, and that is printed. Not those decisions.
+//! The census: counts of everything in a World that decides which render passes and shader variants are
+//! needed. The same record is printed for the user. The decisions themselves are made in the renderer.
 //!
 //! ```text
 //!  components ──► ObjectTraits, one object ──► ObjectCensus, all of them ─┐
@@ -26,30 +27,30 @@ pub use object_census::ObjectCensus;
 
 use crate::{SceneSettings, usable_irradiance_volumes};
 
-/// Counts of what is in a World. Lights that are off and meshes that are hidden count only as such.
+/// Counts of what is in a World. Disabled lights count only as `lights_off`, and hidden meshes not at all.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Census {
-    /// The lights that shine.
+    /// Counts of the lights.
     #[serde(flatten)]
     pub lights: LightCensus,
-    /// Whether there is global ambient light.
+    /// Whether the global ambient light is not black.
     pub global_ambient: bool,
-    /// Whether there is a sky.
+    /// Whether the sky is not black.
     pub sky: bool,
-    /// Entities with a mesh that is shown.
+    /// Meshes that are not hidden.
     pub meshes: usize,
-    /// Triangles of all shown meshes.
+    /// Triangles of these meshes.
     pub triangles: usize,
-    /// Meshes that the baker lights.
+    /// Meshes that the baker includes.
     pub static_objects: usize,
-    /// Meshes that move.
+    /// Meshes marked as moving.
     pub dynamic_objects: usize,
-    /// Meshes that are lit by a lightmap.
+    /// Meshes lit by a lightmap.
     pub lightmapped: usize,
-    /// Irradiance volumes that can be used.
+    /// Irradiance volumes that are valid and placed.
     pub irradiance_volumes: usize,
-    /// Meshes without a lightmap that are lit by one of them.
+    /// Lit meshes without a lightmap, if there is a usable irradiance volume.
     pub lit_by_volume: usize,
     /// Meshes with a texture of any kind.
     pub textured: usize,
@@ -65,29 +66,29 @@ pub struct Census {
     pub occlusion_textures: usize,
     /// Meshes with vertex colours.
     pub vertex_colors: usize,
-    /// Meshes that are cut out by alpha.
+    /// Meshes with an alpha mask.
     pub alpha_mask: usize,
-    /// Meshes that are blended.
+    /// Meshes with alpha blending.
     pub alpha_blend: usize,
-    /// Meshes that are lit from both sides.
+    /// Meshes lit from both sides.
     pub two_sided: usize,
-    /// Of these, those with a material of its own on the back.
+    /// Of these, meshes with a separate material on the back.
     pub back_materials: usize,
-    /// Meshes that take no light.
+    /// Unlit meshes.
     pub unlit: usize,
     /// Meshes that emit light.
     pub emissive: usize,
     /// Emissive meshes whose faces light others in real time.
     pub emissive_lights: usize,
-    /// Meshes with a highlight.
+    /// Meshes with specular reflection.
     pub specular: usize,
-    /// Meshes that mirror.
+    /// Meshes with mirror reflection.
     pub mirrors: usize,
-    /// Meshes that can be drawn with what they mirror: flat ones.
+    /// Mirroring meshes that are flat, so that the reflection can be drawn as a view of its own.
     pub planar_mirrors: usize,
-    /// Meshes that light passes through.
+    /// Meshes that transmit light.
     pub transmission: usize,
-    /// Meshes that can be drawn with what lies behind them.
+    /// Transmissive meshes through which the scene behind them can be drawn.
     pub refractive: usize,
     /// Meshes shaded per face.
     pub flat: usize,
@@ -95,13 +96,14 @@ pub struct Census {
     pub gouraud: usize,
     /// Meshes shaded per fragment.
     pub phong: usize,
-    /// Meshes shaded by need: as rarely as an error allows.
+    /// Meshes with shading by need, i.e. the cheapest rate within an error bound.
     pub shaded_by_need: usize,
     /// Lit meshes with a specular model of their own.
     pub own_reflection: usize,
-    /// Lit meshes with a highlight, by the name of their specular model; models that nothing uses are missing.
+    /// Lit meshes with specular reflection, by the name of their reflection model. Models without meshes are
+    /// absent.
     pub reflection_models: BTreeMap<&'static str, usize>,
-    /// Whether there is fog.
+    /// Whether the scene has fog.
     pub fog: bool,
 }
 
@@ -113,7 +115,8 @@ impl Census {
         Self::new(&objects, LightCensus::of(world), usable_irradiance_volumes(world), &settings)
     }
 
-    /// What objects, lights and so many usable irradiance volumes come to under the settings of their scene.
+    /// Combines the counts of objects, lights and usable irradiance volumes under the settings of their
+    /// scene.
     pub fn new(
         objects: &ObjectCensus,
         lights: LightCensus,

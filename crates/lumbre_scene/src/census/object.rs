@@ -1,4 +1,5 @@
-//! What the components of one object say: all that decides its pass and its shader variant, and what is counted of it. Not those decisions.
+//! The traits of one object, derived from its components: everything that decides its pass and shader variant
+//! and that the census counts. The decisions are made in the renderer.
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -9,79 +10,81 @@ use crate::{
     DynamicObject, EmissiveLight, Lightmap, MaterialTextures, Medium, Mesh, StaticObject, hidden_entities,
 };
 
-/// What matters of one object. Equal traits have equal shader variants in every frame.
+/// The traits of one object. Objects with equal traits use the same shader variants in every frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ObjectTraits {
-    /// Which textures its material has, a bit for each of [`MaterialTextures::slots`].
+    /// The texture slots that are filled: bit i for slot i of [`MaterialTextures::slots`].
     pub texture_mask: u8,
-    /// Which of them read the second set of texture coordinates.
+    /// The slots among them that read the second set of texture coordinates, as a bit mask too.
     pub second_set: u8,
-    /// Whether its vertices have colours.
+    /// Whether its mesh has vertex colours.
     pub vertex_color: bool,
-    /// How alpha is taken.
+    /// Opaque, masked or blended.
     pub alpha_mode: AlphaMode,
-    /// Whether its back is drawn.
+    /// Whether its back faces are drawn.
     pub double_sided: bool,
-    /// Whether its back, where it is drawn, has a material of its own.
+    /// Whether its back faces are drawn with a separate material.
     pub back_material: bool,
-    /// Whether it takes no light.
+    /// Whether it is unlit.
     pub unlit: bool,
     /// Whether its front emits light.
     pub glows: bool,
-    /// Whether its back, where it is drawn and has a material of its own, emits light.
+    /// Whether its back faces are drawn with a separate material that emits light.
     pub back_glows: bool,
-    /// Whether its faces light others in real time.
+    /// Whether its emissive faces light other objects in real time.
     pub lights_others: bool,
-    /// Whether any light makes a highlight on it.
+    /// Whether it has specular reflection, on either side or by a metallic-roughness texture.
     pub specular: bool,
-    /// Whether a highlight may be sharper than plain powers can tell.
+    /// Whether the exponent of its highlight may exceed `lumbre_optics::SHARP_SHININESS`, which needs the
+    /// shader feature for sharp highlights.
     pub sharp: bool,
-    /// Whether it has a lightmap, and coordinates for it.
+    /// Whether it has a lightmap and texture coordinates for it.
     pub lightmapped: bool,
-    /// Whether its highlight is as glTF has it.
+    /// Whether its specular lobe is glTF's energy-keeping one.
     pub energy_keeping: bool,
-    /// How its microfacets are distributed, for Torrance and Sparrow's model.
+    /// Its microfacet distribution, for the Torrance-Sparrow model.
     pub distribution: Distribution,
-    /// Its Fresnel reflectance, for the same model.
+    /// Its Fresnel reflectance, for the Torrance-Sparrow model.
     pub fresnel: Fresnel,
-    /// Its own rate of evaluation, instead of the scene's.
+    /// Its own shading rate, which overrides the scene's.
     pub shading: Option<Shading>,
-    /// Its own specular model, instead of the scene's.
+    /// Its own reflection model, which overrides the scene's.
     pub reflection: Option<ReflectionModel>,
-    /// Whether it mirrors.
+    /// Whether its material has mirror reflection.
     pub mirrors: bool,
-    /// Whether what it mirrors can be drawn as a view of its own: it mirrors (or reflects by Fresnel's equations what it does not let through),
-    /// is flat, and neither blended, unlit nor roughened by a normal texture.
+    /// Whether its reflection can be drawn as a view of its own: it mirrors (or reflects by the Fresnel
+    /// equations what it does not transmit), is flat, and is neither blended nor unlit nor normal-mapped.
     pub planar_mirror: bool,
-    /// Whether light passes through it.
+    /// Whether it transmits light.
     pub transmits: bool,
-    /// Whether what lies behind it can be drawn through it: light passes, and it is neither blended nor unlit.
+    /// Whether the scene behind it can be drawn through it: it transmits light and is neither blended nor
+    /// unlit.
     pub refracts: bool,
-    /// What the baker makes of it.
+    /// Whether the baker includes it.
     pub mobility: Mobility,
 }
 
-/// What the baker makes of an object.
+/// Whether an object is static or moves, as its marker components say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mobility {
-    /// It is lit by the baker.
+    /// The baker includes it.
     Static,
-    /// It moves: the baker leaves it out.
+    /// It moves, so the baker leaves it out.
     Dynamic,
-    /// It says neither.
+    /// It has neither marker.
     #[default]
     Unsaid,
 }
 
-/// The components that an object's traits follow from, as a query's data.
+/// The query data from which an object's traits are derived.
 pub type ObjectComponents = (
     (&'static Mesh, &'static Material, Option<&'static MaterialTextures>, Option<&'static Lightmap>),
     (Option<&'static Shading>, Option<&'static ReflectionModel>, Option<&'static Medium>),
     (Has<StaticObject>, Has<DynamicObject>, Has<EmissiveLight>),
 );
 
-/// What a query of [`ObjectComponents`] finds.
+/// The item that a query of [`ObjectComponents`] yields.
 pub type ObjectItem<'w> = (
     (&'w Mesh, &'w Material, Option<&'w MaterialTextures>, Option<&'w Lightmap>),
     (Option<&'w Shading>, Option<&'w ReflectionModel>, Option<&'w Medium>),
@@ -134,18 +137,20 @@ impl ObjectTraits {
         }
     }
 
-    /// Whether its light comes from a lightmap, where lightmaps are used.
+    /// Returns true if the object is lit by its lightmap whenever lightmaps are in use.
     pub fn is_lit_by_lightmap(&self) -> bool {
         self.lightmapped && !self.unlit
     }
 
-    /// Whether its light comes from an irradiance volume, where there is one: it has no lightmap, whether lightmaps are used or not.
+    /// Returns true if the object is lit by an irradiance volume whenever there is one: it is lit and has no
+    /// lightmap. An object with a lightmap never uses a volume, even while lightmaps are switched off.
     pub fn is_lit_by_irradiance_volume(&self) -> bool {
         !self.lightmapped && !self.unlit
     }
 }
 
-/// The plane of an object, in its mesh's space, where what it mirrors can be drawn as a view of its own.
+/// The plane of a flat mirror in mesh space, or `None` if its reflection cannot be drawn as a view of its own
+/// (see [`ObjectTraits::planar_mirror`]).
 pub fn planar_mirror(
     mesh: &TriangleMesh,
     material: &Material,
@@ -160,7 +165,7 @@ pub fn planar_mirror(
     if mirrors && even && seen_whole { mesh.plane() } else { None }
 }
 
-/// The traits and the number of triangles of each object of a World that is shown.
+/// The traits and the triangle count of each object of a World that is not hidden.
 pub fn shown_objects(world: &mut World) -> Vec<(ObjectTraits, usize)> {
     let hidden = hidden_entities(world);
     let mut query = world.query::<(Entity, ObjectComponents)>();

@@ -1,74 +1,77 @@
-//! Counts over the traits of shown objects, kept up to date as objects come, change and go. What the scene sets is not in it.
+//! Counts over the traits of visible objects, updated incrementally as objects are added, changed and
+//! removed. They do not depend on the scene's settings.
 
 use lumbre_optics::{AlphaMode, ReflectionModel, Shading};
 
 use super::object::{Mobility, ObjectTraits};
 use crate::MaterialTextures;
 
-/// What the shown objects of a scene call for, whatever the scene sets.
+/// Counts over the objects of a scene that are not hidden, independent of the scene's settings.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ObjectCensus {
-    /// Objects that are shown.
+    /// Objects that are not hidden.
     pub meshes: usize,
     /// Their triangles.
     pub triangles: usize,
-    /// Objects that the baker lights.
+    /// Objects that the baker includes.
     pub static_objects: usize,
-    /// Objects that move.
+    /// Objects marked as moving.
     pub dynamic_objects: usize,
-    /// Objects that are lit by a lightmap.
+    /// Objects lit by a lightmap.
     pub lightmapped: usize,
-    /// Of these, the blended ones.
+    /// Of these, objects with alpha blending.
     pub lightmapped_blended: usize,
     /// Lit objects without a lightmap.
     pub without_lightmap: usize,
-    /// Objects by texture, in the order of [`MaterialTextures::slots`].
+    /// Objects with each texture, in the order of [`MaterialTextures::slots`].
     pub textures: [usize; MaterialTextures::SLOTS],
     /// Objects with a texture of any kind.
     pub textured: usize,
     /// Objects with vertex colours.
     pub vertex_colors: usize,
-    /// Objects that are cut out by alpha.
+    /// Objects with an alpha mask.
     pub alpha_mask: usize,
-    /// Objects that are blended.
+    /// Objects with alpha blending.
     pub alpha_blend: usize,
     /// Objects whose material is double-sided.
     pub double_sided: usize,
-    /// Of these, those with a material of its own on the back.
+    /// Of these, objects with a separate material on the back.
     pub back_materials: usize,
-    /// Objects that take no light.
+    /// Unlit objects.
     pub unlit: usize,
     /// Objects whose front emits light.
     pub glowing: usize,
     /// Objects of which only the back emits light.
     pub glowing_behind: usize,
-    /// Objects whose faces light others in real time.
+    /// Objects whose emissive faces light others in real time.
     pub emissive_lights: usize,
-    /// Lit objects by their own rate of evaluation: none of its own first, then as [`Shading::ALL`], and last by need.
+    /// Lit objects by their own shading rate: index 0 for objects that take the scene's, then those of
+    /// [`Shading::ALL`] in order, and last shading by need.
     pub shading: [usize; 2 + Shading::ALL.len()],
-    /// Lit objects by their own specular model: none of its own first, then as [`ReflectionModel::ALL`].
+    /// Lit objects by their own reflection model: index 0 for objects that take the scene's, then those of
+    /// [`ReflectionModel::ALL`] in order.
     pub reflection: [usize; 1 + ReflectionModel::ALL.len()],
-    /// As `reflection`, of those with a highlight.
+    /// As `reflection`, for objects with specular reflection only.
     pub highlights: [usize; 1 + ReflectionModel::ALL.len()],
-    /// Objects that mirror.
+    /// Objects with mirror reflection.
     pub mirrors: usize,
-    /// Objects that can be drawn with what they mirror: flat ones.
+    /// Mirroring objects that are flat, so that the reflection can be drawn as a view of its own.
     pub planar_mirrors: usize,
-    /// Objects that light passes through.
+    /// Objects that transmit light.
     pub transmission: usize,
-    /// Objects that can be drawn with what lies behind them.
+    /// Transmissive objects through which the scene behind them can be drawn.
     pub refractive: usize,
-    /// Of these, those that are lit by a lightmap.
+    /// Of these, objects lit by a lightmap.
     pub lightmapped_refractive: usize,
 }
 
-/// 0 for none, or one more than the place among all.
+/// The index of a choice in the counters: 0 for none, otherwise 1 plus its index in `all`.
 fn choice<T: PartialEq>(own: Option<T>, all: &[T]) -> usize {
     own.and_then(|own| all.iter().position(|one| *one == own)).map_or(0, |place| place + 1)
 }
 
-/// The place of [`Shading::Auto`] among rates of evaluation.
+/// The index of [`Shading::Auto`] in the counters of shading rates.
 const BY_NEED: usize = 1 + Shading::ALL.len();
 
 fn shading_choice(own: Option<Shading>) -> usize {
@@ -88,12 +91,12 @@ impl ObjectCensus {
         census
     }
 
-    /// Counts one more object, of so many triangles.
+    /// Adds an object with this many triangles.
     pub fn add(&mut self, traits: &ObjectTraits, triangles: usize) {
         self.count(traits, triangles, |counter, number| *counter += number);
     }
 
-    /// Takes away an object that was counted.
+    /// Removes an object that was added with the same arguments.
     pub fn remove(&mut self, traits: &ObjectTraits, triangles: usize) {
         self.count(traits, triangles, |counter, number| *counter -= number);
     }
@@ -138,17 +141,17 @@ impl ObjectCensus {
         }
     }
 
-    /// Lit objects shaded at this rate in a scene that sets `scene`.
+    /// Number of lit objects shaded at this rate if the scene's shading is `scene`.
     pub fn shaded(&self, rate: Shading, scene: Shading) -> usize {
         self.shading[shading_choice(Some(rate))] + usize::from(rate == scene) * self.shading[0]
     }
 
-    /// Lit objects shaded by need, to whatever error, in a scene that sets `scene`.
+    /// Number of lit objects shaded by need, with any error bound, if the scene's shading is `scene`.
     pub fn shaded_by_need(&self, scene: Shading) -> usize {
         self.shading[BY_NEED] + if let Shading::Auto { .. } = scene { self.shading[0] } else { 0 }
     }
 
-    /// Lit objects with a highlight of this model in a scene that sets `scene`.
+    /// Number of lit objects with specular reflection of this model if the scene's model is `scene`.
     pub fn highlights_of(&self, model: ReflectionModel, scene: ReflectionModel) -> usize {
         self.highlights[choice(Some(model), ReflectionModel::ALL)]
             + usize::from(model == scene) * self.highlights[0]

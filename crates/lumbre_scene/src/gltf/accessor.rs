@@ -1,7 +1,7 @@
-//! Numbers out of buffers: accessors, sparse ones and normalized integers included. Not what they are used for.
+//! Decodes accessors to numbers, including sparse accessors and normalized integers.
 //!
-//! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and what is
-//! decoded counts against one limit for the whole file.
+//! Every offset, stride and count is checked against the bytes that exist before anything is allocated, and
+//! decoded data is charged to a [`Budget`].
 
 use gltf::json::buffer::View;
 
@@ -12,51 +12,51 @@ use super::document::{Accessor, Document, Sparse, element};
 use super::error::LoadProblem;
 use super::limits::Budget;
 
-/// The bytes of a file's buffers, with the JSON that divides them.
+/// The buffers of a file with the document that describes them.
 pub(crate) struct Buffers<'a> {
     pub document: &'a Document,
     pub bytes: Vec<std::borrow::Cow<'a, [u8]>>,
-    /// What was compressed.
+    /// The decoded form of compressed data.
     pub decoded: std::borrow::Cow<'a, Decoded>,
 }
 
-/// Elements in a buffer view, `count` of them, already known to lie inside it.
+/// Elements in a buffer view, already checked to lie within it.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
 }
 
 impl<'a> Elements<'a> {
-    /// The bytes of one element; empty beyond the last.
+    /// The bytes of one element; empty if the index is out of range.
     fn get(&self, index: usize, size: usize) -> &'a [u8] {
         let start = index.saturating_mul(self.stride);
         self.bytes.get(start..start.saturating_add(size)).unwrap_or_default()
     }
 }
 
-/// The elements of an accessor as they lie in the file.
+/// The undecoded elements of an accessor.
 pub(crate) struct RawElements<'a> {
     pub format: Format,
     pub count: usize,
     base: Option<Elements<'a>>,
-    /// What is said instead of some of them: index and bytes.
+    /// Sparse replacements as pairs of element index and bytes.
     pub sparse: Vec<(u32, &'a [u8])>,
 }
 
 impl<'a> RawElements<'a> {
-    /// The bytes of an element of the buffer view; nothing where there is none, which means zeros.
+    /// The bytes of an element in the buffer view; `None` if the accessor has no view, which means zeros.
     pub(crate) fn base(&self, index: usize) -> Option<&'a [u8]> {
         self.base.as_ref().map(|base| base.get(index, self.format.size()))
     }
 }
 
 impl<'a> Buffers<'a> {
-    /// Whether an accessor's elements were compressed with its primitive.
+    /// Returns true if the accessor's elements come from the compressed data of a primitive.
     pub(crate) fn is_decoded(&self, accessor: usize) -> bool {
         self.decoded.accessors.contains_key(&accessor)
     }
 
-    /// The bytes of a buffer view and its stride.
+    /// The bytes of a buffer view, and its stride if it states one.
     pub(crate) fn view(
         &self,
         index: usize,
@@ -70,7 +70,7 @@ impl<'a> Buffers<'a> {
         Ok((bytes, stride(view)))
     }
 
-    /// `count` elements starting at an offset in a view, or why they are not all inside it.
+    /// `count` elements from an offset in a view, or an error if they exceed the view.
     fn elements(
         &self,
         view: usize,
@@ -99,12 +99,13 @@ impl<'a> Buffers<'a> {
                 "its {count} elements need bytes up to {end} but bufferViews[{view}] has {length}; export the file again"
             )));
         }
-        // Both fit: they are at most the length of a slice.
+        // The casts are lossless: both are at most the length of the slice.
         let bytes = bytes.get(offset as usize..).unwrap_or_default();
         Ok(Elements { bytes, stride: stride as usize })
     }
 
-    /// An accessor as vectors of `N` numbers; a shorter one leaves the rest of each vector at `fill`.
+    /// Decodes an accessor to vectors of `N` numbers. If its elements are shorter, the remaining numbers are
+    /// taken from `fill`.
     ///
     /// `shapes` are the types that the use allows, such as `VEC3`.
     pub(crate) fn floats<const N: usize>(
@@ -133,7 +134,7 @@ impl<'a> Buffers<'a> {
         self.decode(&reader, accessor, &format, zero, decode, budget)
     }
 
-    /// An accessor of indices, each less than `vertices`.
+    /// Decodes an accessor of indices, each of which must be less than `vertices`.
     pub(crate) fn indices(
         &self,
         index: usize,
@@ -158,7 +159,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The elements of the buffer view that an accessor names, or what was decoded for it; nothing where there is neither.
+    /// The elements in the accessor's buffer view or in its decompressed data; `None` if it has neither.
     fn base(
         &self,
         reader: &Reader<'_>,
@@ -207,7 +208,7 @@ impl<'a> Buffers<'a> {
         Ok(values)
     }
 
-    /// The elements of a sparse accessor that differ from the rest, with their indices.
+    /// The replaced elements of a sparse accessor, with their indices.
     fn replacements(
         &self,
         reader: &Reader<'_>,
@@ -231,7 +232,7 @@ impl<'a> Buffers<'a> {
         Ok(pairs.take(sparse.count as usize).map(|(index, value)| (whole(index), value)))
     }
 
-    /// The elements of an accessor of any type, unread.
+    /// The undecoded elements of an accessor of any type.
     pub(crate) fn raw(&self, index: usize, used_by: &str) -> Result<RawElements<'_>, LoadProblem> {
         const SHAPES: [&str; 7] = ["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"];
         let (reader, accessor, format) = Reader::of(self.document, index, used_by, &SHAPES)?;
@@ -249,7 +250,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Bytes from an element of a view to the next, where the view says.
+/// The stride of a view in bytes, if it states one.
 fn stride(view: &View) -> Option<u64> {
     view.byte_stride.map(|stride| stride.0 as u64)
 }

@@ -1,15 +1,17 @@
-//! What the elements of an accessor look like, and which accessor a message is about. Not their bytes.
+//! The element format of an accessor, and the accessor's identity for messages. Reading its bytes is in
+//! `accessor`.
 
 pub(crate) use gltf::json::accessor::{BYTE, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 
 use super::document::{Accessor, Document, element, shortened};
 use super::error::LoadProblem;
 
-/// What elements look like: vectors, or matrices of `columns` columns, each beginning at a multiple of four bytes.
+/// The format of an element: a vector, or a matrix of `columns` columns, each of which starts at a multiple
+/// of four bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Format {
     pub component: u32,
-    /// Of a vector or a column.
+    /// Components of the vector, or of one column.
     pub components: usize,
     pub columns: usize,
 }
@@ -23,7 +25,7 @@ impl Format {
         }
     }
 
-    /// Bytes from a column to the next.
+    /// Bytes from one column to the next.
     fn column_size(self) -> usize {
         let size = self.component_size() * self.components;
         if self.columns > 1 { size.next_multiple_of(4) } else { size }
@@ -33,7 +35,7 @@ impl Format {
         self.column_size() * self.columns
     }
 
-    /// The components of an element as they stand, without normalization.
+    /// The stored components of an element, without normalization.
     pub(crate) fn raw(self, element: &[u8]) -> impl Iterator<Item = f64> {
         let columns = element.chunks(self.column_size()).take(self.columns);
         let own = self.component_size() * self.components;
@@ -46,14 +48,14 @@ impl Format {
     }
 }
 
-/// An accessor in use, for messages.
+/// An accessor and its use, for messages.
 pub(crate) struct Reader<'a> {
     pub index: usize,
     used_by: &'a str,
 }
 
 impl<'a> Reader<'a> {
-    /// An accessor that is used by something that allows these types, such as `VEC3`.
+    /// Looks up the accessor `index`. `shapes` are the types that its use allows, such as `VEC3`.
     pub(crate) fn of<'b>(
         document: &'b Document,
         index: usize,
@@ -104,7 +106,7 @@ pub(crate) fn whole(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
 }
 
-/// One component; normalized integers by the glTF 2.0 specification, section 3.11.
+/// Decodes one component. Normalized integers are converted as in the glTF 2.0 specification, section 3.11.
 pub(crate) fn number(bytes: &[u8], component: u32, normalized: bool) -> f32 {
     let raw = whole(bytes);
     let (value, largest) = match component {

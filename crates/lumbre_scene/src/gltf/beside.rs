@@ -1,4 +1,5 @@
-//! Files that a glTF file names: copied beside an output that lies in another folder. Not their content.
+//! Copies the external files of a glTF file to the folder of an output in another folder. Their content is
+//! not changed.
 
 use std::collections::HashSet;
 use std::fs;
@@ -12,17 +13,18 @@ use super::export_files::Files;
 use super::uri::{self, Base};
 use super::{container, document, patch};
 
-/// What was copied, by the URIs that name it now.
+/// The URIs of the copies in the output, and notes.
 #[derive(Default)]
 pub(crate) struct Copied {
     pub uris: Vec<String>,
     pub notes: Notes,
 }
 
-/// Copies the files that a file's JSON names from one folder to that of the output, and lets the JSON name them there.
+/// Copies the files that a file's JSON refers to into the folder of the output, and updates the URIs in the
+/// JSON.
 ///
-/// Of the same name only a file is replaced that is the same or that an earlier bake copied there; otherwise the copy gets a name of
-/// its own. Nothing is done if both folders are one.
+/// An existing file of the same name is overwritten only if it is identical or was copied there by an earlier
+/// bake; otherwise the copy gets a new name. Nothing is done if both folders are the same.
 pub(crate) fn copy(
     root: &mut Value,
     base: Base<'_>,
@@ -32,7 +34,7 @@ pub(crate) fn copy(
     copy_named(root, base, output, files, false)
 }
 
-/// As [`copy`], with the images of baked light: for an output that keeps it.
+/// As [`copy`], including the images of baked light, for an output that keeps them.
 pub(crate) fn copy_with_light(
     root: &mut Value,
     base: Base<'_>,
@@ -61,7 +63,8 @@ fn copy_named(
     Ok(copies.copied)
 }
 
-/// What the bake copied that wrote the output which is there, if one did.
+/// The URIs of the files that an earlier bake copied when it wrote the current output file; empty if there is
+/// none.
 fn former(output: &Path) -> HashSet<String> {
     let read = || {
         let bytes = uri::read(output).ok()?;
@@ -71,7 +74,7 @@ fn former(output: &Path) -> HashSet<String> {
     read().unwrap_or_default().into_iter().collect()
 }
 
-/// Extensions whose `image` is baked light.
+/// Extensions whose `image` member is baked light.
 const LIGHT: [&str; 2] = ["LUMBRE_lightmap", "LUMBRE_irradiance_volume"];
 
 struct Copies<'a> {
@@ -79,7 +82,7 @@ struct Copies<'a> {
     output: &'a Path,
     beside: &'a Path,
     files: &'a mut Files,
-    /// Images of lightmaps and irradiance volumes, too.
+    /// Whether the images of lightmaps and irradiance volumes are copied too.
     with_light: bool,
     former: HashSet<String>,
     copied: Copied,
@@ -112,7 +115,7 @@ impl Copies<'_> {
         }
     }
 
-    /// Copies the KTX2 image that lies beside a lightmap for other programs, if there is one.
+    /// Copies the KTX2 version of a lightmap, which is written beside it for other programs, if it exists.
     fn copy_packed(&mut self, image: &str) -> Result<(), SaveError> {
         let Some(packed) = image.strip_suffix(".exr").map(|stem| format!("{stem}.ktx2")) else {
             return Ok(());
@@ -123,14 +126,14 @@ impl Copies<'_> {
         Ok(())
     }
 
-    /// Copies what a URI names; the URI of the copy.
+    /// Copies the file that a URI refers to, and returns the URI of the copy.
     fn copy(&mut self, named: &str) -> Result<String, SaveError> {
         let Ok(file) = self.base.file(named, "") else {
             let place = format!("the URI {:?}", document::shortened(named));
             self.copied.notes.add(place, "is not of a file that may be read; kept as it is");
             return Ok(named.to_owned());
         };
-        // A copy of what lies outside of the folder lies in it.
+        // A file from outside of the source folder is copied directly into the output folder.
         let (relative, own) = match uri::relative(named) {
             Ok(relative) => (relative, named.to_owned()),
             Err(_) => {
@@ -171,7 +174,7 @@ impl Copies<'_> {
         Ok(named.to_owned())
     }
 
-    /// Names that a copy may get where its own is taken.
+    /// Alternative names for a copy whose own name is taken.
     fn other_names(&self, relative: &Path) -> impl Iterator<Item = (PathBuf, String)> + use<> {
         let stem = self.output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let name = relative.file_name().unwrap_or_default().to_string_lossy().into_owned();

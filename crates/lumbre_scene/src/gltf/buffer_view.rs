@@ -1,11 +1,11 @@
-//! The bytes that a buffer view stands for, checked against those that exist. Not what they mean.
+//! The bytes of buffer views, with bounds checks.
 
 use std::borrow::Cow;
 
 use super::document::{Document, element};
 use super::error::LoadProblem;
 
-/// The bytes of `bufferViews[index]` in the buffers of its file.
+/// The bytes of `bufferViews[index]`.
 pub(crate) fn range_of_view<'a>(
     document: &Document,
     contents: &'a [Cow<'_, [u8]>],
@@ -17,7 +17,7 @@ pub(crate) fn range_of_view<'a>(
     range(contents, index, (view.buffer.value(), offset, view.byte_length.0), place)
 }
 
-/// So many bytes of a buffer from an offset, on behalf of a view.
+/// `length` bytes from `offset` in a buffer, or an error that names the buffer view with index `view`.
 pub(crate) fn range<'a>(
     contents: &'a [Cow<'_, [u8]>],
     view: usize,

@@ -1,4 +1,5 @@
-//! What of a file's data is compressed, decoded and bounded: buffer views and the primitives of meshes. Not the codecs.
+//! Decodes the compressed data of a file: buffer views (meshopt) and mesh primitives (Draco). The codecs are
+//! in their own modules.
 
 use std::borrow::Cow;
 
@@ -8,16 +9,16 @@ use super::document::Document;
 use super::error::LoadProblem;
 use super::limits::Budget;
 
-/// The data of a file that were compressed.
+/// The decompressed data of a file.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Decoded {
-    /// By `EXT_meshopt_compression`.
+    /// Buffer views compressed with `EXT_meshopt_compression`.
     pub views: DecodedViews,
-    /// By `KHR_draco_mesh_compression`.
+    /// Accessors of primitives compressed with `KHR_draco_mesh_compression`.
     pub accessors: DecodedAccessors,
 }
 
-/// Decodes everything that is compressed in a file.
+/// Decodes all compressed data of a file.
 pub(crate) fn decode(
     document: &Document,
     contents: &[Cow<'_, [u8]>],

@@ -1,4 +1,5 @@
-//! Primitives whose attributes and indices are in KHR_draco_mesh_compression: found, bounded, decoded. Not the codec.
+//! Finds primitives with KHR_draco_mesh_compression, checks their bounds and decodes them. The codec is in
+//! `draco`.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -13,16 +14,17 @@ use super::limits::Budget;
 
 pub(crate) const EXTENSION: &str = "KHR_draco_mesh_compression";
 
-/// Bytes of the decoder's own tables per triangle.
+/// Bytes of the decoder's internal tables per triangle.
 const TABLES: usize = 64;
 
-/// The decoded elements of accessors, by the accessor's index: in the accessor's own format, one after another.
+/// The decoded elements by accessor index, tightly packed in the accessor's own format.
 pub(crate) type DecodedAccessors = HashMap<usize, Vec<u8>>;
 
-/// What an accessor is decoded from: a buffer view, and there an attribute by its number, or the corners of the triangles.
+/// Where an accessor's data comes from: a buffer view, and the id of an attribute in its Draco data, or
+/// `None` for the indices of the triangles.
 type Origin = (usize, Option<u32>);
 
-/// An accessor that is to be decoded.
+/// An accessor to be filled from Draco data.
 struct Target<'a> {
     reader: Reader<'a>,
     format: Format,
@@ -30,7 +32,7 @@ struct Target<'a> {
     origin: Origin,
 }
 
-/// Decodes the primitives that are compressed.
+/// Decodes all primitives that are compressed with Draco.
 pub(crate) fn decode(
     document: &Document,
     contents: &[Cow<'_, [u8]>],
@@ -65,7 +67,7 @@ pub(crate) fn decode(
     Ok(decoded)
 }
 
-/// The extension of a primitive, if it has one.
+/// The Draco extension of a primitive, if it has one.
 pub(crate) fn compressed(
     primitive: &Primitive,
     place: impl FnOnce() -> String,
@@ -76,7 +78,8 @@ pub(crate) fn compressed(
     extension(&primitive.extensions, EXTENSION, &place())
 }
 
-/// The accessors that the data stand for: index, number in the data (none for the triangles), and what uses it.
+/// The accessors that the Draco data provides: accessor index, attribute id in the data (`None` for the
+/// indices), and a name for messages.
 fn names(
     primitive: &Primitive,
     compressed: &DracoPrimitive,
@@ -131,7 +134,8 @@ fn decode_one(
     decoded: &mut DecodedAccessors,
 ) -> Result<(), LoadProblem> {
     let bytes = range_of_view(document, contents, compressed.buffer_view)?;
-    // All that is decoded is paid for before the decoder sees anything, and it may not make more than that.
+    // The whole output is charged to the budget before the decoder runs, and the decoder may not produce more
+    // than that.
     let (mut corners, mut points) = (0, None);
     for target in targets {
         budget.charge(target.count, target.format.size(), || place.to_owned())?;

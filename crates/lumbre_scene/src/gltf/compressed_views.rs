@@ -1,4 +1,5 @@
-//! Buffer views that EXT_meshopt_compression stands in for: found, bounded, decoded. Not the codec.
+//! Finds buffer views with EXT_meshopt_compression, checks their bounds and decodes them. The codec is in
+//! `meshopt`.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -12,10 +13,10 @@ use super::meshopt::{self, Filter, Mode};
 
 const EXTENSION: &str = "EXT_meshopt_compression";
 
-/// The decoded bytes of buffer views, by their index.
+/// The decoded bytes of buffer views, by view index.
 pub(crate) type DecodedViews = HashMap<usize, Vec<u8>>;
 
-/// Whether a buffer only says how long the decoded views would be.
+/// Returns true if a buffer is only a placeholder that states the size of the decoded views.
 pub(crate) fn is_fallback(document: &Document, buffer: usize) -> Result<bool, LoadProblem> {
     let Some(own) = document.buffers.get(buffer) else { return Ok(false) };
     let Some(extensions) = &own.extensions else { return Ok(false) };
@@ -23,7 +24,7 @@ pub(crate) fn is_fallback(document: &Document, buffer: usize) -> Result<bool, Lo
     Ok(own.uri.is_none() && found.is_some_and(|found| found.fallback))
 }
 
-/// Decodes every compressed view of a file.
+/// Decodes all compressed views of a file.
 pub(crate) fn decode(
     document: &Document,
     contents: &[Cow<'_, [u8]>],

@@ -1,4 +1,5 @@
-//! The binary glTF container: a header, a JSON chunk, a binary chunk. Not what is in them.
+//! The binary glTF container (.glb): a header, a JSON chunk, a binary chunk and unknown chunks. Their
+//! contents are not interpreted here.
 
 use super::error::{LoadProblem, Notes};
 
@@ -6,16 +7,16 @@ pub(crate) const MAGIC: &[u8; 4] = b"glTF";
 const JSON: u32 = 0x4E4F_534A;
 const BIN: u32 = 0x004E_4942;
 
-/// The parts of a file.
+/// The parts of a glTF file.
 pub(crate) struct Container<'a> {
     pub json: &'a [u8],
     /// The binary chunk, if there is one.
     pub binary: Option<&'a [u8]>,
-    /// Type and bytes of chunks that glTF does not know.
+    /// Type and bytes of chunks that are neither JSON nor BIN.
     pub others: Vec<(u32, &'a [u8])>,
 }
 
-/// Splits a .glb, or takes a .gltf as it is. glTF 2.0 specification, section 4.
+/// Splits a .glb file (glTF 2.0 specification, section 4). A .gltf file is returned as its JSON.
 pub(crate) fn split<'a>(bytes: &'a [u8], notes: &mut Notes) -> Result<Container<'a>, LoadProblem> {
     if !bytes.starts_with(MAGIC) {
         let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace() && !b"\xef\xbb\xbf".contains(byte));
@@ -23,7 +24,7 @@ pub(crate) fn split<'a>(bytes: &'a [u8], notes: &mut Notes) -> Result<Container<
             let magic = String::from_utf8_lossy(bytes.get(..4).unwrap_or(bytes)).into_owned();
             return Err(LoadProblem::Magic { magic });
         }
-        // A byte order mark is not JSON, but editors write it.
+        // JSON does not allow a byte order mark, but some editors write one.
         let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         return Ok(Container { json, binary: None, others: Vec::new() });
     }
@@ -62,7 +63,8 @@ pub(crate) fn split<'a>(bytes: &'a [u8], notes: &mut Notes) -> Result<Container<
         }
         at = rest;
     }
-    // What stands after the binary chunk is nobody's of whom we know, whole or not.
+    // Chunks after the binary one are unknown to glTF. They are kept, and the first incomplete one ends the
+    // search.
     while let Ok((other, rest)) = chunk(file, at, "", &mut Notes::default()) {
         container.others.push(other);
         at = rest;
@@ -79,7 +81,7 @@ fn word(bytes: &[u8], at: usize, what: &str) -> Result<u32, LoadProblem> {
     })
 }
 
-/// The type and the bytes of the chunk at an offset, and the offset after it.
+/// The type and the bytes of the chunk at an offset, and the offset of the next chunk.
 fn chunk<'a>(
     file: &'a [u8],
     at: usize,
@@ -95,7 +97,8 @@ fn chunk<'a>(
         None => {
             let found = file.len().saturating_sub(start) as u64;
             let problem = LoadProblem::Truncated { what: what.to_owned(), needed: length as u64, found };
-            // A chunk is padded to four bytes: so many may be missing at the end without anything being lost.
+            // Chunks are padded to four bytes, so up to three bytes may be missing at the end without loss of
+            // data.
             if (length as u64).saturating_sub(found) >= 4 {
                 return Err(problem);
             }
@@ -106,8 +109,8 @@ fn chunk<'a>(
     Ok(((kind, content), end.min(file.len())))
 }
 
-/// Puts a .glb together; pads the JSON with spaces and everything else with zeros to multiples of four. `None` above 4 GiB, which the
-/// format cannot hold.
+/// Assembles a .glb file. The JSON is padded with spaces and everything else with zeros to multiples of four
+/// bytes. Returns `None` above 4 GiB, the limit of the format.
 pub(crate) fn join(json: &[u8], binary: &[u8], others: &[(u32, Vec<u8>)]) -> Option<Vec<u8>> {
     let mut chunks = vec![(JSON, json, b' ')];
     if !binary.is_empty() {

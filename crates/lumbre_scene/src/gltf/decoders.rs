@@ -1,18 +1,19 @@
-//! Decoders that a program can be built without: the extension that needs each, and what to do where it is missing. Not the decoders.
+//! The decoders that can be left out of a build: the extension that each one reads, and the remedy if it is
+//! missing.
 
-/// A decoder that is a cargo feature of this crate.
+/// A decoder that is enabled by a cargo feature of this crate.
 pub(crate) struct OptionalDecoder {
-    /// The extension that it reads.
+    /// Name of the extension that it reads.
     pub extension: &'static str,
     /// The cargo feature.
     pub feature: &'static str,
-    /// A command that writes a file without the extension.
+    /// A command that converts a file to one without the extension.
     pub remedy: &'static str,
-    /// Whether it is there.
+    /// Whether it is compiled in.
     pub built: bool,
 }
 
-/// All of them.
+/// All optional decoders.
 pub(crate) const OPTIONAL_DECODERS: [OptionalDecoder; 3] = [
     OptionalDecoder {
         extension: "KHR_draco_mesh_compression",
@@ -34,7 +35,7 @@ pub(crate) const OPTIONAL_DECODERS: [OptionalDecoder; 3] = [
     },
 ];
 
-/// The decoder of an extension, if it was left out of this program.
+/// The decoder of an extension, if it is optional and not compiled in.
 pub(crate) fn missing(extension: &str) -> Option<&'static OptionalDecoder> {
     OPTIONAL_DECODERS.iter().find(|decoder| decoder.extension == extension && !decoder.built)
 }

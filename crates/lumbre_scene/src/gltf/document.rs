@@ -1,8 +1,10 @@
-//! The JSON of a glTF 2.0 file as plain data, indices and numbers unchecked. Not its buffers, and not what it means.
+//! The JSON of a glTF 2.0 file as plain data. Types are checked, but indices and ranges are not, and buffers
+//! are not loaded.
 //!
-//! Buffers, their views, images and samplers are the `gltf` crate's own types. The others are written here: that crate keeps numbers as f32, knows
-//! neither textures without a `source` nor animations without a `node`, and forgets the values and names that it does not know
-//! (docs/decisions.md). Every list is read element by element, so that an error names the element.
+//! Buffers, buffer views, images and samplers use the types of the `gltf` crate. The other types are defined
+//! here, because that crate stores numbers as f32, requires a texture's `source` and an animation target's
+//! `node`, and drops values and names that it does not know (docs/decisions.md). Every list is parsed element
+//! by element, so that an error can name the element.
 
 use gltf::json;
 use serde::Deserialize;
@@ -222,7 +224,7 @@ pub(crate) struct PunctualSpot {
     pub outer_cone_angle: Option<f64>,
 }
 
-/// A whole file.
+/// The parsed JSON of a file.
 #[derive(Debug)]
 pub(crate) struct Document {
     pub scene: Option<usize>,
@@ -240,14 +242,14 @@ pub(crate) struct Document {
     pub animations: Vec<Animation>,
     pub skins: usize,
     pub lights: Vec<PunctualLight>,
-    /// Of each light, whether its strength is in candela or lux.
+    /// For each light, whether its intensity is in candela or lux.
     pub photometric: Vec<bool>,
     pub extensions_used: Vec<String>,
     pub extensions_required: Vec<String>,
 }
 
 impl Document {
-    /// Reads the JSON of a file; checks types and the version, not indices or ranges.
+    /// Parses the JSON of a file. Checks types and the glTF version, but not indices or ranges.
     pub(crate) fn from_root(mut root: Map<String, Value>, notes: &mut Notes) -> Result<Self, LoadProblem> {
         let at = |place: &str| {
             let place = place.to_owned();
@@ -258,7 +260,8 @@ impl Document {
             let unstated = version.is_none();
             let version = version.map_or_else(|| "unstated".to_owned(), |v| shortened(v).to_owned());
             let problem = LoadProblem::Version { version };
-            // Version 1 has objects where version 2 has lists.
+            // glTF 1 has objects where glTF 2 has lists, so lists identify version 2 if the version is not
+            // stated.
             let lists = ["nodes", "meshes", "scenes"].iter().filter_map(|list| root.get(*list));
             if !unstated || !lists.clone().any(Value::is_array) || !lists.clone().all(Value::is_array) {
                 return Err(problem);
@@ -315,12 +318,12 @@ impl Document {
     }
 }
 
-/// The JSON text of a file.
+/// Parses the JSON text of a file into an object.
 pub(crate) fn parse(json: &[u8]) -> Result<Map<String, Value>, LoadProblem> {
     serde_json::from_slice(json).map_err(|source| LoadProblem::Json { place: "JSON".to_owned(), source })
 }
 
-/// The beginning of a text from a file, short enough for a message.
+/// The first 80 characters of a text from a file, for messages.
 pub(crate) fn shortened(text: &str) -> &str {
     match text.char_indices().nth(80) {
         Some((end, _)) => &text[..end],
@@ -350,20 +353,20 @@ fn list<T: DeserializeOwned>(
     parsed.collect()
 }
 
-/// The extension `name` of an object, if it has one.
+/// The extension `name` of an object, or `None` if it has none.
 pub(crate) fn extension<T: DeserializeOwned>(
     extensions: &Extensions,
     name: &str,
     place: &str,
 ) -> Result<Option<T>, LoadProblem> {
     let Some(value) = extensions.get(name) else { return Ok(None) };
-    // By reference: no copy of a tree that may be large.
+    // Deserializing from a reference avoids copying a possibly large tree.
     T::deserialize(value)
         .map(Some)
         .map_err(|source| LoadProblem::Json { place: format!("{place}.extensions.{name}"), source })
 }
 
-/// The element that an index points at, or an error that names the field holding the index.
+/// The list element with this index, or an error that names the field holding the index.
 pub(crate) fn element<'a, T>(
     list: &'a [T],
     name: &'static str,

@@ -1,9 +1,10 @@
-//! The Draco codec, by the crate `draco-core`, within bounds that its caller states. Not where the data are in a file.
+//! Decodes Draco data with the crate `draco-core`, within limits set by the caller.
 //!
-//! `draco-core` has no unsafe code, takes its ceilings before it allocates and answered hundreds of thousands of damaged meshes without a panic;
-//! one would still not get out of here.
+//! `draco-core` has no unsafe code, checks its limits before it allocates, and decoded hundreds of thousands
+//! of damaged meshes without a panic. A panic would be caught here all the same.
 
-/// Most bytes that the attributes of a vertex have together, those included that the glTF file does not name: sixteen of four floats.
+/// Largest total size in bytes of the attributes of a vertex, including those the glTF file does not refer
+/// to: sixteen attributes of four floats.
 pub(crate) const MOST_BYTES_PER_POINT: usize = 16 * 16;
 
 #[cfg(feature = "draco")]
@@ -24,7 +25,8 @@ mod with_decoder {
     /// A decoded mesh.
     pub(crate) struct DracoMesh(Mesh);
 
-    /// Decodes a mesh of so many points and triangles; one of more is refused before it is decoded.
+    /// Decodes a mesh of at most this many points and triangles; a larger one is refused before it is
+    /// decoded.
     pub(crate) fn decode(bytes: &[u8], points: u64, triangles: u64) -> Result<DracoMesh, String> {
         let limits = DecodeLimits::default()
             .with_max_points(points)
@@ -51,7 +53,7 @@ mod with_decoder {
             self.0.num_faces()
         }
 
-        /// The vertices at the corners of the triangles, in the format of an accessor.
+        /// The vertex indices of the triangles, in the format of an accessor.
         pub(crate) fn indices(&self, format: Format) -> Result<Vec<u8>, String> {
             let mut elements = Vec::with_capacity(3 * self.triangles() * format.size());
             for corner in self.0.faces().iter().flatten() {
@@ -60,7 +62,7 @@ mod with_decoder {
             Ok(elements)
         }
 
-        /// The values of an attribute at every point, in the format of an accessor.
+        /// The values of an attribute at all points, in the format of an accessor.
         pub(crate) fn attribute(&self, number: u32, format: Format) -> Result<Vec<u8>, String> {
             let attribute = self.0.attribute_by_unique_id(number).ok_or_else(|| {
                 format!("attribute {number} is not in its Draco data; export the file again")
@@ -87,7 +89,7 @@ mod with_decoder {
         }
     }
 
-    /// The bytes of an attribute at a point.
+    /// The bytes of an attribute at one point.
     fn value(attribute: &PointAttribute, point: usize) -> Option<&[u8]> {
         let entry = attribute.mapped_index(PointIndex(u32::try_from(point).ok()?)).0 as usize;
         let size = attribute.data_type().byte_length() * usize::from(attribute.num_components());
@@ -95,7 +97,7 @@ mod with_decoder {
         attribute.buffer().data().get(start..start.checked_add(size)?)
     }
 
-    /// What glTF calls a type of numbers, where it has it.
+    /// The glTF component type of a Draco data type, if glTF has one.
     fn component(data_type: DataType) -> Option<u32> {
         match data_type {
             DataType::Int8 => Some(BYTE),
@@ -108,7 +110,7 @@ mod with_decoder {
         }
     }
 
-    /// A number of an attribute whose accessor has another type than the data.
+    /// A number to be converted, where the accessor's component type differs from the type in the data.
     #[derive(Clone, Copy)]
     enum Number {
         Whole(i64),
@@ -130,7 +132,7 @@ mod with_decoder {
         }
     }
 
-    /// Writes a number in the type of an accessor, if that can hold it.
+    /// Writes a number in the component type of an accessor, or fails if it does not fit.
     fn write(elements: &mut Vec<u8>, number: Number, component: u32) -> Result<(), String> {
         let too_large = || "has a number in its Draco data that its componentType cannot hold".to_owned();
         let whole = match number {
@@ -162,7 +164,7 @@ mod with_decoder {
 mod without_decoder {
     use crate::gltf::accessor_format::Format;
 
-    /// No mesh: there is no decoder that makes one.
+    /// Has no values: without a decoder there are no meshes.
     pub(crate) enum DracoMesh {}
 
     pub(crate) fn decode(_: &[u8], _: u64, _: u64) -> Result<DracoMesh, String> {

@@ -1,4 +1,5 @@
-//! What can be wrong with a file, by name, and what is merely worth a remark. Not the checks themselves.
+//! Errors of loading glTF files, and notes on repairs and omissions. The checks themselves are in the import
+//! modules.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -9,20 +10,21 @@ use lumbre_optics::{FogError, LightError, MaterialError};
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {}", described(file, problem))]
 pub struct LoadError {
-    /// The file, or the name given to its bytes.
+    /// Path of the file, or the name given for its bytes.
     pub file: String,
-    /// What is wrong, and where; part of the message, so that a chain of causes does not say it twice.
+    /// What is wrong, and where. It is part of this error's message and therefore not its `source`, so that
+    /// printing the chain of causes does not repeat it.
     pub problem: Box<LoadProblem>,
 }
 
 impl LoadError {
-    /// Of a file.
+    /// A problem of the file at this path.
     pub(crate) fn of(file: &std::path::Path, problem: LoadProblem) -> Self {
         Self { file: file.display().to_string(), problem: problem.into() }
     }
 }
 
-/// A problem, which does not name the file again if it is the one that cannot be read.
+/// Text of a problem, without the file's name if the problem is that this very file cannot be read.
 fn described(file: &str, problem: &LoadProblem) -> String {
     match problem {
         LoadProblem::Read { path, source } if path.display().to_string() == file => {
@@ -32,19 +34,19 @@ fn described(file: &str, problem: &LoadProblem) -> String {
     }
 }
 
-/// What is wrong with a glTF file. Places are JSON paths such as `nodes[3].mesh`.
+/// What is wrong with a glTF file. A `place` is a JSON path such as `nodes[3].mesh`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadProblem {
-    /// The file, or one that it names, cannot be read.
+    /// The file, or one that it refers to, cannot be read.
     #[error("cannot read {}: {source}; check that the file exists and may be read", path.display())]
     Read {
-        /// The file that was asked for.
+        /// Path of the file that cannot be read.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Neither binary glTF nor JSON.
+    /// The file is neither binary glTF nor JSON.
     #[error(
         "starts with {magic:?}, so it is neither a .glb (\"glTF\") nor a .gltf (JSON); export it as glTF 2.0"
     )]
@@ -52,25 +54,25 @@ pub enum LoadProblem {
         /// The first bytes, as text.
         magic: String,
     },
-    /// A version other than 2.
+    /// The glTF version is not 2.
     #[error("its glTF version is {version}; only 2.x is supported, export it again as glTF 2.0")]
     Version {
-        /// The version as the file states it.
+        /// The version stated in the file.
         version: String,
     },
-    /// The binary container ends too early.
+    /// The binary container or a buffer ends too early.
     #[error(
         "{what} needs {needed} bytes but {found} are there; the file is truncated, copy or export it again"
     )]
     Truncated {
-        /// The header, chunk or buffer.
+        /// The header, chunk or buffer that is incomplete.
         what: String,
-        /// Bytes that it claims.
+        /// Size in bytes that it claims.
         needed: u64,
-        /// Bytes that exist.
+        /// Bytes that are present.
         found: u64,
     },
-    /// A chunk of a binary glTF is not what the format wants there.
+    /// A chunk of a binary glTF is not of the type required in its position.
     #[error("{what}; export the file again")]
     Container {
         /// What is wrong.
@@ -79,35 +81,35 @@ pub enum LoadProblem {
     /// The JSON cannot be parsed, or a value has the wrong type.
     #[error("{place}: {source}; export the file again or correct this value")]
     Json {
-        /// Which object.
+        /// The object in question.
         place: String,
-        /// What the parser said.
+        /// The error of the JSON parser.
         source: serde_json::Error,
     },
-    /// The file cannot be shown without an extension that this crate does not know.
+    /// The file requires an extension that this crate does not support.
     #[error(
         "requires the extension {name}, which is not supported; export without it (supported: {supported})"
     )]
     RequiredExtension {
-        /// Its name.
+        /// Name of the extension.
         name: String,
-        /// The names of those that are supported.
+        /// Names of the supported extensions.
         supported: String,
     },
-    /// The file cannot be shown without an extension whose decoder was left out of this program.
+    /// The file requires an extension whose decoder was not compiled into this program.
     #[error(
         "requires the extension {name}, whose decoder was left out of this program; build it with the feature `{feature}` of lumbre_scene, \
          or convert the file: {remedy}"
     )]
     SwitchedOff {
-        /// Its name.
+        /// Name of the extension.
         name: String,
-        /// The cargo feature that brings the decoder.
+        /// The cargo feature that enables the decoder.
         feature: &'static str,
-        /// A command that writes the file without the extension.
+        /// A command that converts the file to one without the extension.
         remedy: &'static str,
     },
-    /// An index points at nothing.
+    /// An index is out of range.
     #[error("{place} refers to {list}[{index}], but the file has {count} {list}")]
     Reference {
         /// The field that holds the index.
@@ -122,45 +124,45 @@ pub enum LoadProblem {
     /// A node is its own ancestor.
     #[error("nodes[{node}] ({name}) is its own ancestor; nodes must form trees")]
     Cycle {
-        /// A node on the cycle.
+        /// Index of a node on the cycle.
         node: usize,
-        /// Its name.
+        /// Name of that node.
         name: String,
     },
-    /// A node hangs below two others, or twice below one.
+    /// A node is a child of two nodes, or listed twice by one.
     #[error("nodes[{node}] ({name}) is listed by {first} and by {second}; a node may have one parent only")]
     TwoParents {
-        /// The node.
+        /// Index of the node.
         node: usize,
-        /// Its name.
+        /// Name of the node.
         name: String,
-        /// Who lists it first.
+        /// The place that lists it first.
         first: String,
-        /// Who lists it again.
+        /// The place that lists it again.
         second: String,
     },
-    /// An accessor does not describe data that exists and can be used.
+    /// An accessor is invalid, or its type is not allowed in this use.
     #[error("accessors[{accessor}] ({used_by}): {problem}")]
     Accessor {
-        /// The accessor.
+        /// Index of the accessor.
         accessor: usize,
-        /// The mesh, primitive and attribute that read it.
+        /// The mesh, primitive and attribute that use it.
         used_by: String,
-        /// What is wrong and what to do.
+        /// What is wrong, and the remedy.
         problem: String,
     },
-    /// A buffer view leaves its buffer.
+    /// A buffer view exceeds its buffer.
     #[error("bufferViews[{view}]: bytes {offset} to {end} leave buffers[{buffer}], which has {length}")]
     BufferView {
-        /// The view.
+        /// Index of the view.
         view: usize,
-        /// Its first byte.
+        /// Offset of its first byte.
         offset: u64,
-        /// One past its last byte.
+        /// Offset one past its last byte.
         end: u64,
-        /// The buffer.
+        /// Index of the buffer.
         buffer: usize,
-        /// Bytes that the buffer has.
+        /// Size of the buffer in bytes.
         length: u64,
     },
     /// Compressed data cannot be decoded.
@@ -171,45 +173,45 @@ pub enum LoadProblem {
         /// What is wrong with the data.
         problem: String,
     },
-    /// A URI that is not followed, or that holds no data.
+    /// A URI must not be followed, or its data cannot be decoded.
     #[error("{place}: the URI {uri:?} {problem}")]
     Uri {
         /// The field that holds it.
         place: String,
-        /// Its first characters.
+        /// The beginning of the URI.
         uri: String,
-        /// Why it is refused and what to do.
+        /// Why it is refused, and the remedy.
         problem: String,
     },
     /// An image cannot be decoded.
     #[error("{place}: {problem}")]
     Image {
-        /// The image.
+        /// The place of the image.
         place: String,
-        /// What the decoder said and what to do.
+        /// What the decoder reports, and the remedy.
         problem: String,
     },
-    /// A number, word or combination that the field does not allow.
+    /// A number, name or combination of values that is not allowed.
     #[error("{place}: {field} is {value}; {expected}")]
     Value {
         /// The light, material, camera, node or scene, with its name.
         place: String,
         /// The field.
         field: String,
-        /// What was found.
+        /// The value found.
         value: String,
-        /// What is allowed.
+        /// The values allowed.
         expected: String,
     },
-    /// A light that cannot be evaluated.
+    /// A light has invalid parameters.
     #[error("{place}: {source}")]
     Light {
-        /// The light, or the node that carries it.
+        /// The light, or the node it belongs to.
         place: String,
         /// What is wrong with it.
         source: LightError,
     },
-    /// A material that cannot be lit.
+    /// A material has invalid parameters.
     #[error("{place}: {source}")]
     Material {
         /// The material.
@@ -217,7 +219,7 @@ pub enum LoadProblem {
         /// What is wrong with it.
         source: MaterialError,
     },
-    /// A fog that cannot be evaluated.
+    /// Fog has invalid parameters.
     #[error("{place}: {source}")]
     Fog {
         /// The scene.
@@ -225,7 +227,7 @@ pub enum LoadProblem {
         /// What is wrong with it.
         source: FogError,
     },
-    /// The decoded scene would be larger than the limit.
+    /// The decoded scene would exceed the limit.
     #[error(
         "{what} would take the decoded scene to {needed} bytes, above the limit of {limit}; \
          split the file, or raise LoadLimits::decoded_bytes"
@@ -233,9 +235,9 @@ pub enum LoadProblem {
     TooLarge {
         /// What was about to be decoded.
         what: String,
-        /// Bytes that would be needed in all.
+        /// Total size in bytes that would be needed.
         needed: u64,
-        /// The limit.
+        /// The limit in bytes.
         limit: u64,
     },
 }
@@ -243,9 +245,9 @@ pub enum LoadProblem {
 /// Something that was repaired, ignored or left out while loading or saving.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// The node, mesh, material or extension.
+    /// The node, mesh, material or extension concerned.
     pub place: String,
-    /// What was done about it.
+    /// What is wrong and what was done about it.
     pub text: String,
 }
 
@@ -255,11 +257,11 @@ impl fmt::Display for Note {
     }
 }
 
-/// Collects notes, each one once.
+/// Collects notes without duplicates.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     pub list: Vec<Note>,
-    /// Whether faults that can be repaired are.
+    /// Whether repairable faults are repaired instead of refused.
     pub lenient: bool,
 }
 
@@ -272,7 +274,8 @@ impl Notes {
         }
     }
 
-    /// Notes what is done about a problem, or refuses it where nothing may be.
+    /// Adds a note that a problem was repaired by doing `instead`, or returns the problem as an error if
+    /// repairs are not allowed.
     pub(crate) fn repair(
         &mut self,
         place: &str,
@@ -283,7 +286,7 @@ impl Notes {
             return Err(problem);
         }
         let text = problem.to_string();
-        // Most problems begin with their place.
+        // Most problems start with their place, which the note already names.
         let text = text.strip_prefix(place).map_or(text.as_str(), |rest| rest.trim_start_matches([':', ' ']));
         self.add(place, format!("{text}; {instead}"));
         Ok(())

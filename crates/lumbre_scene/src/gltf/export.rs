@@ -1,4 +1,5 @@
-//! Saving: a World as a .glb, or a .gltf with a .bin, and its lightmaps as OpenEXR and KTX2 images beside it.
+//! Saves a World as a .glb, or as a .gltf with a .bin. Baked light is written as OpenEXR and KTX2 images into
+//! a folder beside it.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -18,39 +19,40 @@ use crate::lightmap_files::{
 };
 use crate::{IrradianceVolume, Lightmap, LightmapEncoding, LightmapImage, SeparateLight};
 
-/// What is written beside what a glTF file and its OpenEXR lightmaps need.
+/// Options for the images of baked light that are written beside a glTF file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SaveOptions {
-    /// How OpenEXR images hold their texels, in place of what each lightmap says: half floats for [`LightmapEncoding::Rgb16Float`], else
-    /// 32-bit floats.
+    /// Encoding of OpenEXR images, overriding that of each lightmap: half floats for
+    /// [`LightmapEncoding::Rgb16Float`], otherwise 32-bit floats.
     pub encoding: Option<LightmapEncoding>,
-    /// Writes each lightmap as a KTX2 image too, under the name of its OpenEXR image with the extension `ktx2`.
+    /// Also writes each lightmap as a KTX2 image in this format, under the name of its OpenEXR image with the
+    /// extension `ktx2`.
     pub ktx2: Option<PackedFormat>,
-    /// How KTX2 images are compressed.
+    /// Compression of KTX2 images.
     pub supercompression: Supercompression,
 }
 
-/// An image of a lightmap or of an irradiance volume that saving wrote.
+/// An image of a lightmap or irradiance volume that was written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightmapFile {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// How it holds a texel: `rgb32f`, `rgb16f`, `rgb9e5` or `b10g11r11`.
+    /// Encoding of its texels: `rgb32f`, `rgb16f`, `rgb9e5` or `b10g11r11`.
     pub encoding: &'static str,
-    /// Its bytes.
+    /// Size of the file in bytes.
     pub bytes: u64,
-    /// What the encoding costs.
+    /// The error introduced by the encoding.
     pub error: EncodingError,
 }
 
-/// What saving wrote.
+/// The result of saving.
 #[derive(Clone, Debug, Default)]
 pub struct SaveReport {
-    /// Every file, the glTF itself last.
+    /// Every file written, the glTF file last.
     pub files: Vec<PathBuf>,
-    /// Bytes of the glTF file and its .bin.
+    /// Total size of the glTF file and its .bin in bytes.
     pub bytes: u64,
-    /// The images of lightmaps and irradiance volumes among the files.
+    /// The images of lightmaps and irradiance volumes among these files.
     pub lightmaps: Vec<LightmapFile>,
     /// What could not be expressed and was left out.
     pub notes: Vec<Note>,
@@ -60,22 +62,23 @@ pub struct SaveReport {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SaveError {
-    /// The name ends in neither .glb nor .gltf.
+    /// The output path ends in neither .glb nor .gltf.
     #[error("{} ends in neither .glb nor .gltf; name the output with one of them", path.display())]
     Extension {
-        /// The name.
+        /// The output path.
         path: PathBuf,
     },
-    /// A .glb is to become a .gltf, or the other way round, where everything is to stay as it is.
+    /// A file is to be rewritten with only its settings changed, but source and output are not both .glb or
+    /// both .gltf.
     #[error("{} is of the other kind than its source; give it the same ending, .glb or .gltf", path.display())]
     Container {
-        /// The output.
+        /// The output path.
         path: PathBuf,
     },
-    /// The file that is to be written again cannot be read.
+    /// The file to be rewritten cannot be read.
     #[error(transparent)]
     Unreadable(LoadError),
-    /// A file without a scene has no place for settings.
+    /// The file has no scene that could hold the settings.
     #[error("{} has no scene that could hold the settings; give it one", path.display())]
     NoScene {
         /// The file.
@@ -84,12 +87,12 @@ pub enum SaveError {
     /// A file cannot be written.
     #[error("cannot write {}: {source}; check the folder, its permissions and the space left", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A mesh is not valid.
+    /// A mesh is invalid.
     #[error("{place}: {source}")]
     Mesh {
         /// The entity.
@@ -97,15 +100,15 @@ pub enum SaveError {
         /// What is wrong with it.
         source: MeshError,
     },
-    /// A number is NaN or infinite, which JSON cannot hold.
+    /// A number is NaN or infinite, which JSON cannot represent.
     #[error("{place}: {field} holds a number that is NaN or infinite; correct it before saving")]
     NotFinite {
         /// The entity.
         place: String,
-        /// The component.
+        /// The component, or a field of it.
         field: String,
     },
-    /// A light that could not be loaded again.
+    /// A light is invalid and could not be loaded again.
     #[error("{place}: {source}")]
     Light {
         /// The entity.
@@ -113,7 +116,7 @@ pub enum SaveError {
         /// What is wrong with it.
         source: LightError,
     },
-    /// A material that could not be loaded again.
+    /// A material is invalid and could not be loaded again.
     #[error("{place}: {source}")]
     Material {
         /// The entity.
@@ -121,7 +124,7 @@ pub enum SaveError {
         /// What is wrong with it.
         source: MaterialError,
     },
-    /// A fog that could not be loaded again.
+    /// Fog is invalid and could not be loaded again.
     #[error("scene: {source}")]
     Fog {
         /// What is wrong with it.
@@ -132,18 +135,18 @@ pub enum SaveError {
     Image {
         /// The entity.
         place: String,
-        /// The image.
+        /// Name of the image.
         image: String,
         /// What is wrong with it.
         problem: String,
     },
-    /// The JSON cannot be written.
+    /// The JSON cannot be serialized.
     #[error("cannot write the JSON: {source}")]
     Json {
-        /// What the writer said.
+        /// The error of the serializer.
         source: serde_json::Error,
     },
-    /// A mesh is another than the one that was loaded, by more than lightmap coordinates.
+    /// A mesh differs from the one that was loaded by more than its lightmap coordinates.
     #[error(
         "{place}: its triangles are no longer those of the file, so that they cannot be written into it; save the World as a file of its own"
     )]
@@ -151,7 +154,7 @@ pub enum SaveError {
         /// The primitive.
         place: String,
     },
-    /// Data of the file that is written anew cannot be read.
+    /// Data of the source file that must be rewritten cannot be read.
     #[error("{place}: {problem}")]
     Source {
         /// The primitive.
@@ -159,26 +162,27 @@ pub enum SaveError {
         /// What is wrong with it.
         problem: Box<super::error::LoadProblem>,
     },
-    /// More than a .glb can hold.
+    /// The output exceeds the size limit of a .glb.
     #[error("{} would exceed the 4 GiB that a .glb can hold; save as .gltf", path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
 
-/// Saves every entity with a `Transform`, the scene's settings and the lightmaps.
+/// Saves every entity with a `Transform`, the scene's settings, lightmaps and irradiance volumes.
 ///
-/// The format is chosen by the extension of `path`. Textures are embedded as PNG; lightmaps lie beside as `<stem>.<node>.exr`. Files are
-/// written under temporary names first and renamed when all are complete, the glTF last.
+/// The extension of `path` selects the format. Textures are embedded as PNG. Images of baked light are
+/// written into the folder `<stem>.lightmaps` beside the file. All files are written under temporary names
+/// first and renamed when they are complete, the glTF file last.
 ///
 /// # Errors
-/// [`SaveError`] with the place and the remedy. Nothing half-written is left behind.
+/// [`SaveError`] with the place and the remedy. No incomplete file is left behind.
 pub fn save(world: &mut World, path: &Path) -> Result<SaveReport, SaveError> {
     save_with(world, path, &SaveOptions::default())
 }
 
-/// As [`save`], with choices.
+/// [`save`] with options.
 ///
 /// # Errors
 /// As [`save`].
@@ -213,7 +217,7 @@ pub fn save_with(world: &mut World, path: &Path, options: &SaveOptions) -> Resul
     Ok(SaveReport { files: files.commit()?, bytes, lightmaps: written, notes })
 }
 
-/// Whether a name is that of a .glb; not one of a .gltf.
+/// Returns true for the extension .glb and false for .gltf; other extensions are an error.
 pub(crate) fn is_glb(path: &Path) -> Result<bool, SaveError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     match extension.as_deref() {
@@ -223,7 +227,7 @@ pub(crate) fn is_glb(path: &Path) -> Result<bool, SaveError> {
     }
 }
 
-/// Writes the images of lightmaps and irradiance volumes into their folder beside the file that shows them.
+/// Writes the images of lightmaps and irradiance volumes into their folder beside the glTF file at `path`.
 pub(crate) fn write_lightmaps(
     lightmaps: &LightmapFiles,
     path: &Path,
@@ -270,7 +274,7 @@ pub(crate) fn write_lightmaps(
     Ok(written)
 }
 
-/// The JSON and the binary data of a file.
+/// The JSON and the binary data of a file, and the notes.
 fn document(nodes: Nodes, scene: Option<Value>, bin_name: Option<&str>) -> (Value, Vec<u8>, Vec<Note>) {
     let Nodes { nodes, roots, meshes, materials, lights, cameras, data, notes } = nodes;
     let mut root = Map::new();
@@ -306,7 +310,7 @@ fn document(nodes: Nodes, scene: Option<Value>, bin_name: Option<&str>) -> (Valu
         ("samplers", data.samplers),
         ("textures", data.textures),
     ] {
-        // The specification allows no empty lists.
+        // The glTF specification does not allow empty lists.
         if !list.is_empty() {
             root.insert(name.to_owned(), list.into());
         }
@@ -323,7 +327,7 @@ fn document(nodes: Nodes, scene: Option<Value>, bin_name: Option<&str>) -> (Valu
     (root, data.binary, notes)
 }
 
-/// The names of all extensions below a value, the application's own data (`extras`) aside.
+/// Collects the names of all extensions in a value, except in application data (`extras`).
 fn extensions_in(value: &Value, used: &mut HashSet<String>) {
     match value {
         Value::Object(object) => {
@@ -340,9 +344,9 @@ fn extensions_in(value: &Value, used: &mut HashSet<String>) {
     }
 }
 
-/// Lightmap images to be written, each once, into a folder of their own under names that do not collide.
+/// The images of baked light to be written, each once, with unique names in a folder of their own.
 pub(crate) struct LightmapFiles {
-    /// The folder's name, beside the file that shows them.
+    /// Name of the folder, which lies beside the glTF file.
     folder: String,
     encoding: Option<LightmapEncoding>,
     known: HashMap<*const LightmapImage, usize>,
@@ -352,13 +356,13 @@ pub(crate) struct LightmapFiles {
 }
 
 impl LightmapFiles {
-    /// Of a file `<stem>.glb` the folder is `<stem>.lightmaps`.
+    /// The folder for a file `<stem>.glb` is `<stem>.lightmaps`.
     pub(crate) fn new(stem: &str, encoding: Option<LightmapEncoding>) -> Self {
         let (images, volumes, names) = Default::default();
         Self { folder: format!("{stem}.lightmaps"), encoding, known: HashMap::new(), images, volumes, names }
     }
 
-    /// The extension object for a node that shows an image.
+    /// The `LUMBRE_lightmap` object for a node that uses an image.
     pub(crate) fn reference(
         &mut self,
         image: &Arc<LightmapImage>,
@@ -368,7 +372,7 @@ impl LightmapFiles {
         let known = match self.known.get(&Arc::as_ptr(image)) {
             Some(&known) => known,
             None => {
-                // An atlas is that of several nodes.
+                // An atlas is shared by several nodes, so it keeps its own name.
                 let atlas = image.name.split('.').next().filter(|name| name.starts_with("atlas-"));
                 let name = self.file_name(atlas.or(node), index, "exr");
                 self.known.insert(Arc::as_ptr(image), self.images.len());
@@ -384,7 +388,7 @@ impl LightmapFiles {
         json!({"image": self.uri(&self.images[known].0), "texCoord": 1, "encoding": encoding})
     }
 
-    /// The extension object for a node with an irradiance volume.
+    /// The `LUMBRE_irradiance_volume` object for a node with a volume.
     pub(crate) fn volume_reference(
         &mut self,
         volume: &IrradianceVolume,
@@ -401,7 +405,8 @@ impl LightmapFiles {
         reference
     }
 
-    /// The direct and the bounced light of the images beside them, where the World has it. Last: nothing names these files.
+    /// Adds the separate direct and bounced light of the lightmaps added so far, where the World has it.
+    /// Called last, since no node refers to these files.
     pub(crate) fn add_separate_light(&mut self, world: &mut World) {
         let mut query = world.query::<(&Lightmap, &SeparateLight)>();
         let separate: HashMap<_, _> =
@@ -417,28 +422,28 @@ impl LightmapFiles {
         self.images.extend(files);
     }
 
-    /// Where an image lies, as the file that shows it names it.
+    /// The URI of an image, relative to the glTF file.
     fn uri(&self, name: &str) -> String {
         uri::percent_encoded_path(&Path::new(&self.folder).join(name))
     }
 
-    /// A name that no other image of the file has, whatever its extension.
+    /// A file name whose stem is not used by any other image.
     fn file_name(&mut self, node: Option<&str>, index: usize, extension: &str) -> String {
         let number = index.to_string();
-        // Names become file names: only what every file system takes.
+        // The name comes from a node, so it is reduced to characters that every file system allows.
         let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
         let label: String =
             node.filter(|name| !name.is_empty()).unwrap_or(&number).chars().take(64).map(plain).collect();
         let candidates =
             std::iter::once(label.clone()).chain((index..).map(|number| format!("{label}.{number}")));
-        // Case counts on some file systems only.
+        // Compared in lower case, since some file systems ignore case.
         let name =
             candidates.into_iter().find(|name| self.names.insert(name.to_lowercase())).unwrap_or_default();
         format!("{name}.{extension}")
     }
 }
 
-/// Where marks stand: the first of each run, and how many.
+/// Run-length encodes the indices of true flags as pairs of first index and count.
 fn runs(marks: &[bool]) -> Vec<usize> {
     let mut runs = Vec::new();
     let mut first = 0;

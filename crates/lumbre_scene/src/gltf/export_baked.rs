@@ -1,4 +1,5 @@
-//! Saving a baked file: the artist's file as it was, and the light. Not the images of the light, nor Worlds that came from no file.
+//! Saves a baked file: the artist's file as it was, with baked light added. Worlds that were not loaded from
+//! a file are saved by `export`.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
@@ -25,25 +26,27 @@ use super::vertex_data::NewData;
 use super::{beside, container, import_scene, uri};
 use crate::{IrradianceVolume, Lightmap, LightmapImage, Mesh, Name, Primitive, SceneSettings, Transform};
 
-/// Writes a file anew with the light that a bake has given to the World it was loaded into.
+/// Writes a file again with the light that was baked for the World it was loaded into.
 ///
-/// Everything of the file is kept, what this crate does not understand included. Changed or added are, and recorded in the extension
-/// `LUMBRE_bake` of the file:
+/// Everything in the file is kept, including what this crate does not understand. The following is changed or
+/// added, and recorded in the file's extension `LUMBRE_bake`:
 ///
-/// - `LUMBRE_lightmap` of nodes, and `TEXCOORD_1` of their meshes. Where charts meet, vertices are split with all their attributes and
-///   morph targets; indices are then written anew. A `TEXCOORD_1` that is in the way moves to another set, and materials follow. Nodes
-///   that share a mesh and need different coordinates get meshes of their own.
-/// - `"bake": "static"` of lights whose light is in the maps.
-/// - `LUMBRE_irradiance_volume` of nodes, and new nodes for volumes that had none.
-/// - `LUMBRE_scene.sky`, if the World's is another.
+/// - `LUMBRE_lightmap` of nodes, and `TEXCOORD_1` of their meshes. Where charts meet, vertices are split with
+///   all their attributes and morph targets, and the indices are rewritten. A `TEXCOORD_1` in use moves to
+///   another set, and the materials are adapted. Nodes that share a mesh but need different coordinates get
+///   meshes of their own.
+/// - `"bake": "static"` of lights whose light is in the lightmaps.
+/// - `LUMBRE_irradiance_volume` of nodes, and new nodes for volumes without one.
+/// - `LUMBRE_scene.sky`, if the World's sky differs.
 /// - `extensionsUsed`.
 ///
-/// New data lie behind the old, so that indices of the file stay valid. Nothing else of the World is written. A .gltf keeps its buffers
-/// and gets one more, `<stem>.bake.bin`; from .gltf to .glb the first buffer becomes the binary chunk, from .glb to .gltf the chunk becomes
-/// `<stem>.bin`. Files that the JSON names are copied beside an output in another folder.
+/// New data is appended, so that existing indices stay valid. Nothing else of the World is written. A .gltf
+/// keeps its buffers and gets one more, `<stem>.bake.bin`. From .gltf to .glb the first buffer becomes the
+/// binary chunk; from .glb to .gltf the chunk becomes `<stem>.bin`. If the output is in another folder, the
+/// files that the JSON refers to are copied there.
 ///
 /// # Errors
-/// [`SaveError`] with the place and the remedy. Nothing half-written is left behind.
+/// [`SaveError`] with the place and the remedy. No incomplete file is left behind.
 pub fn save_baked(
     world: &mut World,
     source: &SourceFile,
@@ -87,9 +90,9 @@ pub fn save_baked(
         }
     }
     let failed = |source| SaveError::Json { source };
-    // Where the file lies is no part of the bake: what follows is not recorded.
+    // What follows depends on where the output lies. It is not part of the bake and thus not recorded.
     let mut root = patch.finish().map_err(failed)?;
-    // In a .glb the first buffer is the chunk; in a .gltf what was a chunk is a file.
+    // In a .glb the first buffer is the binary chunk; in a .gltf a former chunk becomes a file.
     let chunk_name = format!("{stem}.bin");
     let was_chunk = source.document.buffers.first().is_some_and(|first| first.uri.is_none());
     let mut chunk = Vec::new();
@@ -131,17 +134,17 @@ pub fn save_baked(
     Ok(SaveReport { files: files.commit()?, bytes, lightmaps: written, notes: notes.list })
 }
 
-/// A baked file in the making.
+/// State of writing a baked file.
 struct Baked<'a> {
     source: &'a SourceFile,
     patch: Patch,
     lightmaps: LightmapFiles,
     primitives: Primitives<'a>,
-    /// Extensions that were written.
+    /// Names of the extensions written.
     used: HashSet<&'static str>,
 }
 
-/// What a node shows of its mesh: the primitives that get lightmap coordinates, by their index.
+/// The primitives of a node's mesh that get lightmap coordinates, as JSON by index.
 type Shown = BTreeMap<usize, Value>;
 
 impl Baked<'_> {
@@ -149,7 +152,7 @@ impl Baked<'_> {
         &self.source.document
     }
 
-    /// The nodes that are shown, with their entities.
+    /// The nodes whose entities are in the World.
     fn entities(&self, world: &World) -> Vec<(usize, Entity)> {
         let nodes = self.source.nodes.iter().copied().enumerate();
         nodes.filter(|(_, entity)| world.get_entity(*entity).is_ok()).collect()
@@ -197,7 +200,8 @@ impl Baked<'_> {
         Ok(())
     }
 
-    /// Writes the primitives into their meshes, or into copies where nodes that share a mesh differ.
+    /// Writes the changed primitives into their meshes, or into copies of a mesh where nodes that share it
+    /// differ.
     fn share(&mut self, shown: &BTreeMap<usize, Shown>) {
         let mut users: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (node, of) in self.source.document.nodes.iter().enumerate() {
@@ -245,7 +249,7 @@ impl Baked<'_> {
         }
     }
 
-    /// Says of every light whose light is in the maps that it is.
+    /// Marks every light whose light is in the lightmaps as static.
     fn lights(&mut self, world: &World) {
         if !self.used.contains("LUMBRE_lightmap") {
             return;
@@ -311,7 +315,8 @@ impl Baked<'_> {
             with_volume.insert(number);
             self.used.insert("LUMBRE_irradiance_volume");
         }
-        // Those of a former bake that the file does not know for its own.
+        // Volumes no longer in the World, such as those of an earlier bake whose record did not match the
+        // file.
         for node in (0..self.source.nodes.len()).filter(|node| !with_volume.contains(node)) {
             if self.source.nodes[node] != Entity::PLACEHOLDER {
                 self.patch.remove(&place!["nodes", node, "extensions", "LUMBRE_irradiance_volume"]);
@@ -320,7 +325,7 @@ impl Baked<'_> {
         Ok(())
     }
 
-    /// Puts a new node into the scene that is shown.
+    /// Adds a new node to the default scene.
     fn show(&mut self, node: usize) {
         let scene = self.scene();
         let at = place!["scenes", scene, "nodes"];
@@ -329,7 +334,7 @@ impl Baked<'_> {
         self.patch.set(&at, nodes.into());
     }
 
-    /// The scene that is shown; one of all nodes is made where the file has none.
+    /// The default scene. If the file has no scenes, one with all root nodes is added.
     fn scene(&mut self) -> usize {
         if self.document().scenes.is_empty() && self.patch.get(&place!["scenes", 0]).is_none() {
             let shown = hierarchy(self.document(), &mut Notes::default());
@@ -340,7 +345,7 @@ impl Baked<'_> {
         self.document().scene.unwrap_or(0)
     }
 
-    /// The sky, if it was changed since the file was loaded.
+    /// Writes the sky if it was changed since the file was loaded.
     fn sky(&mut self, world: &World) -> Result<(), SaveError> {
         let Some(settings) = world.get_resource::<SceneSettings>() else { return Ok(()) };
         let scene = self.document().scene.unwrap_or(0);
@@ -378,7 +383,7 @@ impl Baked<'_> {
     }
 }
 
-/// The primitives of a node's mesh that have a lightmap: index, triangles and image.
+/// The primitives of a node's mesh that have a lightmap, as (index, triangles, image).
 fn lightmapped_parts(world: &World, node: Entity) -> Vec<(usize, Arc<TriangleMesh>, Arc<LightmapImage>)> {
     let children = world.get::<crate::Children>(node).into_iter().flat_map(|children| children.iter());
     let parts = children.filter_map(|part| {

@@ -1,4 +1,4 @@
-//! The binary side of a file being written: buffer views, accessors, meshes, images. Not the scene.
+//! The binary data of a file being written: buffer views, accessors, meshes and images.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use super::export::SaveError;
 use super::texture_sets::LIGHTMAP_COORDINATES;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
 
-/// Data of the file so far; equal things are written once.
+/// The data collected so far; equal items are written once.
 #[derive(Default)]
 pub(crate) struct Data {
     pub binary: Vec<u8>,
@@ -52,7 +52,8 @@ impl Data {
         self.accessors.len() - 1
     }
 
-    /// `attributes` and `indices` of a primitive; meshes that share their `Arc` share accessors. The caller keeps the mesh alive.
+    /// The `attributes` and `indices` of a primitive. Meshes that share their `Arc` share accessors. The
+    /// caller must keep the mesh alive, since it is identified by its address.
     pub(crate) fn geometry(&mut self, mesh: &Arc<TriangleMesh>, place: &str) -> Result<Value, SaveError> {
         if let Some(known) = self.geometries.get(&Arc::as_ptr(mesh)) {
             return Ok(known.clone());
@@ -77,7 +78,7 @@ impl Data {
         }
         attributes.insert("POSITION".to_owned(), positions.into());
         if !mesh.normals.is_empty() {
-            // A triangle without an area has no normal, but glTF has no vertex without one.
+            // A vertex of degenerate triangles has a zero normal, which glTF does not allow.
             let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
             if missing > 0 {
                 self.notes.add(place, format!("{missing} normals are zero; they are written as (0, 1, 0)"));
@@ -87,7 +88,7 @@ impl Data {
             let accessor = self.floats(normals, "VEC3", count);
             attributes.insert("NORMAL".to_owned(), accessor.into());
         }
-        // The format knows no tangents without a direction; a reader makes its own.
+        // glTF does not allow zero tangents. Without the attribute, a reader computes its own.
         if !mesh.tangents.is_empty() && mesh.tangents.iter().all(|tangent| tangent.truncate() != Vec3::ZERO) {
             let accessor = self.floats(mesh.tangents.iter().flat_map(|v| v.to_array()), "VEC4", count);
             attributes.insert("TANGENT".to_owned(), accessor.into());
@@ -108,7 +109,7 @@ impl Data {
             let accessor = self.floats(mesh.colors.iter().flat_map(|v| v.to_array()), "VEC4", count);
             attributes.insert("COLOR_0".to_owned(), accessor.into());
         }
-        // The largest index of a type restarts primitives, and is not a vertex.
+        // The largest index of a type is the primitive restart value and must not be a vertex.
         let short = count < usize::from(u16::MAX);
         let bytes: Vec<u8> = if short {
             mesh.indices.iter().flat_map(|&index| (index as u16).to_le_bytes()).collect()

@@ -1,6 +1,7 @@
-//! Writing several files so that each is under its final name whole or not at all. Not what is in them.
+//! Writes several files so that each appears under its final name only when it is complete.
 //!
-//! Of what a process is writing one file is locked: `.partial` files of which none is were left by one that was killed, and go.
+//! A process keeps a lock on one of the `.partial` files it is writing. If none of a process's `.partial`
+//! files in a folder is locked, the process was killed, and the files are removed.
 
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsString;
@@ -10,20 +11,21 @@ use std::path::{Path, PathBuf};
 
 use super::export::SaveError;
 
-/// Files written beside their final names; dropping it removes what was not committed.
+/// Files written under temporary names. Dropping this removes everything that was not committed.
 #[derive(Default)]
 pub(crate) struct Files {
-    /// (temporary, final)
+    /// (temporary path, final path)
     waiting: Vec<(PathBuf, PathBuf)>,
-    /// One of the temporary ones, locked so that no other process takes them for left over.
+    /// One of the temporary files, locked so that other processes do not remove them.
     held: Option<File>,
-    /// Folders that were looked through for what was left over.
+    /// Folders already searched for leftover temporary files.
     tidied: HashSet<PathBuf>,
-    /// Folders that were not there.
+    /// Folders that were created.
     made: Vec<PathBuf>,
 }
 
-/// The process in a name that [`Files`] gives to what is not finished: `.NAME.PROCESS-ATTEMPT.partial`.
+/// The process id in the name of a temporary file of [`Files`], `.NAME.PROCESS-ATTEMPT.partial`; `None` for
+/// other names.
 fn writer(name: &str) -> Option<&str> {
     let own = name.strip_prefix('.')?.strip_suffix(".partial")?;
     let (process, attempt) = own.rsplit_once('.')?.1.split_once('-')?;
@@ -31,12 +33,13 @@ fn writer(name: &str) -> Option<&str> {
     (number(process) && number(attempt)).then_some(process)
 }
 
-/// Removes what killed processes have left half-written in a folder. That it cannot is no reason not to write.
+/// Removes temporary files that killed processes left in a folder. Failures are ignored, as they do not
+/// prevent writing.
 fn tidy(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     let mut by_process: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for entry in entries.flatten() {
-        // A link or a pipe is not ours, and opening it might wait for ever.
+        // Skip links and pipes: this module never creates any, and opening a pipe might block for ever.
         if entry.file_type().is_ok_and(|kind| kind.is_file())
             && let Some(process) = entry.file_name().to_str().and_then(writer)
         {
@@ -53,14 +56,14 @@ fn tidy(folder: &Path) {
 }
 
 impl Files {
-    /// Makes a folder if it is not there, and its own folder is; if it cannot be made, writing into it says why.
+    /// Creates a folder in an existing one. Failures are ignored here; writing into the folder reports them.
     pub(crate) fn make_folder(&mut self, folder: &Path) {
         if fs::create_dir(folder).is_ok() {
             self.made.push(folder.to_owned());
         }
     }
 
-    /// Writes a file beside `path`.
+    /// Writes a file under a temporary name beside `path`.
     pub(crate) fn write(&mut self, path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
         let failed = |source| SaveError::Write { path: path.to_owned(), source };
         let Some(name) = path.file_name() else {
@@ -83,7 +86,8 @@ impl Files {
             let temporary = path.with_file_name(hidden);
             match OpenOptions::new().write(true).create_new(true).open(&temporary) {
                 Ok(mut file) => {
-                    // Another process that tidies may have been quicker than the lock. Where there are no locks nobody tidies.
+                    // Another process may have removed the file before it was locked. Without support for
+                    // locks nothing is removed.
                     if self.held.is_none()
                         && (matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !temporary.exists())
                     {
@@ -105,10 +109,10 @@ impl Files {
         )))
     }
 
-    /// Gives every file its final name, in the order they were written.
+    /// Renames all files to their final names, in the order in which they were written.
     pub(crate) fn commit(mut self) -> Result<Vec<PathBuf>, SaveError> {
         let mut done = Vec::new();
-        // The first is soon no temporary file any more: the last is locked as well.
+        // Renaming the first file ends the protection by its lock, so the last one is locked as well.
         let last = self.waiting.last().and_then(|(temporary, _)| File::open(temporary).ok());
         let _ = last.as_ref().map(File::try_lock);
         while !self.waiting.is_empty() {
@@ -123,11 +127,11 @@ impl Files {
 impl Drop for Files {
     fn drop(&mut self) {
         for (temporary, _) in &self.waiting {
-            // Nothing more can be done about a file that cannot be removed either.
+            // A failure is ignored, since nothing more can be done.
             let _ = fs::remove_file(temporary);
         }
         for folder in &self.made {
-            // Only if nothing is in it.
+            // Fails, as it should, if the folder is not empty.
             let _ = fs::remove_dir(folder);
         }
     }

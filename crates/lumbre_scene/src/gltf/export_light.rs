@@ -1,4 +1,4 @@
-//! `Light` into KHR_lights_punctual, with LUMBRE_lights_phong beside it where that cannot say everything.
+//! Exports a `Light` as KHR_lights_punctual, plus LUMBRE_lights_phong for what that cannot express.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -12,7 +12,8 @@ use super::export_material::color;
 use super::extensions::{PhongLight, PhongSpot};
 use super::import_light;
 
-/// The JSON of a light. The KHR keys come as near to it as they can, for other programs; our own say it exactly.
+/// The JSON of a light. The KHR keys approximate it for other programs; LUMBRE_lights_phong states it
+/// exactly.
 pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Value, SaveError> {
     light
         .validate(name.unwrap_or(place))
@@ -26,7 +27,7 @@ pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Va
     written["type"] = match (light.kind, light.spot) {
         (LightKind::Directional, _) => "directional",
         (LightKind::Point, Some(_)) => "spot",
-        // Other programs know no ambient light; a dark one does no harm there.
+        // glTF has no ambient light. Other programs see a black point light instead, which does no harm.
         (LightKind::Point | LightKind::Ambient, _) => "point",
     }
     .into();
@@ -34,7 +35,7 @@ pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Va
         written["range"] = json!(f64::from(light.attenuation.range));
     }
     if let (LightKind::Point, Some(cone)) = (light.kind, light.spot) {
-        // KHR wants outer within (0, π/2] and inner less than outer.
+        // KHR requires an outer angle in (0, π/2] and an inner angle less than that.
         let outer = cone.outer_angle().clamp(1e-3, FRAC_PI_2);
         let inner = match cone {
             SpotCone::Smooth { inner, .. } => inner.min(outer.next_down()),
@@ -45,7 +46,8 @@ pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Va
     }
     let reread = PunctualLight::deserialize_value(&written)
         .and_then(|source| import_light::light(&source, place).ok());
-    // A static light is marked as such in so many words: that is how a baked file says what is in its lightmaps.
+    // A static light is always marked explicitly, since a baked file states by this what its lightmaps
+    // contain.
     if reread.as_ref() != Some(light) || light.bake == BakeMode::Static {
         let phong = serde_json::to_value(phong(light, reread.and_then(|light| light.spot)));
         let phong = phong.map_err(|source| SaveError::Json { source })?;
@@ -54,7 +56,7 @@ pub(crate) fn light(light: &Light, name: Option<&str>, place: &str) -> Result<Va
     Ok(written)
 }
 
-/// LUMBRE_lights_phong, its cone left out where KHR_lights_punctual says the same.
+/// The LUMBRE_lights_phong object. The cone is left out if KHR_lights_punctual expresses it exactly.
 pub(crate) fn phong(light: &Light, khr_spot: Option<SpotCone>) -> PhongLight {
     let attenuation = &light.attenuation;
     let spot = light.spot.filter(|cone| Some(*cone) != khr_spot).map(|cone| match cone {

@@ -1,4 +1,5 @@
-//! `Material` and its textures into a glTF material, with LUMBRE_materials_phong where metallic-roughness cannot say it.
+//! Exports a `Material` and its textures as a glTF material, plus LUMBRE_materials_phong for what
+//! metallic-roughness cannot express.
 
 use glam::Vec3;
 use lumbre_optics::{AlphaMode, Fresnel, Lobe, Material, Surface, shininess_from_roughness};
@@ -10,7 +11,8 @@ use super::extensions::{PhongMaterial, PhongSurface};
 use super::import_material::{default_lobe, front_from_metallic_roughness};
 use crate::{MaterialTextures, Medium};
 
-/// The JSON of a material. Without our extension it reads back the same, or the extension is there.
+/// The JSON of a material. LUMBRE_materials_phong is written only if the material would not be read back
+/// identically without it.
 pub(crate) fn material(
     (material, medium): (&Material, Option<Medium>),
     textures: &MaterialTextures,
@@ -25,7 +27,7 @@ pub(crate) fn material(
     }
     let mut extensions = Map::new();
     let emission = material.front.emission;
-    // A power of two, so that factor times strength is the same f32 again.
+    // A power of two, so that multiplying factor and strength restores the same f32.
     let strength =
         if emission.max_element() > 1.0 { emission.max_element().log2().ceil().exp2() } else { 1.0 };
     let (factor, strength) =
@@ -50,7 +52,7 @@ pub(crate) fn material(
     let plain = front_from_metallic_roughness(base, metallic, roughness, emission, material.unlit);
     let exact = textures.metallic_roughness.is_some() || plain == material.front;
     let defaults = Material::default();
-    // What a reader takes where nothing is said: as in `import_material`.
+    // The default of a reader for a material without the extension, as in `import_material`.
     let textured = textures.metallic_roughness.is_some();
     let plain_fresnel = material.fresnel == Fresnel::NormalReflectance;
     let beyond = material.back.is_some()
@@ -63,7 +65,7 @@ pub(crate) fn material(
         || !plain_fresnel;
     if !exact || beyond {
         let front = if textures.metallic_roughness.is_some() {
-            // Naming coefficients would replace the texture.
+            // Stating coefficients would replace the metallic-roughness texture on import.
             PhongSurface::default()
         } else {
             surface(&material.front)
@@ -166,8 +168,8 @@ fn surface(surface: &Surface) -> PhongSurface {
     }
 }
 
-/// Base colour, metallic and roughness of which a surface is the image under the mapping; where it is none, a dielectric with its diffuse
-/// colour and its exponent.
+/// Base colour, metallic and roughness that import maps to exactly this surface. If there are none, a
+/// dielectric with the surface's diffuse colour and exponent.
 fn metallic_roughness(front: &Surface, unlit: bool) -> (Vec3, f32, f32) {
     let base = front.ambient;
     let strongest = base.max_position();
@@ -188,7 +190,8 @@ fn metallic_roughness(front: &Surface, unlit: bool) -> (Vec3, f32, f32) {
     if fits { (base, metallic.0, roughness.0) } else { (front.diffuse, 0.0, roughness.0) }
 }
 
-/// The number in [0, 1] within a few roundings of `start` that `matches`, and whether there is one.
+/// Searches for a number in [0, 1], within a few roundings of `start`, for which `matches` is true. Returns
+/// it with true, or `start` with false if there is none.
 fn nearest(start: f32, matches: impl Fn(f32) -> bool) -> (f32, bool) {
     let start = if start.is_nan() { 0.0 } else { start.clamp(0.0, 1.0) };
     let (mut below, mut above) = (start, start);

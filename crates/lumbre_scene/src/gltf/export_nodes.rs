@@ -1,4 +1,5 @@
-//! Entities into nodes: the hierarchy, primitives gathered into meshes again, and what hangs on each node.
+//! Converts entities to nodes: the hierarchy, primitives merged into meshes again, and the extensions of each
+//! node.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -19,7 +20,7 @@ use crate::{
     LightmapImage, LightmapScale, MaterialTextures, Medium, Mesh, Primitive, Quadric, Transform,
 };
 
-/// The lists of a file being written.
+/// The JSON lists of a file being written.
 #[derive(Default)]
 pub(crate) struct Nodes {
     pub nodes: Vec<Value>,
@@ -32,7 +33,8 @@ pub(crate) struct Nodes {
     pub notes: Vec<Note>,
 }
 
-/// What a mesh shows that glTF says per node: primitives that differ in it need nodes of their own.
+/// Properties of a primitive's entity that glTF states per node. Primitives that differ in them need separate
+/// nodes.
 #[derive(Clone, PartialEq)]
 struct Appearance {
     shading: Option<Shading>,
@@ -45,10 +47,10 @@ struct Appearance {
     dynamic: bool,
 }
 
-/// The triangle mesh and the material of each primitive.
+/// The triangle mesh and the material index of each primitive of a glTF mesh.
 type Parts = Vec<(*const TriangleMesh, usize)>;
 
-/// Materials written so far, and meshes by what they are made of.
+/// Materials written so far, and meshes by their name and parts.
 #[derive(Default)]
 struct Known {
     materials: Vec<(Material, MaterialTextures, Option<Medium>, Arc<str>)>,
@@ -56,11 +58,11 @@ struct Known {
 }
 
 impl Nodes {
-    /// Reads the whole World.
+    /// Converts all entities of a World that have a transform.
     pub(crate) fn collect(world: &mut World, lightmaps: &mut LightmapFiles) -> Result<Self, SaveError> {
         let mut entities: Vec<Entity> =
             world.query_filtered::<Entity, With<Transform>>().iter(world).collect();
-        // In the order they were spawned, which is that of the file they came from.
+        // Sorted by spawn order, which is the order of the file they came from.
         entities.sort_unstable_by_key(|entity| entity.index_u32());
         let mut notes = Notes::default();
         let has_transform: HashSet<Entity> = entities.iter().copied().collect();
@@ -109,7 +111,8 @@ impl Nodes {
                     None => groups.push((appearance, vec![entity])),
                 }
             }
-            // The node itself shows the first group that moves as it does; nodes below it show the others.
+            // The first group with the node's own mobility is attached to the node itself; the others get
+            // child nodes.
             let own = groups.iter().position(|(appearance, _)| appearance.dynamic == dynamic);
             let own = own.map(|own| groups.remove(own));
             let name = world.get::<Name>(entity).map(|name| name.as_str().to_owned());
@@ -173,7 +176,7 @@ impl Nodes {
         Ok(result)
     }
 
-    /// A node without its mesh and children.
+    /// The JSON of a node, without its mesh and children.
     fn node(
         &mut self,
         world: &World,
@@ -308,7 +311,7 @@ impl Nodes {
     }
 }
 
-/// Translation, rotation and scale of a node, those that are not the identity's.
+/// Writes translation, rotation and scale of a node, except those equal to the identity's.
 pub(crate) fn transform_keys(node: &mut Map<String, Value>, transform: &Transform) {
     let identity = Transform::IDENTITY;
     if transform.translation != identity.translation {
@@ -322,7 +325,7 @@ pub(crate) fn transform_keys(node: &mut Map<String, Value>, transform: &Transfor
     }
 }
 
-/// Whether an entity is nothing but a primitive of its parent's mesh.
+/// Returns true if an entity is nothing but a primitive of its parent's mesh.
 fn is_primitive(world: &World, entity: Entity) -> bool {
     world.get::<Primitive>(entity).is_some()
         && world.get::<Mesh>(entity).is_some()

@@ -1,4 +1,4 @@
-//! Scene settings and cameras into JSON.
+//! Exports scene settings and cameras as JSON.
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -11,7 +11,7 @@ use super::extensions::{FogExtension, SceneExtension};
 use super::frame_settings;
 use crate::{Camera, Projection, SceneSettings};
 
-/// LUMBRE_scene; nothing where the World has only the default settings.
+/// The LUMBRE_scene object, or `None` if all settings are the defaults.
 pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
     let settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
     if settings == SceneSettings::default() {
@@ -66,7 +66,7 @@ pub(crate) fn settings(world: &World) -> Result<Option<Value>, SaveError> {
     serde_json::to_value(written).map(Some).map_err(|source| SaveError::Json { source })
 }
 
-/// A glTF camera.
+/// The JSON of a camera.
 pub(crate) fn camera(camera: &Camera, place: &str) -> Result<Value, SaveError> {
     let (written, numbers) = match camera.projection {
         Projection::Perspective { vertical_fov, aspect, near, far } => {

@@ -1,4 +1,5 @@
-//! A file with other settings, and everything else as it was, byte for byte: baked light, animations, what Lumbre does not know. Not a World that is saved.
+//! Rewrites a file with changed settings and everything else preserved: buffers, baked light, animations and
+//! what Lumbre does not understand. No World is involved.
 
 use std::path::Path;
 
@@ -11,22 +12,24 @@ use super::export_files::Files;
 use super::{beside, container, document, frame_settings, uri};
 use crate::FrameSettings;
 
-/// What [`save_settings`] changes.
+/// The settings that [`save_settings`] writes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FileSettings {
-    /// Of objects that choose none (`LUMBRE_scene.shading`).
+    /// Shading of objects that do not set their own (`LUMBRE_scene.shading`).
     pub shading: Shading,
-    /// Whether lights that cast shadows in frames go on to do so (`LUMBRE_lights_phong.shadow`).
+    /// Whether lights that cast shadows keep doing so (`LUMBRE_lights_phong.shadow`).
     pub shadows: bool,
-    /// What frames are to spend (`LUMBRE_scene.frame`), in place of what the file says of that.
+    /// Frame settings (`LUMBRE_scene.frame`), which replace those of the file.
     pub frame: FrameSettings,
 }
 
-/// Writes a .glb or .gltf again with these settings. In another folder the files that it names are copied beside it.
+/// Writes a .glb or .gltf file again with these settings. If the output is in another folder, the files that
+/// it refers to are copied there.
 ///
 /// # Errors
-/// [`SaveError::Unreadable`] where the file cannot be read, [`SaveError::Container`] where a .glb would have to become a .gltf or the other way round,
-/// [`SaveError::NoScene`] where there is nothing that holds the settings; or as [`save`](super::save()). Nothing half-written is left behind.
+/// [`SaveError::Unreadable`] if the file cannot be read, [`SaveError::Container`] if source and output are
+/// not both .glb or both .gltf, [`SaveError::NoScene`] if the file has no scene; otherwise as
+/// [`save`](super::save()). No incomplete file is left behind.
 pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Result<SaveReport, SaveError> {
     let unread = |problem: LoadProblem| SaveError::Unreadable(LoadError::of(source, problem));
     let mut notes = Notes::default();
@@ -68,7 +71,7 @@ pub fn save_settings(source: &Path, path: &Path, settings: FileSettings) -> Resu
     Ok(SaveReport { files: files.commit()?, bytes, lightmaps: Vec::new(), notes: notes.list })
 }
 
-/// In the scene that is shown; nothing where there is none.
+/// Sets shading and frame settings of the default scene, or returns `None` if there is no such scene.
 fn set_scene(root: &mut Value, shading: Shading, frame: Option<Value>) -> Option<()> {
     let shown = root.get("scene").and_then(Value::as_u64).unwrap_or(0);
     let scene = root.pointer_mut(&format!("/scenes/{shown}"))?.as_object_mut()?;

@@ -1,7 +1,9 @@
-//! The JSON of the LUMBRE_* extensions, as read and as written. Not what the keys mean: that is `import_*` and `export_*`.
+//! The JSON types of the LUMBRE_* extensions, for reading and writing, and of other extensions, for reading.
+//! Their keys are interpreted in `import_*` and `export_*`.
 //!
-//! Every key is optional. Beside the ones that the format describes there are three for what a World holds and glTF
-//! has no place for: `LUMBRE_lights_phong.kind` ("ambient"), `LUMBRE_object`, `LUMBRE_camera`.
+//! Every key is optional, except the `image` of lightmaps and irradiance volumes. Besides the keys that the
+//! format describes, three represent what a World holds but glTF has no place for: `LUMBRE_lights_phong.kind`
+//! ("ambient"), `LUMBRE_object` and `LUMBRE_camera`.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,33 +24,33 @@ pub(crate) struct PhongMaterial {
     pub transmission: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ior: Option<f64>,
-    /// bare or energy-keeping.
+    /// `bare` or `energy-keeping`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobe: Option<String>,
-    /// cosine-power, gaussian or trowbridge-reitz.
+    /// `cosine-power`, `gaussian` or `trowbridge-reitz`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distribution: Option<String>,
-    /// dielectric, conductor or normal-reflectance.
+    /// `dielectric`, `conductor` or `normal-reflectance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fresnel: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub eta: Option<Color>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absorption: Option<Color>,
-    /// A see-through surface is a sheet without an inside.
+    /// A transmissive surface is a thin sheet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thin: Option<bool>,
-    /// Fresnel's equations divide what passes.
+    /// The Fresnel equations split the light that passes.
     #[serde(rename = "fresnelSplit", skip_serializing_if = "Option::is_none")]
     pub fresnel_split: Option<bool>,
     #[serde(rename = "attenuationColor", skip_serializing_if = "Option::is_none")]
     pub attenuation_color: Option<Color>,
-    /// Metres.
+    /// In metres.
     #[serde(rename = "attenuationDistance", skip_serializing_if = "Option::is_none")]
     pub attenuation_distance: Option<f64>,
 }
 
-/// The coefficients of one side.
+/// The coefficients of one side of a surface.
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 pub(crate) struct PhongSurface {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -87,15 +89,16 @@ pub(crate) struct PhongLight {
     pub shadow: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bake: Option<String>,
-    /// Metres.
+    /// In metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<f64>,
-    /// Radians.
+    /// In radians.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle: Option<f64>,
 }
 
-/// OpenGL's cone, or with `inner` and `outer` the one of KHR_lights_punctual (for a directional light, which has no cone there).
+/// OpenGL's cone, or with `inner` and `outer` that of KHR_lights_punctual (for directional lights, which have
+/// no cone there).
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 pub(crate) struct PhongSpot {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -173,11 +176,12 @@ pub(crate) struct LightmapExtension {
     pub encoding: Option<String>,
 }
 
-/// `nodes[i].extensions.LUMBRE_irradiance_volume`. What packs a colour shows in the image; `encoding` tells it to others.
+/// `nodes[i].extensions.LUMBRE_irradiance_volume`. Import takes the texel format from the image; the key
+/// `encoding` is for other programs.
 #[derive(Deserialize, Serialize, Clone, Debug)]
 pub(crate) struct IrradianceVolumeExtension {
     pub image: String,
-    /// Runs of probes inside of geometry: the first of a run, how many, and so on. Along x first, then y, then z.
+    /// Runs of probes inside geometry as pairs of first index and count; x varies fastest, then y, then z.
     #[serde(default)]
     pub inside: Vec<u32>,
 }
@@ -186,7 +190,7 @@ pub(crate) struct IrradianceVolumeExtension {
 #[derive(Deserialize, Serialize, Clone, Debug, Default, PartialEq)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ObjectExtension {
-    /// `false` says of a mesh with a skeleton that it stands still.
+    /// `false` marks a mesh with a skin as static.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dynamic: Option<bool>,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -206,7 +210,7 @@ pub(crate) struct CameraExtension {
     pub active: bool,
 }
 
-/// EXT_meshopt_compression of a buffer view: where the compressed data are, and what they stand for.
+/// EXT_meshopt_compression of a buffer view: where the compressed data is, and what it decodes to.
 #[derive(Deserialize, Debug)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct MeshoptView {
@@ -223,12 +227,13 @@ pub(crate) struct MeshoptView {
 /// EXT_meshopt_compression of a buffer.
 #[derive(Deserialize, Debug, Default)]
 pub(crate) struct MeshoptBuffer {
-    /// The buffer has no data of its own: views into it are compressed.
+    /// The buffer has no data: all views into it are compressed.
     #[serde(default)]
     pub fallback: bool,
 }
 
-/// KHR_draco_mesh_compression of a primitive: the view with the compressed data, and the number of each attribute in them.
+/// KHR_draco_mesh_compression of a primitive: the view with the compressed data, and the id of each attribute
+/// in it.
 #[derive(Deserialize, Debug)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct DracoPrimitive {
@@ -237,20 +242,20 @@ pub(crate) struct DracoPrimitive {
     pub attributes: std::collections::BTreeMap<String, u32>,
 }
 
-/// KHR_texture_basisu and EXT_texture_webp of a texture: the image in place of its `source`.
+/// KHR_texture_basisu and EXT_texture_webp of a texture: the image that replaces its `source`.
 #[derive(Deserialize, Debug)]
 pub(crate) struct TextureSource {
     pub source: usize,
 }
 
-/// EXT_mesh_gpu_instancing of a node: accessors by the name of what they hold of every instance.
+/// EXT_mesh_gpu_instancing of a node: the accessor of each per-instance attribute, by the attribute's name.
 #[derive(Deserialize, Debug)]
 pub(crate) struct Instancing {
     #[serde(default)]
     pub attributes: std::collections::BTreeMap<String, usize>,
 }
 
-/// KHR_animation_pointer of the target of an animation's channel: the JSON pointer to what is animated.
+/// KHR_animation_pointer of an animation channel's target: the JSON pointer to the animated value.
 #[derive(Deserialize, Debug)]
 pub(crate) struct AnimationPointer {
     pub pointer: String,

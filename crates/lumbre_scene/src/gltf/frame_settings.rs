@@ -1,4 +1,4 @@
-//! `LUMBRE_scene.frame`: what a level asks of its frames, from JSON and into it.
+//! Reads and writes `LUMBRE_scene.frame`, the frame settings of a level.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub(crate) struct FrameExtension {
     pub shadow_filter: Option<String>,
 }
 
-/// The settings that a file names; the defaults for keys that are missing.
+/// The settings in a file, with defaults for missing keys.
 pub(crate) fn read(source: &FrameExtension, place: &str) -> Result<FrameSettings, LoadProblem> {
     let usual = FrameSettings::default();
     let number = |field: &str, value: Option<f64>, usual: f32, range: [f32; 2], expected: &str| {
@@ -61,10 +61,10 @@ pub(crate) fn read(source: &FrameExtension, place: &str) -> Result<FrameSettings
     Ok(FrameSettings { multisample: source.multisample, light_threshold, shadow_resolution, shadow_filter })
 }
 
-/// As a file has them; nothing where they are the defaults.
+/// The settings as JSON, without those equal to the defaults; `None` if all are.
 ///
 /// # Errors
-/// [`SaveError::NotFinite`].
+/// [`SaveError::NotFinite`] if a number is NaN or infinite.
 pub(crate) fn written(settings: &FrameSettings) -> Result<Option<FrameExtension>, SaveError> {
     let usual = FrameSettings::default();
     if *settings == usual {

@@ -1,9 +1,10 @@
-//! Calls of decoders that others wrote: a panic in one is an answer, not the end of the program. Not the decoders.
+//! Calls third-party decoders so that a panic in one becomes a return value instead of ending the program.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What a decoder answers; nothing if it panics. What it was working on is dropped then.
+/// The result of `decode`, or `None` if it panics; what it was working on is dropped then.
 pub(crate) fn guarded<T>(decode: impl FnOnce() -> T) -> Option<T> {
-    // Nothing that the closure borrows is changed by it: decoders read bytes and make values of their own.
+    // Unwind safety: decoders only read the bytes that the closure borrows and build new values, so a panic
+    // leaves no borrowed state half-modified.
     catch_unwind(AssertUnwindSafe(decode)).ok()
 }

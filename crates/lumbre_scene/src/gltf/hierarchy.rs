@@ -1,4 +1,4 @@
-//! The trees that a file's nodes form, checked: no cycles, one parent each. Not the entities made from them.
+//! The node trees of a file, validated: no cycles, and at most one parent per node.
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 
@@ -6,17 +6,17 @@ use super::document::{Document, Node, element};
 use super::error::{LoadProblem, Notes};
 use crate::Transform;
 
-/// The nodes of the scene that is shown.
+/// The nodes of the default scene.
 pub(crate) struct Hierarchy {
-    /// Node indices, every parent before its children.
+    /// Node indices, with every parent before its children.
     pub order: Vec<usize>,
-    /// The parent of each node of the file, if it has one.
+    /// The parent of each node of the file, or `None` for roots.
     pub parents: Vec<Option<usize>>,
-    /// The scene, if the file has any.
+    /// Index of the scene; `None` if the file has no scenes.
     pub scene: Option<usize>,
 }
 
-/// Checks all nodes of a file and lists those of its default scene (all, if it has no scenes).
+/// Checks all nodes of a file and lists those of its default scene, or all nodes if it has no scenes.
 pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierarchy, LoadProblem> {
     let count = document.nodes.len();
     let name = |node: usize| document.nodes[node].name.clone().unwrap_or_default();
@@ -57,7 +57,7 @@ pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierar
     let roots: Vec<usize> = (0..count).filter(|&node| parents[node].is_none()).collect();
     let mut reached = vec![false; count];
     let everything = below(&roots, &mut reached);
-    // With one parent each, what no root leads to goes round in a circle.
+    // Every node has at most one parent here, so a node that no root reaches is on or below a cycle.
     if let Some(node) = reached.iter().position(|&reached| !reached) {
         return Err(LoadProblem::Cycle { node, name: name(node) });
     }
@@ -86,7 +86,7 @@ pub(crate) fn hierarchy(document: &Document, notes: &mut Notes) -> Result<Hierar
                 } else if let Some(parent) = parents[node] {
                     let problem = twice(node, format!("nodes[{parent}].children"), place.clone());
                     notes.repair(&document.node_place(node), problem, "it stays below its parent")?;
-                    // Its parents may not be in the scene; then it is shown by itself.
+                    // If none of its ancestors is listed in the scene, the node becomes a root.
                     let mut above = std::iter::successors(Some(node), |&node| parents[node]).skip(1);
                     let is_listed = |above: usize| listed.contains(&above);
                     if !above.any(is_listed) {
@@ -148,12 +148,12 @@ pub(crate) fn transform(node: &Node, place: &str, notes: &mut Notes) -> Result<T
     if !(length.is_finite() && length > 1e-6) {
         return Err(refused("rotation", rotation.to_string(), "use a unit quaternion [x, y, z, w]"));
     }
-    // Unit already, to what f32 can hold: keep its digits.
+    // Already a unit quaternion up to rounding: keep its exact components.
     let rotation = if (length - 1.0).abs() < 1e-12 { rotation } else { rotation / length };
     Ok(Transform { translation, rotation, scale })
 }
 
-/// Chains of such transforms stay finite in f64.
+/// Bounds components so that chains of transforms stay finite in f64.
 fn representable(value: DVec3) -> bool {
     value.is_finite() && value.abs().max_element() < 1e30
 }

@@ -1,4 +1,4 @@
-//! Loading: from a file or bytes to entities in a World.
+//! Loads a glTF file or its bytes: splits the container, decodes everything, and spawns the entities.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -20,30 +20,33 @@ use crate::{
     update_transforms,
 };
 
-/// What loading did.
+/// The result of loading a file.
 #[derive(Clone, Debug, Default)]
 pub struct LoadReport {
-    /// The entity of each glTF node, by the node's index; [`Entity::PLACEHOLDER`] for nodes that are not in the scene that is shown.
+    /// The entity of each glTF node, by the node's index; [`Entity::PLACEHOLDER`] for nodes outside of the
+    /// loaded scene.
     pub nodes: Vec<Entity>,
     /// What was repaired, ignored or left out.
     pub notes: Vec<Note>,
-    /// Different triangle meshes: primitives of meshes that are used.
+    /// Number of distinct triangle meshes: the primitives of all glTF meshes in use.
     pub meshes: usize,
-    /// Triangles of all entities.
+    /// Number of triangles of all entities.
     pub triangles: usize,
-    /// The files beside the glTF file that its buffers and images are in, if a folder was given.
+    /// The external files that the buffers and images refer to, if a folder was given.
     pub files: Vec<PathBuf>,
-    /// Lights whose strength is in candela or lux, as `KHR_lights_punctual` has it: numbers that a picture holds under an exposure only.
+    /// Number of lights with an intensity in candela or lux, as in `KHR_lights_punctual`. Such values need an
+    /// exposure to be displayed.
     pub photometric_lights: usize,
-    /// Whether a camera says how its pictures are exposed (`LUMBRE_camera.exposure`).
+    /// Whether a camera states its exposure (`LUMBRE_camera.exposure`).
     pub states_exposure: bool,
 }
 
-/// Loads a .glb or .gltf file into a World, beside what is there.
+/// Loads a .glb or .gltf file and adds its entities to a World.
 ///
-/// Every node becomes an entity with `Transform` and `Name` (if it has one); every primitive of its mesh a child of that with `Mesh`,
-/// `Material` and `Primitive`. Lights and cameras sit on the node's own entity. The scene's settings become the resource
-/// [`SceneSettings`](crate::SceneSettings); global transforms are up to date.
+/// Every node becomes an entity with `Transform` and, if it is named, `Name`. Every primitive of its mesh
+/// becomes a child of that entity with `Mesh`, `Material` and `Primitive`. Lights and cameras are components
+/// of the node's own entity. The scene's settings become the resource
+/// [`SceneSettings`](crate::SceneSettings). Global transforms are up to date afterwards.
 ///
 /// # Errors
 /// [`LoadError`] with the place and the remedy; the World is then unchanged.
@@ -51,7 +54,7 @@ pub fn load(world: &mut World, path: &Path) -> Result<LoadReport, LoadError> {
     load_with(world, path, &LoadOptions::default())
 }
 
-/// [`load`], with choices.
+/// [`load`] with options.
 ///
 /// # Errors
 /// As [`load`].
@@ -66,10 +69,11 @@ pub fn load_with(world: &mut World, path: &Path, options: &LoadOptions) -> Resul
     Ok(spawn(world, prepared, notes))
 }
 
-/// Loads the bytes of a .glb or .gltf. `name` is for messages, `base` the folder that relative URIs start from.
+/// Loads the bytes of a .glb or .gltf file. `name` is used in messages; `base` is the folder to which
+/// relative URIs refer.
 ///
 /// # Errors
-/// As [`load`]; also for URIs of files if there is no `base`.
+/// As [`load`], and for a URI of an external file if `base` is `None`.
 pub fn load_slice(
     world: &mut World,
     bytes: &[u8],
@@ -82,7 +86,7 @@ pub fn load_slice(
 /// [`load_slice`] with limits on what may be decoded.
 ///
 /// # Errors
-/// As [`load_slice`]; [`LoadProblem::TooLarge`] where a limit is met.
+/// As [`load_slice`], and [`LoadProblem::TooLarge`] if a limit is exceeded.
 pub fn load_slice_within(
     world: &mut World,
     bytes: &[u8],
@@ -118,7 +122,7 @@ fn read(bytes: &[u8], base: Base<'_>, options: &LoadOptions) -> Result<(Prepared
     Ok((prepared, notes))
 }
 
-/// Refuses what cannot be shown without an extension that is not known here.
+/// Refuses a file that requires an extension this crate does not support.
 pub(crate) fn check_extensions(document: &Document) -> Result<(), LoadProblem> {
     for name in &document.extensions_required {
         if !super::SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
@@ -132,7 +136,7 @@ pub(crate) fn check_extensions(document: &Document) -> Result<(), LoadProblem> {
     Ok(())
 }
 
-/// The bytes of every buffer, as long as each says it is.
+/// The bytes of every buffer, truncated to its `byteLength`.
 pub(crate) fn contents<'a>(
     document: &Document,
     binary: Option<&'a [u8]>,
@@ -144,7 +148,7 @@ pub(crate) fn contents<'a>(
         let place = format!("buffers[{index}]");
         let content = match (&buffer.uri, binary) {
             (Some(uri), _) => Cow::Owned(uri::fetch(uri, base, &place)?),
-            // Views into it are decoded from other buffers.
+            // A fallback buffer has no bytes: the views into it are decoded from other buffers.
             (None, _) if compressed_views::is_fallback(document, index)? => {
                 contents.push(Cow::Borrowed(&[][..]));
                 continue;
@@ -160,7 +164,7 @@ pub(crate) fn contents<'a>(
         let found = content.len() as u64;
         if found < byte_length {
             let problem = LoadProblem::Truncated { what: place.clone(), needed: byte_length, found };
-            // Four is what everything in a .glb is padded to.
+            // Everything in a .glb is padded to four bytes, so fewer than four missing bytes are padding.
             if byte_length - found >= 4 {
                 return Err(problem);
             }
@@ -181,7 +185,7 @@ pub(crate) fn contents<'a>(
     Ok(contents)
 }
 
-/// Checks and decodes everything that is shown of a file of so many bytes.
+/// Validates and decodes everything in the scene of a file of `file_bytes` bytes.
 pub(crate) fn decode(
     buffers: &Buffers<'_>,
     file_bytes: u64,
@@ -202,14 +206,14 @@ fn files_beside(document: &Document, base: Base<'_>) -> Vec<PathBuf> {
     uris.filter(|uri| !uri.starts_with("data:")).filter_map(|uri| base.file(uri, "").ok()).collect()
 }
 
-/// Makes entities of what was decoded.
+/// Spawns the entities of a decoded file.
 pub(crate) fn spawn(world: &mut World, prepared: Prepared, notes: Notes) -> LoadReport {
     let mut report = LoadReport { notes: notes.list, files: prepared.files, ..LoadReport::default() };
     report.nodes = vec![Entity::PLACEHOLDER; prepared.node_count];
     (report.photometric_lights, report.states_exposure) =
         (prepared.photometric_lights, prepared.states_exposure);
     report.meshes = prepared.meshes.values().map(Vec::len).sum();
-    // Entities in the order of the file, then children in the order of their parent's list.
+    // Spawn entities in file order first, then attach children in the order of their parents' lists.
     let mut by_index: Vec<&PreparedNode> = prepared.nodes.iter().collect();
     by_index.sort_unstable_by_key(|node| node.index);
     for node in by_index {

@@ -1,4 +1,4 @@
-//! Textures: images decoded within limits, samplers, and how a material refers to both.
+//! Imports textures: decodes images within limits, and converts samplers and texture references.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -21,29 +21,30 @@ use super::uri::{self, Base};
 use super::value::number;
 use crate::{Image, Mipmap, Sampler, TextureReference, Wrap};
 
-/// Most texels that one byte of a PNG or JPEG can stand for: deflate expands at most 1032 times, and a texel has at least one bit.
-/// A JPEG block of 64 texels takes at least one bit.
+/// Most texels that one byte of a PNG or JPEG can represent: deflate expands at most 1032 times, and a texel
+/// has at least one bit. A JPEG block of 64 texels takes at least one bit.
 const MOST_TEXELS_PER_BYTE: u64 = 8 * 1032;
 
-/// Texels that an image of any length may claim: one of a single colour takes next to no bytes as WebP or ETC1S.
+/// Number of texels that an image may claim whatever its size in bytes: an image of a single colour takes
+/// next to no bytes as WebP or ETC1S.
 const TEXELS_OF_ANY_IMAGE: u64 = 4096 * 4096;
 
-/// Extensions of a texture that name another image, the one that is preferred first.
+/// Texture extensions that refer to an alternative image, in order of preference.
 const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 
-/// Decodes images when they are first used.
+/// The images of a file, decoded on first use.
 pub(crate) struct Images<'a> {
     pub buffers: &'a Buffers<'a>,
     pub base: Base<'a>,
     pub limits: LoadLimits,
     pub budget: Budget,
     pub decoded: Vec<Option<Arc<Image>>>,
-    /// What stands in for images that cannot be read.
+    /// Replaces images that cannot be read.
     pub stand_in: Arc<Image>,
 }
 
 impl Images<'_> {
-    /// The texture that a material's slot names. `None`, with a note, if it is of a kind that is not supported.
+    /// The texture for a slot of a material. Returns `None`, with a note, if it is of an unsupported kind.
     pub(crate) fn texture(
         &mut self,
         info: &TextureInfo,
@@ -101,8 +102,8 @@ impl Images<'_> {
         Ok(Some(TextureReference { image, sampler, tex_coord, offset, rotation, scale }))
     }
 
-    /// As [`texture`](Self::texture) for a slot in which white would mean something, such as a slope: an image that cannot be read is
-    /// left out.
+    /// As [`texture`](Self::texture), for slots in which white has a meaning, such as normals: if the image
+    /// cannot be read, the texture is left out.
     pub(crate) fn texture_without_stand_in(
         &mut self,
         info: &TextureInfo,
@@ -113,7 +114,8 @@ impl Images<'_> {
         Ok(texture.filter(|texture| !Arc::ptr_eq(&texture.image, &self.stand_in)))
     }
 
-    /// The first of a texture's images that can be read, each decoded once. Where that may be, white stands in if none can.
+    /// The first of a texture's images that can be read; each is decoded once. If none can be and repairs are
+    /// allowed, the result is white.
     fn image(
         &mut self,
         sources: &[usize],
@@ -133,7 +135,8 @@ impl Images<'_> {
         Ok(Arc::clone(&self.stand_in))
     }
 
-    /// An image that was not decoded yet; white where it cannot be, which is noted with the image that is then tried.
+    /// Decodes an image and stores it. If that fails and repairs are allowed, the result is white, and a note
+    /// says whether the image `next` is tried instead.
     fn decode_once(
         &mut self,
         index: usize,
@@ -148,7 +151,7 @@ impl Images<'_> {
         };
         let image = match self.read(index, used_by, &place) {
             Ok(image) => Arc::new(image),
-            // What would fill the memory is no fault to be repaired.
+            // Exceeding the memory limit must not be repaired.
             Err(problem @ LoadProblem::TooLarge { .. }) => return Err(problem),
             Err(problem) => {
                 let remedy = match next {
@@ -191,8 +194,8 @@ impl Images<'_> {
     }
 }
 
-/// The images of a texture, in the order in which they are tried: those of extensions that are decoded, and its own. None, with a note, where
-/// there are none.
+/// The images of a texture in the order in which they are tried: those of supported extensions, then its own
+/// source. Empty, with a note, if there are none.
 fn sources(texture: &Texture, place: &str, notes: &mut Notes) -> Result<Vec<usize>, LoadProblem> {
     let mut sources = Vec::new();
     for name in TEXTURE_EXTENSIONS {
@@ -217,12 +220,12 @@ fn sources(texture: &Texture, place: &str, notes: &mut Notes) -> Result<Vec<usiz
     Ok(sources)
 }
 
-/// One white texel.
+/// An image of one white texel.
 pub(crate) fn white() -> Image {
     Image { name: "white".into(), width: 1, height: 1, rgba: vec![255; 4] }
 }
 
-/// Decodes an image, whose kind shows in its first bytes.
+/// Decodes an image, whose format is recognized by its first bytes.
 fn decode(
     bytes: &[u8],
     name: String,
@@ -237,7 +240,7 @@ fn decode(
     }
 }
 
-/// A KTX2 picture.
+/// Decodes a KTX2 image.
 fn decode_ktx2(
     bytes: &[u8],
     name: String,
@@ -255,7 +258,7 @@ fn decode_ktx2(
     Ok(Image { name, width, height, rgba: picture.texels().map_err(undecodable)? })
 }
 
-/// A PNG, JPEG or WebP picture.
+/// Decodes a PNG, JPEG or WebP image.
 fn decode_common(
     bytes: &[u8],
     name: String,
@@ -283,7 +286,7 @@ fn decode_common(
         let mut bounds = image::Limits::default();
         bounds.max_image_width = Some(limits.image_side);
         bounds.max_image_height = Some(limits.image_side);
-        // Eight bytes per texel, 16-bit RGBA, and as much again for the decoder's own rows.
+        // Eight bytes per texel for 16-bit RGBA, and as much again for the decoder's buffers.
         bounds.max_alloc =
             Some(u64::from(limits.image_side).pow(2).saturating_mul(16).min(limits.image_bytes));
         reader.limits(bounds);
@@ -307,7 +310,8 @@ fn decode_common(
     Ok(Image { name, width, height, rgba: decoded.into_raw() })
 }
 
-/// Whether an image may have so many texels.
+/// Checks that an image may have this size: within the limits, and with no more texels than its bytes can
+/// represent.
 fn check_size(
     (width, height): (u32, u32),
     most_texels: u64,
@@ -324,7 +328,7 @@ fn check_size(
 }
 
 fn sampler(source: &json::texture::Sampler) -> Sampler {
-    // What is not a number of glTF counts as not said.
+    // Values that are not in the glTF specification count as missing.
     let wrap = |value: Checked<WrappingMode>| match value {
         Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
         Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,

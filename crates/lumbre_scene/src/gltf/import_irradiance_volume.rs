@@ -1,4 +1,4 @@
-//! LUMBRE_irradiance_volume: reads the 3D KTX2 image beside a baked file. Not the making of such volumes.
+//! Imports LUMBRE_irradiance_volume with its 3D KTX2 image.
 
 use super::document::shortened;
 use super::error::LoadProblem;
@@ -8,7 +8,7 @@ use super::uri::{self, Base};
 use crate::IrradianceVolume;
 use crate::lightmap_files::{Ktx2Error, Ktx2Header};
 
-/// The volume of a node.
+/// The irradiance volume of a node.
 pub(crate) fn irradiance_volume(
     source: &IrradianceVolumeExtension,
     place: &str,
@@ -26,7 +26,7 @@ pub(crate) fn irradiance_volume(
         let most = limits.image_side;
         return Err(refused(format!("claims {side} texels along a side; at most {most} are allowed")));
     }
-    // As bytes, as packed texels and as colours.
+    // Each texel is held as bytes, as a packed texel and as a colour.
     budget.charge(header.texels, 4 + 4 + 12, || place.clone())?;
     let volume = IrradianceVolume::from_ktx2(&bytes, header.texels).map_err(unreadable)?;
     let inside = marks(&source.inside, volume.cubes.len()).ok_or_else(|| LoadProblem::Value {
@@ -41,7 +41,8 @@ pub(crate) fn irradiance_volume(
     Ok(IrradianceVolume { inside, ..volume })
 }
 
-/// The mark of each probe; none without runs, `None` for runs that do not fit.
+/// Expands runs to one flag per probe. Returns an empty list if there are no runs, and `None` if they are not
+/// ascending or exceed the number of probes.
 fn marks(runs: &[u32], probes: usize) -> Option<Vec<bool>> {
     if runs.is_empty() {
         return Some(Vec::new());

@@ -1,4 +1,5 @@
-//! KHR_lights_punctual with LUMBRE_lights_phong beside it into `Light`. Not where lights stand: that is their node.
+//! Imports lights: KHR_lights_punctual, with LUMBRE_lights_phong, to `Light`. Their positions are in the
+//! nodes.
 
 use std::f32::consts::{FRAC_PI_4, PI};
 
@@ -12,8 +13,9 @@ use super::value::{color, number};
 
 /// Reads one light.
 ///
-/// Without LUMBRE_lights_phong its colour is `color * intensity / π`, as what multiplies k_d is irradiance / π, with the
-/// inverse-square law and the specification's window at `range`. With it the numbers stand as they are.
+/// Without LUMBRE_lights_phong its colour is `color * intensity / π`, as k_d is multiplied by irradiance / π,
+/// with the inverse-square law and the specification's window at `range`. With LUMBRE_lights_phong the
+/// numbers are used unchanged.
 pub(crate) fn light(source: &PunctualLight, place: &str) -> Result<Light, LoadProblem> {
     let wrong = |field: &str, value: &str, expected: &str| LoadProblem::Value {
         place: place.to_owned(),

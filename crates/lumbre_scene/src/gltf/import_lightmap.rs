@@ -1,4 +1,4 @@
-//! LUMBRE_lightmap: reads the OpenEXR or KTX2 image beside a baked file. Not the making of lightmaps.
+//! Imports LUMBRE_lightmap with its OpenEXR or KTX2 image.
 
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -15,10 +15,11 @@ use super::uri::{self, Base};
 use crate::lightmap_files::{Ktx2Error, Ktx2Header};
 use crate::{Lightmap, LightmapEncoding, LightmapImage};
 
-/// Most texels per byte of an OpenEXR file: zlib expands at most 1032 times, and a texel of three halves has six bytes.
+/// Most texels per byte of an OpenEXR file: zlib expands at most 1032 times, and a texel of three halves has
+/// six bytes.
 const MOST_TEXELS_PER_BYTE: u64 = 1032 / 6;
 
-/// The lightmaps of a file, each image read once.
+/// The lightmaps of a file; each image is read once.
 #[derive(Default)]
 pub(crate) struct Lightmaps {
     read: HashMap<(String, LightmapEncoding), Arc<LightmapImage>>,
@@ -63,7 +64,7 @@ impl Lightmaps {
         let bytes = uri::fetch(&source.image, base, &place)?;
         let name =
             uri::relative(&source.image).map(|path| path.to_string_lossy().into_owned()).unwrap_or_default();
-        // By its bytes, not by its name.
+        // The format is recognized by the first bytes, not by the name.
         let decode = if Ktx2Header::recognizes(&bytes) { decode_ktx2 } else { decode_open_exr };
         let (width, height, texels) = decode(&bytes, &place, limits, budget)?;
         if let Some(at) = texels.iter().position(|texel| !texel.is_finite()) {
@@ -96,7 +97,7 @@ fn decode_ktx2(
             "claims {width} x {height} x {depth} texels; a lightmap has one slice, and at most {side} per side are allowed"
         )));
     }
-    // As bytes, as packed texels and as colours.
+    // Each texel is held as bytes, as a packed texel and as a colour.
     budget.charge(header.texels, 4 + 4 + 12, || place.to_owned())?;
     let texture = header.texture().map_err(unreadable)?;
     Ok((width, height, texture.colors().collect()))
@@ -122,7 +123,7 @@ fn decode_open_exr(
             "claims {width} x {height} texels in {length} bytes; at most {side} per side are allowed, and what the bytes can hold"
         )));
     }
-    // Twice: as bytes and as texels.
+    // Each texel is held twice, as bytes and as a colour.
     budget.charge(texels, 24, || place.to_owned())?;
     let mut buffer = vec![0; texels as usize * 12];
     decoder.read_image(&mut buffer).map_err(undecodable)?;

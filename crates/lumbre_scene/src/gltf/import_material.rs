@@ -1,4 +1,5 @@
-//! glTF materials into Phong ones, with their textures. Not the mapping's equations: those are in `lumbre_optics`.
+//! Imports glTF materials as Phong materials, with their textures. The equations of the conversion are in
+//! `lumbre_optics`.
 
 use std::sync::Arc;
 
@@ -59,7 +60,8 @@ pub(crate) fn material(
             dielectric: dielectric.specular,
         });
     }
-    // A metal's highlight has the colour of its base texture: that takes the per-texel mapping, here with factors alone.
+    // The highlight of a metal has the colour of its base texture. That needs the per-texel conversion, here
+    // with the factors alone.
     if textures.metallic_roughness.is_none()
         && metallic > 0.0
         && phong.is_none()
@@ -82,14 +84,14 @@ pub(crate) fn material(
     if let Some(specular) = dielectric.stated() {
         front.specular = specular.lerp(base, metallic);
     }
-    // Of a metallic-roughness material k_s is the reflectance at normal incidence.
+    // In the metallic-roughness model k_s is the reflectance at normal incidence.
     let replaced = phong.is_some() && textures.metallic_roughness.is_none();
     let fresnel = if replaced { Fresnel::Dielectric } else { Fresnel::NormalReflectance };
     let mut material = Material { front, unlit, fresnel, ..Material::default() };
     material.ior = dielectric.ior;
     let transmitted = transmission(source, place, notes)?;
     material.transmission = transmitted * base * (1.0 - metallic);
-    // glTF mixes what passes with what is scattered back: the diffuse part keeps the rest.
+    // glTF blends transmission with diffuse reflection, so the diffuse part keeps the remaining fraction.
     material.front.diffuse *= 1.0 - transmitted;
     material.front.ambient *= 1.0 - transmitted;
     material.lobe = default_lobe(phong.as_ref(), textures.metallic_roughness.is_some());
@@ -135,24 +137,25 @@ pub(crate) fn material(
     Ok((material, textures))
 }
 
-/// What is left of a material where nothing is metal.
+/// The reflectance of a material's non-metallic part.
 struct Dielectric {
     ior: f32,
     specular: Vec3,
 }
 
 impl Dielectric {
-    /// Its k_s, if it is not that of every glTF material.
+    /// k_s, if it differs from the default of glTF materials.
     fn stated(&self) -> Option<Vec3> {
         (self.specular != Vec3::splat(PLAIN_DIELECTRIC)).then_some(self.specular)
     }
 }
 
-/// Reflectance of the index 1.5 along the normal.
+/// Reflectance at normal incidence for the index of refraction 1.5.
 const PLAIN_DIELECTRIC: f32 = 0.04;
 
-/// `KHR_materials_ior` and `KHR_materials_specular`: k_s = min(((ior - 1)/(ior + 1))^2 specularColor, 1) specular. An index of 0 reflects all, as
-/// the extension says; the equations then take the largest index that they know.
+/// `KHR_materials_ior` and `KHR_materials_specular`: k_s = min(((ior - 1)/(ior + 1))^2 specularColor, 1)
+/// specular. An index of 0 reflects all light, as the extension defines; the material then gets the largest
+/// index allowed.
 fn dielectric(
     source: &document::Material,
     place: &str,
@@ -204,7 +207,7 @@ fn dielectric(
 /// Largest index of refraction of a material.
 const LARGEST_INDEX: f32 = 1e4;
 
-/// `KHR_materials_transmission`: the part of the light that is not reflected at the surface which passes.
+/// `KHR_materials_transmission`: the fraction of the light not reflected at the surface that is transmitted.
 fn transmission(source: &document::Material, place: &str, notes: &mut Notes) -> Result<f32, LoadProblem> {
     let name = "KHR_materials_transmission";
     let Some(stated) = extension::<Transmission>(&source.extensions, name, place)? else {
@@ -280,13 +283,14 @@ pub(crate) fn front_from_metallic_roughness(
     let mut front = Material::from_metallic_roughness(base, metallic, roughness).front;
     front.emission = emission;
     if unlit {
-        // What an unlit surface shows is its base colour, whatever its metalness.
+        // An unlit surface shows its base colour, whatever its metallic factor.
         front.diffuse = base;
     }
     front
 }
 
-/// The lobe of a material that does not state it: bare where it has the documents' coefficients or chooses its microfacets.
+/// The lobe of a material that does not state one: bare if it has LUMBRE_materials_phong and either no
+/// metallic-roughness texture or microfacet parameters of its own, otherwise energy-keeping.
 pub(crate) fn default_lobe(phong: Option<&PhongMaterial>, textured: bool) -> Lobe {
     let bare = phong.is_some_and(|phong| {
         let chooses = phong.distribution.is_some()
@@ -298,7 +302,8 @@ pub(crate) fn default_lobe(phong: Option<&PhongMaterial>, textured: bool) -> Lob
     if bare { Lobe::Bare } else { Lobe::EnergyKeeping }
 }
 
-/// A conductor where either part of its index is given, unless it says otherwise. The other part is then that of air: 1, and 0.
+/// The Fresnel model: a conductor if `eta` or `absorption` is given, unless the material states another. The
+/// missing one of the two is then that of air: 1 or 0.
 fn fresnel_of(phong: &PhongMaterial, default: Fresnel, place: &str) -> Result<Fresnel, LoadProblem> {
     let given = phong.eta.is_some() || phong.absorption.is_some();
     let conductor = Fresnel::Conductor {
@@ -325,7 +330,8 @@ fn fresnel_of(phong: &PhongMaterial, default: Fresnel, place: &str) -> Result<Fr
 }
 
 impl PhongSurface {
-    /// Whether it says how light is reflected, and so replaces the metallic-roughness mapping and its texture.
+    /// Returns true if it states coefficients of reflection, which replace the metallic-roughness conversion
+    /// and texture.
     fn states_reflection(&self) -> bool {
         self.ambient.is_some()
             || self.diffuse.is_some()

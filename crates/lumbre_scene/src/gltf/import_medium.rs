@@ -1,5 +1,6 @@
-//! What is behind a see-through material: `KHR_materials_transmission`, `KHR_materials_volume` and the keys of `LUMBRE_materials_phong` that
-//! say it in full. Not the coefficient of transmission and the index: those are `import_material`'s.
+//! Imports the medium of a transmissive material from `KHR_materials_transmission`, `KHR_materials_volume`
+//! and `LUMBRE_materials_phong`. The coefficient of transmission and the index of refraction are read in
+//! `import_material`.
 
 use super::document::{self, extension};
 use super::error::{LoadProblem, Notes};
@@ -7,7 +8,7 @@ use super::extensions::{PhongMaterial, Transmission, Volume};
 use super::value::{color, number};
 use crate::Medium;
 
-/// The medium of a material; none where the defaults hold.
+/// The medium of a material, or `None` if it equals the default.
 pub(crate) fn medium(
     source: &document::Material,
     place: &str,
@@ -20,7 +21,8 @@ pub(crate) fn medium(
     let defaults = Medium::default();
     let mut medium = defaults;
     if transmission {
-        // glTF: without a volume, or with one without thickness, the surface has no inside. Its transmission is Fresnel's.
+        // In glTF a transmissive surface without a volume, or with thickness 0, is thin. Its transmission
+        // follows Fresnel.
         let solid = volume.as_ref().is_some_and(|volume| number(volume.thickness_factor, 0.0) > 0.0);
         (medium.thin, medium.fresnel) = (!solid, true);
     }

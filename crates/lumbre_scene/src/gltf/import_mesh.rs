@@ -1,4 +1,5 @@
-//! Primitives of glTF meshes into triangle meshes: strips and fans, missing and broken normals. Not materials.
+//! Imports primitives as triangle meshes: converts strips and fans, and repairs missing and invalid normals
+//! and tangents.
 
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
@@ -12,10 +13,11 @@ use super::error::{LoadProblem, Notes};
 use super::limits::Budget;
 use super::texture_sets::LIGHTMAP_COORDINATES;
 
-/// Squared length beyond which a normal is not taken as unit: what f32 and 16-bit exporters leave, and not more.
+/// Largest deviation of a squared length from 1 for which a vector counts as unit: what f32 and 16-bit
+/// exporters leave.
 const UNIT_TOLERANCE: f32 = 1e-5;
 
-/// Reads one primitive; `None` if it makes no triangles. `place` names its mesh.
+/// Reads one primitive, or returns `None` if it has no triangles. `place` names its mesh.
 pub(crate) fn triangle_mesh(
     buffers: &Buffers<'_>,
     primitive: &Primitive,
@@ -101,7 +103,7 @@ pub(crate) fn triangle_mesh(
             return Err(LoadProblem::TooLarge { what: used_by("NORMAL"), needed, limit });
         }
         budget.charge(mesh.indices.len() as u64, 64, || used_by("NORMAL"))?;
-        // Tangents of a file without normals are to be ignored (section 3.7.2.1).
+        // The specification requires tangents to be ignored if there are no normals (section 3.7.2.1).
         mesh.tangents = Vec::new();
         mesh = flat(&mesh);
     } else {
@@ -111,7 +113,7 @@ pub(crate) fn triangle_mesh(
     Ok(Some(mesh))
 }
 
-/// The vertices of a primitive in the order in which it is drawn, as its mode reads them.
+/// The vertex indices of a primitive in drawing order, to be interpreted by its mode.
 fn order(
     buffers: &Buffers<'_>,
     primitive: &Primitive,
@@ -139,7 +141,8 @@ fn order(
     Ok(order)
 }
 
-/// The file's vertex at each corner of each triangle that [`triangle_mesh`] makes of a primitive of so many vertices.
+/// The vertex in the file for each corner of each triangle that [`triangle_mesh`] makes of a primitive with
+/// this many vertices.
 pub(crate) fn corners(
     buffers: &Buffers<'_>,
     primitive: &Primitive,
@@ -151,7 +154,7 @@ pub(crate) fn corners(
     Ok(triangles(primitive.mode.unwrap_or(TRIANGLES), order))
 }
 
-/// The attributes of one primitive.
+/// Reads the attributes of one primitive.
 struct Attributes<'a> {
     buffers: &'a Buffers<'a>,
     primitive: &'a Primitive,
@@ -161,7 +164,8 @@ struct Attributes<'a> {
 }
 
 impl Attributes<'_> {
-    /// Whether the first set of texture coordinates is there because a lightmap's must not be alone.
+    /// Returns true if TEXCOORD_0 exists only because glTF does not allow the lightmap's TEXCOORD_1 without
+    /// it.
     fn first_coordinates_stand_in(&self) -> bool {
         let attributes = &self.primitive.attributes;
         let Some(first) = attributes.get("TEXCOORD_0").and_then(Value::as_u64) else { return false };
@@ -236,8 +240,8 @@ impl Attributes<'_> {
     }
 }
 
-/// A list of triangles from a list, strip or fan (glTF 2.0 specification, section 3.7.2.1). Triangles of a strip that repeat a vertex
-/// only join its parts, and are left out.
+/// Converts a list, strip or fan to a list of triangles (glTF 2.0 specification, section 3.7.2.1). Triangles
+/// of a strip with a repeated vertex only connect its parts, and are left out.
 fn triangles(mode: u32, mut order: Vec<u32>) -> Vec<u32> {
     match mode {
         TRIANGLE_STRIP => {
@@ -258,8 +262,8 @@ fn triangles(mode: u32, mut order: Vec<u32>) -> Vec<u32> {
     }
 }
 
-/// Splits every vertex by triangle and gives it the face's normal, as the specification asks where a file has none
-/// (section 3.7.2.1). Triangles without area get the zero vector.
+/// Gives every triangle its own vertices with the face normal, as the specification requires for meshes
+/// without normals (section 3.7.2.1). Degenerate triangles get the zero vector.
 fn flat(mesh: &TriangleMesh) -> TriangleMesh {
     fn split<T: Copy>(values: &[T], indices: &[u32]) -> Vec<T> {
         if values.is_empty() {
@@ -282,14 +286,15 @@ fn flat(mesh: &TriangleMesh) -> TriangleMesh {
     }
 }
 
-/// Perpendicular to a triangle, with twice its area as length; computed in f64, where products of f32 neither overflow nor vanish.
+/// The unit normal of a triangle; zero if the triangle is degenerate. Computed in f64, where products of f32
+/// neither overflow nor underflow.
 fn face_normal(mesh: &TriangleMesh, [a, b, c]: [u32; 3]) -> Vec3 {
     let at = |vertex: u32| mesh.positions[vertex as usize].as_dvec3();
     (at(b) - at(a)).cross(at(c) - at(a)).try_normalize().unwrap_or_default().as_vec3()
 }
 
-/// Makes every tangent a unit vector with a side of +1 or -1. One that has no direction is the zero vector, on which a normal map has no
-/// effect.
+/// Makes every tangent a unit vector with a handedness of +1 or -1. One without a direction becomes zero,
+/// which disables the normal map there.
 fn repair_tangents(mesh: &mut TriangleMesh, place: &str, notes: &mut Notes) {
     let mut broken = 0usize;
     for tangent in &mut mesh.tangents {
@@ -308,7 +313,8 @@ fn repair_tangents(mesh: &mut TriangleMesh, place: &str, notes: &mut Notes) {
     }
 }
 
-/// Makes every normal a unit vector. Zero and NaN ones become the average of the faces around them.
+/// Makes every normal a unit vector. Zero and NaN normals are replaced by the average of the adjacent face
+/// normals.
 fn repair_normals(mesh: &mut TriangleMesh, place: &str, notes: &mut Notes) {
     let mut broken = vec![false; mesh.normals.len()];
     let mut count = 0usize;

@@ -1,4 +1,4 @@
-//! LUMBRE_scene and cameras: what holds for a whole scene, and the lenses it is seen through.
+//! Imports the scene settings (LUMBRE_scene) and the projections of cameras.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use super::frame_settings;
 use super::value::{color, number};
 use crate::{Projection, SceneSettings};
 
-/// The settings of a scene; the defaults for keys that are missing.
+/// The settings of a scene, with defaults for missing keys.
 pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSettings, LoadProblem> {
     let place = format!("scenes[{scene}]");
     let mut settings = SceneSettings::default();
@@ -62,7 +62,7 @@ pub(crate) fn settings(document: &Document, scene: usize) -> Result<SceneSetting
     Ok(settings)
 }
 
-/// The shading technique with a name, or by need with an error behind it: `auto:0.01`.
+/// The shading with this name. Shading by need has its error bound appended, as in `auto:0.01`.
 pub(crate) fn shading(name: &str, place: &str, field: &str) -> Result<Shading, LoadProblem> {
     name.parse().map_err(|unknown: NoShading| LoadProblem::Value {
         place: place.to_owned(),
@@ -72,13 +72,13 @@ pub(crate) fn shading(name: &str, place: &str, field: &str) -> Result<Shading, L
     })
 }
 
-/// The specular model with a name.
+/// The reflection model with this name.
 pub(crate) fn reflection(name: &str, place: &str, field: &str) -> Result<ReflectionModel, LoadProblem> {
     let names = ReflectionModel::ALL.iter().map(|model| model.name());
     ReflectionModel::from_name(name).ok_or_else(|| unknown(place, field, name, names))
 }
 
-/// A name that stands for none of the choices.
+/// The error for a name that is not one of the allowed `names`.
 pub(crate) fn unknown(
     place: &str,
     field: &str,
@@ -93,7 +93,7 @@ pub(crate) fn unknown(
     }
 }
 
-/// OpenGL's defaults (start 0, end 1, density 1) for keys that are missing.
+/// Reads fog, with OpenGL's defaults (start 0, end 1, density 1) for missing keys.
 fn fog(source: &FogExtension, place: &str) -> Result<Fog, LoadProblem> {
     let (start, end) = (number(source.start, 0.0), number(source.end, 1.0));
     let density = number(source.density, 1.0);
@@ -113,7 +113,7 @@ fn fog(source: &FogExtension, place: &str) -> Result<Fog, LoadProblem> {
     Ok(Fog { mode, color: source.color.map_or(Vec3::ZERO, color) })
 }
 
-/// The lens of `cameras[index]`, which must exist.
+/// The projection of `cameras[index]`, which must exist.
 pub(crate) fn projection(document: &Document, index: usize) -> Result<Projection, LoadProblem> {
     let camera = &document.cameras[index];
     let place = match &camera.name {
@@ -145,7 +145,7 @@ pub(crate) fn projection(document: &Document, index: usize) -> Result<Projection
             check(lens.ymag != 0.0, "ymag", lens.ymag, "use half the height that is seen")?;
             check(lens.znear >= 0.0, "znear", lens.znear, "use a distance of at least 0")?;
             check(lens.zfar > lens.znear, "zfar", lens.zfar, "use a distance beyond znear")?;
-            // Negative magnitudes mirror; the specification only advises against them.
+            // Negative magnitudes would mirror the picture; the specification only advises against them.
             let (half_width, half_height) = (lens.xmag.abs(), lens.ymag.abs());
             Ok(Projection::Orthographic { half_width, half_height, near: lens.znear, far: lens.zfar })
         }

@@ -1,5 +1,6 @@
-//! EXT_mesh_gpu_instancing: every instance becomes a node below the one that lists them, so that it is drawn, baked and written as any other node.
-//! Not instanced drawing: the renderer finds what shares a mesh by itself.
+//! Expands EXT_mesh_gpu_instancing: every instance becomes a child node of the instanced node, so that it is
+//! drawn, baked and written like any other node. Instanced drawing is not decided here: the renderer finds
+//! objects that share a mesh.
 
 use serde_json::{Map, Value, json};
 
@@ -12,16 +13,16 @@ use super::patch::{Patch, place, without_unused};
 
 const EXTENSION: &str = "EXT_mesh_gpu_instancing";
 
-/// Bytes that an instance takes as a node, in the JSON and out of it.
+/// Approximate size in bytes of an instance as a node, including its JSON.
 const NODE: usize = 1024;
 
-/// Whether a node of a file lists instances.
+/// Returns true if a node of the file has instances.
 pub(crate) fn is_used(root: &Map<String, Value>) -> bool {
     let nodes = root.get("nodes").and_then(Value::as_array).into_iter().flatten();
     nodes.filter_map(|node| node.get("extensions")).any(|extensions| extensions.get(EXTENSION).is_some())
 }
 
-/// Writes the instances of every node out as nodes; says whether there are any.
+/// Replaces the instances of every node by nodes. Returns true if there were any.
 pub(crate) fn expand(
     patch: &mut Patch,
     document: &Document,
@@ -56,7 +57,7 @@ pub(crate) fn expand(
     Ok(expanded)
 }
 
-/// The keys of a node for every instance.
+/// The transform members of a node for every instance.
 fn instances(
     instancing: &Instancing,
     name: &str,
@@ -93,11 +94,11 @@ fn instances(
             instance.insert(key.to_owned(), json!(value));
         }
     }
-    // One without any of the three stands where its node does.
+    // Without any of the three attributes there is one instance, at the node itself.
     Ok(instances.unwrap_or_else(|| vec![Map::new()]))
 }
 
-/// What an attribute holds of every instance.
+/// The values of an attribute, one per instance.
 enum Values {
     Vectors(Vec<[f32; 3]>),
     Rotations(Vec<[f32; 4]>),
@@ -119,10 +120,10 @@ impl Values {
     }
 }
 
-/// Puts the instances below their node, which keeps everything but the mesh.
+/// Adds the instances as children of their node, which keeps everything except the mesh.
 fn write(patch: &mut Patch, index: usize, node: &Node, mesh: usize, instances: Vec<Map<String, Value>>) {
     let mut children: Vec<Value> = node.children.iter().map(|&child| child.into()).collect();
-    // What the node says of its mesh holds for each instance.
+    // Extensions of the node that concern its mesh apply to each instance.
     let own: Map<String, Value> =
         node.extensions.iter().filter(|(name, _)| FOR_MESHES.contains(&name.as_str())).map(cloned).collect();
     for (number, mut instance) in instances.into_iter().enumerate() {
@@ -144,7 +145,7 @@ fn write(patch: &mut Patch, index: usize, node: &Node, mesh: usize, instances: V
     }
 }
 
-/// Extensions of a node that speak of its mesh and not of what hangs below it.
+/// Extensions of a node that concern its own mesh rather than its children.
 const FOR_MESHES: [&str; 2] = ["LUMBRE_object", "LUMBRE_shading"];
 
 fn cloned((name, value): (&String, &Value)) -> (String, Value) {

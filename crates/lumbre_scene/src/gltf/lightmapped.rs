@@ -1,5 +1,5 @@
-//! A primitive of the artist's file with lightmap coordinates: the same triangles, vertices split where charts meet, every attribute
-//! carried along. Not the coordinates' making.
+//! Adds lightmap coordinates to a primitive of the artist's file: the triangles stay the same, vertices are
+//! split where charts meet, and every attribute is carried along. The coordinates are computed elsewhere.
 
 use std::collections::HashMap;
 
@@ -17,27 +17,28 @@ use super::patch::{Patch, place};
 use super::texture_sets::{LIGHTMAP_COORDINATES, with_sets_moved};
 use super::vertex_data::{NewData, Normals, Vertices};
 
-/// Where fewer than one vertex in so many is drawn, the others are not carried along: primitives may share one large list.
+/// If fewer than one in this many vertices is used, the unused ones are dropped: primitives may share one
+/// large list.
 const LEAST_USED: usize = 4;
 
-/// Primitives in the making, and what of them was written already.
+/// Primitives being changed, and what was written for them already.
 pub(crate) struct Primitives<'a> {
     pub buffers: &'a Buffers<'a>,
     pub data: NewData,
     pub notes: Notes,
-    /// Attributes, targets and indices by the primitive, its vertices and its triangles.
+    /// Written attributes, targets and indices, by primitive, vertices and triangles.
     known: HashMap<Chosen, Map<String, Value>>,
-    /// Materials with other texture coordinates, by the material and where its sets went.
+    /// Copies of materials that read other texture coordinates, by material and moved sets.
     materials: HashMap<(usize, Moves), usize>,
 }
 
-/// A primitive by its mesh and index, its vertices, and its triangles.
+/// A primitive (mesh and index), its vertices and its triangles.
 type Chosen = (usize, usize, Vertices, Vec<u32>);
 
-/// What became of the sets of texture coordinates: pairs of the set before and after.
+/// How texture coordinate sets were renumbered, as pairs of the old and the new set.
 type Moves = Vec<(u64, u64)>;
 
-/// The vertices of a primitive with one lightmap coordinate each.
+/// The vertices of a primitive, split so that each has one lightmap coordinate.
 struct Split {
     vertices: Vertices,
     coordinates: Vec<Vec2>,
@@ -46,7 +47,7 @@ struct Split {
 }
 
 impl Split {
-    /// The normal that a mesh has at each vertex; zero where none of its triangles has it.
+    /// The normal of `made` at each vertex; zero for vertices that no triangle uses.
     fn directions(&self, made: &TriangleMesh) -> Vec<Vec3> {
         let mut directions = vec![Vec3::ZERO; self.vertices.sources.len()];
         for (&vertex, &of) in self.corners.iter().zip(&made.indices) {
@@ -66,10 +67,11 @@ impl<'a> Primitives<'a> {
         Self { buffers, data, notes: Notes::default(), known, materials }
     }
 
-    /// `meshes[mesh].primitives[index]` with the lightmap coordinates of a mesh that was made of it.
+    /// The JSON of `meshes[mesh].primitives[index]` with the lightmap coordinates of `made`, a mesh derived
+    /// from it.
     ///
     /// # Errors
-    /// [`SaveError::MeshChanged`] where the mesh is not that primitive with vertices split.
+    /// [`SaveError::MeshChanged`] if `made` is not that primitive with some vertices split.
     pub(crate) fn lightmapped(
         &mut self,
         patch: &mut Patch,
@@ -168,7 +170,7 @@ impl<'a> Primitives<'a> {
         self.buffers.floats(accessor as usize, &used_by, &[shape], [0.0; N], &mut budget).map(Some)
     }
 
-    /// An accessor of normals in place of one of which some have no direction; nothing if all have one.
+    /// A new accessor in which normals without a direction are replaced; `None` if all have one.
     fn mended_normals(
         &mut self,
         patch: &mut Patch,
@@ -181,7 +183,7 @@ impl<'a> Primitives<'a> {
         let used_by = format!("{place}.NORMAL");
         let normals =
             Normals { buffers: self.buffers, accessor, used_by: &used_by, vertices, chosen, directions };
-        // What cannot be read is told where the attribute is carried along.
+        // An accessor that cannot be read is reported where the attribute is copied.
         let (mended, count) = normals.mended(&mut self.data, patch).ok().flatten()?;
         self.notes.add(
             place,
@@ -190,7 +192,7 @@ impl<'a> Primitives<'a> {
         Some(mended)
     }
 
-    /// Gives a primitive other vertices: its attributes, morph targets and indices.
+    /// Replaces the vertices of a primitive: its attributes, morph targets and indices.
     #[expect(clippy::too_many_arguments, reason = "one call for all that a primitive gets")]
     fn choose_vertices(
         &mut self,
@@ -257,13 +259,13 @@ impl<'a> Primitives<'a> {
             }
             self.known.insert(key, written);
         }
-        // The triangles are listed one by one now.
+        // Strips and fans were converted to a list of triangles.
         if let Value::Object(object) = primitive {
             object.shift_remove("mode");
         }
     }
 
-    /// Lets the materials of a primitive read its texture coordinates where they are now.
+    /// Makes the materials of a primitive read its texture coordinates from their new sets.
     fn follow(&mut self, patch: &mut Patch, primitive: &mut Value, moves: &Moves) {
         if moves.is_empty() {
             return;
@@ -298,8 +300,9 @@ impl<'a> Primitives<'a> {
     }
 }
 
-/// Where the sets of texture coordinates go that were in the way of the lightmap's: the second becomes the first if the bake has put it
-/// there, otherwise it goes to the end; so does a first one that is displaced. `alike`: the first two hold the same.
+/// Renumbers the texture coordinate sets to make TEXCOORD_1 free for the lightmap. The second set becomes the
+/// first if the bake moved it there (`to_first`), otherwise it goes to the end, as does a displaced first
+/// set. If the first two sets are equal (`alike`), materials just read the first one.
 fn move_sets(primitive: &mut Value, to_first: bool, alike: bool) -> Moves {
     let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) else {
         return Moves::new();
@@ -324,7 +327,8 @@ fn move_sets(primitive: &mut Value, to_first: bool, alike: bool) -> Moves {
     moves
 }
 
-/// One vertex for every pair of an old vertex and a lightmap coordinate: the old ones in their places, further ones after them.
+/// Makes one vertex for every pair of an old vertex and a lightmap coordinate. The old vertices keep their
+/// indices, and additional ones follow.
 fn split(corners: &[u32], made: &TriangleMesh, count: usize) -> Split {
     let bits = |uv: Vec2| uv.to_array().map(f32::to_bits);
     let mut first: Vec<Option<Vec2>> = vec![None; count];

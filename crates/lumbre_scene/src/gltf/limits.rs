@@ -1,18 +1,19 @@
-//! How large a decoded scene may become. Not what it holds.
+//! Limits on the size of a decoded scene.
 
 use super::document::Document;
 use super::error::LoadProblem;
 
-/// Bounds on what loading allocates, so that a small file cannot fill the memory.
+/// Limits on what loading allocates, so that a small file cannot fill the memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadLimits {
-    /// Bytes of decoded vertices and indices in all; by default 64 MiB and 64 times the file with its buffers, and 1024 times what is compressed
-    /// as `KHR_draco_mesh_compression`, where a triangle may take a byte.
+    /// Total size of decoded vertices and indices in bytes. The default is 64 MiB plus 64 times the size of
+    /// the file with its buffers, plus 1024 times the size of data compressed with
+    /// `KHR_draco_mesh_compression`, where a triangle may take one byte.
     pub decoded_bytes: Option<u64>,
-    /// Width and height of an image in texels; by default 16384.
+    /// Largest width and height of an image in texels; 16384 by default.
     pub image_side: u32,
-    /// Bytes of decoded images in all; by default 32 GiB. An image is also refused before it is decoded if it claims more texels than its
-    /// bytes can hold.
+    /// Total size of decoded images in bytes; 32 GiB by default. An image is also refused before it is
+    /// decoded if it claims more texels than its bytes can represent.
     pub image_bytes: u64,
 }
 
@@ -23,7 +24,7 @@ impl Default for LoadLimits {
 }
 
 impl LoadLimits {
-    /// What may be decoded of a file of so many bytes with these buffers.
+    /// The budget for decoding a file of this size with these buffers.
     pub(crate) fn budget(
         &self,
         file_bytes: usize,
@@ -39,10 +40,11 @@ impl LoadLimits {
     }
 }
 
-/// How many bytes of vertices and indices a byte of Draco data may stand for.
+/// How many bytes of vertices and indices one byte of Draco data may expand to.
 const DRACO_EXPANSION: u64 = 1024;
 
-/// The bytes of all views that primitives name as their Draco data, as the document claims.
+/// Total size of the buffer views that hold Draco data, as claimed by the document. Each view is counted
+/// once.
 fn compressed_bytes(document: &Document) -> u64 {
     let primitives = document.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let views = primitives.filter_map(|primitive| {
@@ -54,7 +56,7 @@ fn compressed_bytes(document: &Document) -> u64 {
     lengths.fold(0u64, |total, view| total.saturating_add(view.byte_length.0))
 }
 
-/// What is left of a limit.
+/// A limit in bytes, and how much of it is used up.
 pub(crate) struct Budget {
     used: u64,
     limit: u64,
@@ -65,7 +67,8 @@ impl Budget {
         Self { used: 0, limit }
     }
 
-    /// Takes `count` elements of `size` bytes from the budget, before they are allocated.
+    /// Takes `count` elements of `size` bytes from the budget; called before they are allocated. `what` names
+    /// them in the error.
     pub(crate) fn charge(
         &mut self,
         count: u64,

@@ -1,9 +1,9 @@
-//! The compressed data of EXT_meshopt_compression: vertices, triangles and index sequences, and their filters. Not the buffer views they
-//! stand for. By the extension's specification, appendices A and B.
+//! Decodes the data of EXT_meshopt_compression: vertices, triangles, index sequences, and the filters for
+//! vertices. Implemented after appendices A and B of the extension's specification.
 //!
-//! Every read is checked, and the caller bounds what is decoded before anything is allocated.
+//! Every read is bounds-checked, and the caller limits the decoded size before anything is allocated.
 
-/// What a compressed buffer view holds.
+/// The kind of data in a compressed buffer view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mode {
     Attributes,
@@ -11,7 +11,7 @@ pub(crate) enum Mode {
     Indices,
 }
 
-/// How decoded attributes are turned into numbers.
+/// The filter that converts decoded attributes to numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Filter {
     None,
@@ -23,15 +23,15 @@ pub(crate) enum Filter {
 const TRUNCATED: &str = "its compressed data end too early";
 const LEFT_OVER: &str = "its compressed data have another length than what is in them";
 
-/// Elements of a group, which share their width in bits.
+/// Number of elements in a group, which are coded with the same number of bits.
 const GROUP: usize = 16;
-/// Most bytes and most elements of a block.
+/// Largest number of bytes and of elements in a block.
 const BLOCK_BYTES: usize = 8192;
 const BLOCK_ELEMENTS: usize = 256;
-/// Least bytes after the last block.
+/// Smallest number of bytes after the last block.
 const TAIL: usize = 32;
 
-/// Bytes read from the front.
+/// Reads bytes from the front.
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -49,7 +49,7 @@ impl<'a> Reader<'a> {
         Ok(taken)
     }
 
-    /// An unsigned number of at most 32 bits in groups of seven, the lowest first.
+    /// Reads an unsigned number of at most 32 bits in LEB128: groups of seven bits, the lowest first.
     fn leb128(&mut self) -> Result<u32, &'static str> {
         let mut value = 0;
         for shift in (0..35).step_by(7) {
@@ -66,7 +66,7 @@ impl<'a> Reader<'a> {
 /// Decodes `count` elements of `stride` bytes.
 ///
 /// # Errors
-/// What is wrong with the data.
+/// A description of what is wrong with the data.
 pub(crate) fn decode(
     mode: Mode,
     filter: Filter,
@@ -136,11 +136,12 @@ fn vertices(count: usize, stride: usize, source: &[u8]) -> Result<Vec<u8>, &'sta
             data.extend_from_slice(&last);
         }
     }
-    // What follows is padded to 32 bytes.
+    // The tail is padded to 32 bytes.
     if reader.at + TAIL.saturating_sub(stride) == body.len() { Ok(data) } else { Err(LEFT_OVER) }
 }
 
-/// Sixteen numbers of 0, 2, 4 or 8 bits; the largest of 2 and 4 bits says that a byte follows.
+/// Reads sixteen numbers of 0, 2, 4 or 8 bits. With 2 or 4 bits, the largest value means that a full byte
+/// follows.
 fn read_group(reader: &mut Reader<'_>, mode: u8, values: &mut [u8]) -> Result<(), &'static str> {
     let bits = match mode {
         0 => {
@@ -164,7 +165,7 @@ fn read_group(reader: &mut Reader<'_>, mode: u8, values: &mut [u8]) -> Result<()
     Ok(())
 }
 
-/// The last things that were seen.
+/// A ring buffer of the most recent values.
 struct Recent<const N: usize, T> {
     values: [T; N],
     next: usize,
@@ -180,7 +181,7 @@ impl<const N: usize, T: Copy + Default> Recent<N, T> {
         self.next = (self.next + 1) % N;
     }
 
-    /// The one before the last `back` ones.
+    /// The value pushed `back` steps before the latest one.
     fn get(&self, back: usize) -> T {
         self.values[(self.next + N - 1 - back % N) % N]
     }
@@ -326,7 +327,7 @@ fn apply(filter: Filter, stride: usize, data: &mut [u8]) -> Result<(), &'static 
     Ok(())
 }
 
-/// A unit vector, times `most`, from its place on an octahedron.
+/// Decodes an octahedral unit vector, scaled by `most`.
 fn octahedral(x: f32, y: f32, one: f32, most: f32) -> [f32; 3] {
     let (x, y) = if one == 0.0 { (0.0, 0.0) } else { (x / one, y / one) };
     let z = 1.0 - x.abs() - y.abs();
@@ -336,7 +337,7 @@ fn octahedral(x: f32, y: f32, one: f32, most: f32) -> [f32; 3] {
     [x, y, z].map(|value| rounded(value * scale))
 }
 
-/// To the nearest whole number, halves away from zero.
+/// Rounds to the nearest integer, halves away from zero.
 fn rounded(value: f32) -> f32 {
     value.round()
 }
@@ -345,7 +346,8 @@ fn rounded(value: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Encoded by meshoptimizer's own encoder, and of what: the vectors of its decoder's tests (js/meshopt_decoder.test.js, MIT licence).
+    /// Checks that data made by meshoptimizer's own encoder decodes as expected, and that no prefix of it
+    /// decodes. The vectors are from the tests of its decoder (js/meshopt_decoder.test.js, MIT licence).
     fn holds(mode: Mode, filter: Filter, count: usize, stride: usize, encoded: &[u8], expected: &[u8]) {
         assert_eq!(decode(mode, filter, count, stride, encoded).as_deref(), Ok(expected));
         for length in 0..encoded.len() {

@@ -1,7 +1,8 @@
-//! glTF 2.0 files: reading one into a World, and writing a World as one. Not baking, not drawing.
+//! glTF 2.0 files: importing one into a World, and exporting a World as one. Baking and drawing are
+//! elsewhere.
 //!
-//! Everything that a file says is checked and decoded before the World is touched, and everything that is written lies under its final
-//! name whole or not at all.
+//! Import validates and decodes the whole file before it changes the World. Export writes every file under a
+//! temporary name first, so that a file of the final name is always complete.
 
 mod accessor;
 mod accessor_format;
@@ -61,7 +62,7 @@ pub use limits::LoadLimits;
 pub use options::LoadOptions;
 pub use source::SourceFile;
 
-/// Extensions that a file may require.
+/// Extensions that a file may list in `extensionsRequired`.
 pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",

@@ -1,21 +1,21 @@
-//! Changes to a file's JSON that can be taken back: what a bake adds is recorded in the file, so that the next bake begins with the
-//! artist's file again. Not what is changed.
+//! Reversible changes to the JSON of a file. A bake records in the file what it changes, so that the next
+//! bake can restore the artist's version first. What is changed is up to the callers.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-/// The extension of a whole file that holds the record.
+/// The root-level extension that holds the record.
 pub(crate) const EXTENSION: &str = "LUMBRE_bake";
 
-/// The lists that grow at their end.
+/// The lists to which elements may be appended.
 const LISTS: [&str; 6] = ["accessors", "bufferViews", "buffers", "materials", "meshes", "nodes"];
 
-/// The version of the record; another is left as it is.
+/// Version of the record. Records of other versions are not undone.
 const VERSION: u32 = 1;
 
-/// A member of an object or an element of a list.
+/// One step of a path: the name of an object member or the index of a list element.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Key {
@@ -35,29 +35,29 @@ impl From<&str> for Key {
     }
 }
 
-/// The way to a value from the root.
+/// The path from the root to a value.
 pub(crate) type Place = Vec<Key>;
 
-/// A place of names and indices.
+/// Builds a path from names and indices.
 macro_rules! place {
     ($($key:expr),+ $(,)?) => { [$($crate::gltf::patch::Key::from($key)),+] };
 }
 pub(crate) use place;
 
-/// `extensions.LUMBRE_bake`.
+/// The record of changes, stored as `extensions.LUMBRE_bake`.
 #[derive(Serialize, Deserialize)]
 struct Record {
     version: u32,
-    /// Of each list its length before and after; no length where there was no list.
+    /// Length of each changed list before and after the changes; `None` if the list did not exist.
     lengths: BTreeMap<String, [Option<usize>; 2]>,
-    /// What stood in the places that were changed; nothing where nothing stood.
+    /// The former values at the changed paths; `None` where there was no value.
     replaced: Vec<(Place, Option<Value>)>,
-    /// Files that were copied beside the output, by their URIs.
+    /// URIs of the files that were copied beside the output.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     copied: Vec<String>,
 }
 
-/// The JSON of a file while it is changed.
+/// The JSON of a file, with a record of the changes made to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
     root: Value,
@@ -72,28 +72,28 @@ impl Patch {
         Self { root, lengths, replaced: Vec::new() }
     }
 
-    /// The value at a place.
+    /// The value at a path.
     pub(crate) fn get(&self, place: &[Key]) -> Option<&Value> {
         place.iter().try_fold(&self.root, |value, key| step(value, key))
     }
 
-    /// The JSON as it is now.
+    /// A copy of the JSON in its current state.
     pub(crate) fn root(&self) -> Map<String, Value> {
         self.root.as_object().cloned().unwrap_or_default()
     }
 
-    /// Whether nothing was changed.
+    /// Returns true if nothing was changed.
     pub(crate) fn is_unchanged(&self) -> bool {
         self.replaced.is_empty()
             && self.lengths.iter().all(|(list, before)| length(&self.root, list) == *before)
     }
 
-    /// How long a list was before anything was added to it.
+    /// Length of a list before anything was appended to it.
     pub(crate) fn former_length(&self, list: &str) -> usize {
         self.lengths.get(list).copied().flatten().unwrap_or_default()
     }
 
-    /// Appends to one of the lists that may grow, and says where.
+    /// Appends to one of the extensible lists and returns the index of the new element.
     pub(crate) fn push(&mut self, list: &str, value: Value) -> usize {
         let entry = &mut self.root[list];
         if !entry.is_array() {
@@ -106,12 +106,12 @@ impl Patch {
         entries.unwrap_or_default().saturating_sub(1)
     }
 
-    /// Puts a value in a place; objects on the way are made where there are none.
+    /// Sets the value at a path, creating missing objects along it.
     pub(crate) fn set(&mut self, place: &[Key], value: Value) {
         if self.get(place) == Some(&value) {
             return;
         }
-        // The first step that leads nowhere is what taking back removes.
+        // Undoing removes the first step of the path that does not exist yet.
         let existing = (0..place.len()).take_while(|&end| self.get(&place[..=end]).is_some()).count();
         let changed = &place[..(existing + 1).min(place.len())];
         let former = self.get(changed).cloned();
@@ -119,7 +119,7 @@ impl Patch {
         put(&mut self.root, place, Some(value));
     }
 
-    /// Takes a member out of its object.
+    /// Removes the value at a path from its object.
     pub(crate) fn remove(&mut self, place: &[Key]) {
         if let Some(former) = self.get(place).cloned() {
             self.remember(place, Some(former));
@@ -127,7 +127,7 @@ impl Patch {
         }
     }
 
-    /// Makes the value at a place equal to another, touching only members that differ.
+    /// Changes the value at a path to `value`, touching only the members that differ.
     pub(crate) fn replace(&mut self, place: &[Key], value: &Value) {
         let (Some(Value::Object(before)), Value::Object(after)) = (self.get(place), value) else {
             self.set(place, value.clone());
@@ -144,7 +144,7 @@ impl Patch {
     }
 
     fn remember(&mut self, place: &[Key], former: Option<Value>) {
-        // What is new as a whole needs no memory of its parts.
+        // Appended elements are removed as a whole, so former values inside them are not needed.
         let added = match place {
             [Key::Name(list), Key::Index(index), ..] => {
                 self.lengths.contains_key(list) && *index >= self.former_length(list)
@@ -156,10 +156,10 @@ impl Patch {
         }
     }
 
-    /// The JSON with the record of what was changed.
+    /// The changed JSON, including the record of the changes if there are any.
     ///
     /// # Errors
-    /// What the writer of the JSON says.
+    /// The error of the JSON serializer.
     pub(crate) fn finish(mut self) -> Result<Value, serde_json::Error> {
         if self.is_unchanged() {
             return Ok(self.root);
@@ -179,7 +179,8 @@ impl Patch {
     }
 }
 
-/// Takes an extension out of `extensionsUsed` and `extensionsRequired` if nothing in a list of the file has it any more.
+/// Removes an extension from `extensionsUsed` and `extensionsRequired` if no element of `list` has it any
+/// more.
 pub(crate) fn without_unused(patch: &mut Patch, extension: &str, list: &str) {
     fn has(value: &Value, extension: &str) -> bool {
         match value {
@@ -205,17 +206,17 @@ pub(crate) fn without_unused(patch: &mut Patch, extension: &str, list: &str) {
     }
 }
 
-/// What became of a former bake.
+/// The outcome of undoing an earlier bake.
 pub(crate) enum Former {
-    /// There was none.
+    /// The file has no record of a bake.
     None,
-    /// What it added is gone.
+    /// The changes of the bake were undone.
     TakenBack,
-    /// The file was changed since, so that the record no longer fits it.
+    /// The file was modified after the bake, so the record no longer matches it. Only the record was removed.
     Changed,
 }
 
-/// Takes back what a bake added to a file.
+/// Undoes the changes that an earlier bake made to a file.
 pub(crate) fn take_back(root: &mut Map<String, Value>) -> Former {
     let Some(record) = root.get("extensions").and_then(|extensions| extensions.get(EXTENSION)) else {
         return Former::None;
@@ -229,14 +230,14 @@ pub(crate) fn take_back(root: &mut Map<String, Value>) -> Former {
         *root = pristine;
         return Former::TakenBack;
     }
-    // Nobody may take it for valid later either.
+    // Remove the record, so that it cannot be mistaken for a valid one later.
     if let Some(Value::Object(extensions)) = root.get_mut("extensions") {
         extensions.shift_remove(EXTENSION);
     }
     Former::Changed
 }
 
-/// Adds to the record which files were copied beside the file, by their URIs.
+/// Adds to the record the URIs of the files that were copied beside the output.
 pub(crate) fn record_copied(root: &mut Value, copied: Vec<String>) {
     if let (false, Some(Value::Object(record))) =
         (copied.is_empty(), root.get_mut("extensions").and_then(|own| own.get_mut(EXTENSION)))
@@ -245,21 +246,21 @@ pub(crate) fn record_copied(root: &mut Value, copied: Vec<String>) {
     }
 }
 
-/// The URIs of the files that a bake copied beside a file.
+/// The URIs of the files that an earlier bake copied beside its output.
 pub(crate) fn copied(root: &Map<String, Value>) -> Vec<String> {
     let record = root.get("extensions").and_then(|extensions| extensions.get(EXTENSION));
     record.and_then(|record| Record::deserialize(record).ok()).map_or(Vec::new(), |record| record.copied)
 }
 
-/// The lights that state their strength as `KHR_lights_punctual` does, in candela or lux: those without `LUMBRE_lights_phong`, and those
-/// that have it of a bake only.
+/// For each light, whether its intensity is in candela or lux, as in `KHR_lights_punctual`: true if it has no
+/// `LUMBRE_lights_phong`, or has it only because a bake added it.
 pub(crate) fn photometric_lights(root: &Map<String, Value>) -> Vec<bool> {
     let extensions = root.get("extensions");
     let record = extensions.and_then(|extensions| Record::deserialize(extensions.get(EXTENSION)?).ok());
     let marked = |light: usize| {
         let of_it = place!["extensions", "KHR_lights_punctual", "lights", light];
         let mut replaced = record.iter().flat_map(|record| &record.replaced);
-        // The extension was made then, or the object around it.
+        // The bake created the extension, or the object around it.
         replaced.any(|(place, former)| {
             former.is_none() && place.starts_with(&of_it) && place.len() <= of_it.len() + 2
         })
@@ -307,7 +308,8 @@ fn step<'a>(value: &'a Value, key: &Key) -> Option<&'a Value> {
     }
 }
 
-/// Puts a value in a place, or takes what is there out of its object. Objects on the way are made.
+/// Sets the value at a path, creating missing objects along it, or removes the value if it is `None`. Returns
+/// `None` if the path does not fit the JSON.
 fn put(root: &mut Value, place: &[Key], value: Option<Value>) -> Option<()> {
     let (last, way) = place.split_last()?;
     let parent = way.iter().try_fold(root, |parent, key| match key {
@@ -369,7 +371,7 @@ mod tests {
         assert_eq!(Value::Object(again.clone()), original);
         assert!(matches!(take_back(&mut again), Former::None));
 
-        // Another program added an accessor: the record is void, and everything stays.
+        // Another program added an accessor, so the record no longer matches and nothing is undone.
         let mut changed = object(baked);
         changed["accessors"].as_array_mut().unwrap().push(json!({}));
         assert!(matches!(take_back(&mut changed), Former::Changed));

@@ -1,4 +1,4 @@
-//! A decoded file, every value checked: what is left is to spawn it.
+//! Decodes and validates a whole file into plain data, so that spawning its entities cannot fail.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -29,7 +29,7 @@ use crate::{
     SceneSettings, Transform,
 };
 
-/// A primitive of a mesh with its material.
+/// A decoded primitive of a mesh with its material.
 pub(crate) struct PreparedPrimitive {
     pub label: Primitive,
     pub mesh: Arc<TriangleMesh>,
@@ -38,7 +38,7 @@ pub(crate) struct PreparedPrimitive {
     pub medium: Option<Medium>,
 }
 
-/// A node with what hangs on it.
+/// A decoded node with everything attached to it.
 pub(crate) struct PreparedNode {
     /// Index in the file.
     pub index: usize,
@@ -61,24 +61,24 @@ pub(crate) struct PreparedNode {
     pub extras: Option<serde_json::Value>,
 }
 
-/// A whole scene.
+/// A decoded scene.
 pub(crate) struct Prepared {
     /// Every parent before its children.
     pub nodes: Vec<PreparedNode>,
-    /// Primitives of each mesh that is used.
+    /// The primitives of each mesh in use.
     pub meshes: BTreeMap<usize, Vec<PreparedPrimitive>>,
     pub settings: SceneSettings,
-    /// Length of the file's list of nodes.
+    /// Number of nodes in the file.
     pub node_count: usize,
-    /// Files beside the glTF file.
+    /// The external files that the file refers to.
     pub files: Vec<PathBuf>,
-    /// Lights of shown nodes whose strength is in candela or lux.
+    /// Number of lights in the scene with an intensity in candela or lux.
     pub photometric_lights: usize,
-    /// Whether a shown camera says how its pictures are exposed.
+    /// Whether a camera in the scene states its exposure.
     pub states_exposure: bool,
 }
 
-/// Decodes a document.
+/// Decodes and validates a document.
 pub(crate) fn prepare(
     document: &Document,
     buffers: &Buffers<'_>,
@@ -96,7 +96,7 @@ pub(crate) fn prepare(
     let image_budget = Budget::new(limits.image_bytes);
     let mut images =
         Images { buffers, base, limits, budget: image_budget, decoded, stand_in: Arc::new(white()) };
-    // Also those that nothing uses: what is wrong with them should be known before it matters.
+    // Materials are decoded even if nothing uses them, so that their faults are reported early.
     let (mut materials, mut media) = (Vec::new(), Vec::new());
     for (index, source) in document.materials.iter().enumerate() {
         media.push(import_medium::medium(source, &document.material_place(index), notes)?);
@@ -260,11 +260,11 @@ fn lightmap_scale(found: Option<f64>, place: &str) -> Result<Option<LightmapScal
     }
 }
 
-/// Triangle meshes by the accessors they are read from, so that primitives which differ in their material only share them.
-/// `None` for those that make no triangles.
+/// Triangle meshes by the accessors they are read from, so that primitives which differ only in their
+/// material share them. `None` for primitives without triangles.
 type Geometries = HashMap<String, Option<Arc<TriangleMesh>>>;
 
-/// What primitives are read from.
+/// The data from which primitives are made.
 struct Source<'a> {
     document: &'a Document,
     buffers: &'a Buffers<'a>,
@@ -319,7 +319,7 @@ impl Source<'_> {
     }
 }
 
-/// The textures whose coordinates the mesh has.
+/// The textures for which the mesh has texture coordinates.
 fn usable(
     mut textures: MaterialTextures,
     mesh: &TriangleMesh,
@@ -339,7 +339,7 @@ fn usable(
     textures
 }
 
-/// Nodes that an animation moves or that say so, and all below them.
+/// Nodes that are animated, skinned or marked as dynamic, and all their descendants.
 fn dynamic_nodes(
     document: &Document,
     order: &[usize],
@@ -383,14 +383,14 @@ fn dynamic_nodes(
     Ok(dynamic)
 }
 
-/// The node that is moved where a JSON pointer is animated: by its transform or the weights of its morph targets.
+/// The node that moves if this JSON pointer is animated, by its transform or its morph target weights.
 fn moved_node(pointer: &str) -> Option<usize> {
     let (node, property) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
     let property = property.split('/').next()?;
     matches!(property, "translation" | "rotation" | "scale" | "weights").then(|| node.parse().ok())?
 }
 
-/// The lights whose strength or colour is animated through a JSON pointer.
+/// The lights that are animated through a JSON pointer.
 fn animated_lights(document: &Document) -> Result<HashSet<usize>, LoadProblem> {
     let mut animated = HashSet::new();
     for (index, animation) in document.animations.iter().enumerate() {

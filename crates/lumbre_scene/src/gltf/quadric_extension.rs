@@ -1,4 +1,5 @@
-//! `LUMBRE_quadric` of a node, as read and as written: the exact surface in place of the node's mesh, which stays for whoever does not know it.
+//! Reads and writes `LUMBRE_quadric`, the exact surface of a node. The node's mesh remains for programs that
+//! do not support the extension.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -7,39 +8,39 @@ use super::error::LoadProblem;
 use super::import_scene::unknown;
 use crate::{Quadric, QuadricShape};
 
-/// The JSON.
+/// The JSON of the extension.
 #[derive(Deserialize, Serialize, Clone, Debug, Default)]
 pub(crate) struct QuadricExtension {
-    /// plane, sphere, cylinder, cone or quadric.
+    /// `plane`, `sphere`, `cylinder`, `cone` or `quadric`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<String>,
-    /// Metres; 1 without it.
+    /// In metres; 1 if missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<f64>,
-    /// Metres; 1 without it.
+    /// In metres; 1 if missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height: Option<f64>,
-    /// Whether discs close a cylinder's or a cone's ends; they do without it.
+    /// Whether the ends of a cylinder or cone are closed by discs; true if missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closed: Option<bool>,
-    /// Of a general quadric, a to j.
+    /// The coefficients a to j of a general quadric.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients: Option<[f64; 10]>,
-    /// Smallest corner of the box outside of which the surface is cut away, metres.
+    /// Minimum corner of the trim box, in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<[f64; 3]>,
-    /// Largest corner.
+    /// Maximum corner of the trim box, in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<[f64; 3]>,
 }
 
-/// Every kind.
+/// All values of `kind`.
 const KINDS: [&str; 5] = ["plane", "sphere", "cylinder", "cone", "quadric"];
-/// Beyond these numbers their squares are no f64.
+/// Largest absolute value of a number, so that its square is finite in f64.
 const LARGEST: f64 = 1e100;
 
 impl QuadricExtension {
-    /// The surface that it states.
+    /// Converts the JSON to a surface and validates it.
     pub fn surface(&self, place: &str) -> Result<Quadric, LoadProblem> {
         let refused = |field: &str, value: String, expected: &str| LoadProblem::Value {
             place: place.to_owned(),
@@ -63,7 +64,7 @@ impl QuadricExtension {
             Some(other) => return Err(unknown(place, "LUMBRE_quadric.kind", other, KINDS.into_iter())),
             None => return Err(refused("kind", "missing".to_owned(), "say which surface it is")),
         };
-        // A side that is not given is open.
+        // A missing corner leaves its sides unbounded.
         let corner = |own: Option<[f64; 3]>, open: f64| own.map_or(DVec3::splat(open), DVec3::from_array);
         let trim = (self.min.is_some() || self.max.is_some())
             .then(|| [corner(self.min, f64::NEG_INFINITY), corner(self.max, f64::INFINITY)]);
@@ -83,7 +84,7 @@ impl QuadricExtension {
         Ok(quadric)
     }
 
-    /// What states a surface.
+    /// The JSON for a surface.
     pub fn of(quadric: &Quadric) -> Self {
         let kind = |name: &str| Self { kind: Some(name.to_owned()), ..Self::default() };
         let own = match quadric.shape {

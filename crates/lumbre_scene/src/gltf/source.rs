@@ -1,4 +1,4 @@
-//! A glTF file kept as it was read, so that it can be written again with light. Not what is in it.
+//! A glTF file kept as it was read, so that it can be written again with baked light added.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -15,22 +15,22 @@ use super::patch::{Former, Patch, take_back};
 use super::uri::{self, Base};
 use super::{compressed, container, instancing};
 
-/// A glTF file as its artist made it: the JSON, the buffers and chunks of others, untouched. What an earlier bake added to the file is
-/// taken back when it is read.
+/// A glTF file as the artist made it, with its JSON, buffers and unknown chunks preserved. Changes made by an
+/// earlier bake are undone when it is read.
 #[derive(Debug)]
 pub struct SourceFile {
-    /// The JSON, with what had to be written out before anything could be read of it.
+    /// The JSON; GPU instances are already expanded to nodes.
     pub(crate) patch: Patch,
     pub(crate) document: Document,
     /// The bytes of every buffer.
     pub(crate) contents: Vec<Vec<u8>>,
-    /// What was compressed.
+    /// The decoded form of compressed data.
     decoded: Decoded,
-    /// Type and bytes of chunks that glTF does not know.
+    /// Type and bytes of chunks that are neither JSON nor BIN.
     pub(crate) chunks: Vec<(u32, Vec<u8>)>,
-    /// The folder that it lies in.
+    /// The folder of the file.
     pub(crate) folder: PathBuf,
-    /// The entity of each node, once it is loaded.
+    /// The entity of each node; empty until the file is loaded into a World.
     pub(crate) nodes: Vec<Entity>,
     name: String,
     file_bytes: u64,
@@ -39,7 +39,7 @@ pub struct SourceFile {
 }
 
 impl SourceFile {
-    /// Reads a .glb, or a .gltf with its buffers.
+    /// Reads a .glb file, or a .gltf file with its buffers.
     ///
     /// # Errors
     /// [`LoadError`] with the place and the remedy.
@@ -96,7 +96,8 @@ impl SourceFile {
         })
     }
 
-    /// Loads it into a World, as [`load`](super::load()) does. [`save_baked`](super::save_baked) then knows its entities.
+    /// Spawns its entities in a World, as [`load`](super::load()) does, and remembers them for
+    /// [`save_baked`](super::save_baked).
     ///
     /// # Errors
     /// [`LoadError`] with the place and the remedy; the World is then unchanged.
@@ -110,12 +111,12 @@ impl SourceFile {
         Ok(report)
     }
 
-    /// Where its files are.
+    /// The folders to which its URIs may refer.
     pub(crate) fn base(&self) -> Base<'_> {
         Base { folder: Some(&self.folder), root: self.options.root.as_deref() }
     }
 
-    /// The buffers, to be read through the document.
+    /// The buffers with the document that describes them.
     pub(crate) fn buffers(&self) -> Buffers<'_> {
         let bytes = self.contents.iter().map(|content| Cow::Borrowed(content.as_slice())).collect();
         Buffers { document: &self.document, bytes, decoded: Cow::Borrowed(&self.decoded) }

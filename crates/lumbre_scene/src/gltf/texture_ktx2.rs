@@ -1,12 +1,13 @@
-//! Pictures in KTX2 files, as KHR_texture_basisu has them: UASTC and ETC1S (BasisLZ), as Zstandard frames or not, and plain bytes. Only the
-//! largest level of one picture is decoded. Not lightmaps: those hold light, and are read by `lightmap_files`.
+//! Decodes KTX2 textures as used by KHR_texture_basisu: UASTC and ETC1S (BasisLZ), with or without Zstandard
+//! supercompression, and uncompressed bytes. Only the largest level of a single 2D image is decoded. KTX2
+//! lightmaps are read in `lightmap_files`.
 //!
-//! The transcoder is the crate `basisu`. It trusts the offsets of the container, so it never sees the file: what it gets is a container of one
-//! level written here, around bytes that were found inside of the file.
+//! The transcoder is the crate `basisu`. It trusts the offsets in the container, so it never sees the file
+//! itself, but a container with one level that is built here around bytes known to lie within the file.
 
 use crate::lightmap_files::{Ktx2Error, ktx2, zstandard};
 
-/// The number of a header's field, from the format on.
+/// Indices of the header's 32-bit fields, counted from vkFormat.
 mod field {
     pub(super) const FORMAT: usize = 0;
     pub(super) const WIDTH: usize = 2;
@@ -23,47 +24,48 @@ mod field {
 const ETC1S: u8 = 163;
 const UASTC: u8 = 166;
 
-/// Ways in which all levels are compressed.
+/// Supercompression schemes.
 const BASIS_LZ: u32 = 1;
 const ZSTANDARD: u32 = 2;
 
-/// Most bytes that a byte of a Zstandard frame stands for: a block of four bytes can stand for 128 KiB.
+/// Largest expansion factor of Zstandard: a block of four bytes can expand to 128 KiB.
 const ZSTANDARD_EXPANSION: u64 = (128 << 10) / 4;
 
-/// Texels that a picture of any length may claim, if nothing else bounds them.
+/// Number of texels that an image may claim whatever its size in bytes, if nothing else bounds it.
 const TEXELS_OF_ANY_PICTURE: u64 = 4096 * 4096;
 
-/// Bytes of a UASTC block, of sixteen texels.
+/// Size in bytes of a UASTC block of sixteen texels.
 const UASTC_BLOCK: u64 = 16;
 
-/// What the header says, before any texel is decoded.
+/// The validated header of a file, available before any texel is decoded.
 pub(crate) struct Ktx2Picture<'a> {
     pub width: u32,
     pub height: u32,
     coding: Coding,
-    /// The largest level.
+    /// The bytes of the largest level.
     level: &'a [u8],
     zstandard: bool,
     descriptor: &'a [u8],
     global_data: &'a [u8],
 }
 
-/// How texels are coded.
+/// Coding of the texels.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coding {
     Etc1s,
     Uastc,
-    /// Channels of a byte each.
+    /// Uncompressed, with this number of channels of one byte each.
     Plain(usize),
 }
 
 impl<'a> Ktx2Picture<'a> {
-    /// Whether bytes start as a KTX2 file does.
+    /// Returns true if the bytes start with the KTX2 identifier.
     pub(crate) fn recognizes(bytes: &[u8]) -> bool {
         bytes.starts_with(&ktx2::IDENTIFIER)
     }
 
-    /// Checks everything but the texels: afterwards the bytes of the file can hold as many as it claims.
+    /// Checks everything except the texels. The file is then known to be large enough for the texels it
+    /// claims.
     pub(crate) fn read(bytes: &'a [u8]) -> Result<Self, Ktx2Error> {
         ktx2::part(bytes, "header with its level index", 0, (ktx2::HEADER_BYTES + ktx2::LEVEL_BYTES) as u64)?;
         let word = |index: usize| ktx2::word(bytes, ktx2::IDENTIFIER.len() + 4 * index);
@@ -137,18 +139,20 @@ impl<'a> Ktx2Picture<'a> {
         Ok(picture)
     }
 
-    /// Most texels that its bytes can stand for.
+    /// Most texels that the bytes can represent.
     pub(crate) fn most_texels(&self) -> u64 {
         match self.coding {
-            // A block of sixteen texels takes about a bit at least, but runs of the same block take none.
+            // A block of sixteen texels takes at least about one bit, except in runs of equal blocks, which
+            // take none.
             Coding::Etc1s => TEXELS_OF_ANY_PICTURE.max((self.level.len() as u64).saturating_mul(8 * 16)),
             _ => u64::MAX,
         }
     }
 
-    /// Bytes of the level once it is no Zstandard frame; nothing where blocks have no size of their own.
+    /// Size of the level in bytes after Zstandard decompression; `None` for ETC1S, whose blocks have no fixed
+    /// size.
     fn level_bytes(&self) -> Option<u64> {
-        // Both products fit: sides have 32 bits, and the largest level of UASTC has a byte per texel.
+        // The number of blocks fits, as each side has at most 30 bits; UASTC takes one byte per texel.
         let blocks = || u64::from(self.width.div_ceil(4)).saturating_mul(self.height.div_ceil(4).into());
         match self.coding {
             Coding::Etc1s => None,
@@ -164,7 +168,7 @@ impl<'a> Ktx2Picture<'a> {
         if self.zstandard { length.saturating_mul(ZSTANDARD_EXPANSION) } else { length }
     }
 
-    /// The texels, RGBA, row by row from the top. Takes twelve bytes a texel at most.
+    /// Decodes the texels to RGBA, row by row from the top. Needs at most twelve bytes per texel.
     pub(crate) fn texels(&self) -> Result<Vec<u8>, String> {
         let unpacked;
         let mut level = self.level;
@@ -209,10 +213,12 @@ impl<'a> Ktx2Picture<'a> {
             .to_owned())
     }
 
-    /// A file with the largest level alone, not supercompressed but for BasisLZ, whose offsets are all right.
+    /// Builds a KTX2 file that contains only the largest level, without Zstandard supercompression and with
+    /// valid offsets.
     #[cfg(feature = "basisu")]
     fn with_one_level(&self, level: &[u8]) -> Option<Vec<u8>> {
-        /// Before the codebooks stand their sizes, then twenty bytes for every picture: only the first is kept.
+        /// The BasisLZ global data starts with the sizes, followed by twenty bytes per image; only the first
+        /// image is kept.
         const SIZES: usize = 20;
         const PICTURE: usize = 20;
         let mut global_data = Vec::new();

@@ -1,15 +1,18 @@
-//! Which sets of texture coordinates a material's textures read, other sets in their place, and a first set where a mesh has only a second. Not the
-//! coordinates themselves.
+//! The texture coordinate sets that a material's textures read: renumbering them, and the convention for
+//! meshes that have only lightmap coordinates.
 
 use serde_json::{Value, json};
 
-/// The name of the accessor that holds the coordinates of a lightmap where a mesh has no others. glTF does not allow a second set without a first,
-/// so both are this accessor then; by its name it is known again that there is no first.
+/// Name of the accessor for the lightmap coordinates of a mesh that has no others. glTF does not allow
+/// TEXCOORD_1 without TEXCOORD_0, so both use this accessor; on import, its name tells that TEXCOORD_0 is
+/// only a placeholder.
 pub(crate) const LIGHTMAP_COORDINATES: &str = "LUMBRE_lightmap coordinates";
 
-/// The material with every texture reading the set that `moved` gives for its own; `None` where that changes nothing.
+/// The material with every texture reading the set `moved(set)` instead of `set`; `None` if that changes
+/// nothing.
 ///
-/// Textures of extensions are found by their form: a member whose name ends in `Texture`, with an `index`.
+/// Textures in extensions are recognized by their form: a member with a name ending in `Texture` that has an
+/// `index`.
 pub(crate) fn with_sets_moved(material: &Value, moved: &dyn Fn(u64) -> u64) -> Option<Value> {
     let mut changed = material.clone();
     walk(&mut changed, moved);

@@ -1,21 +1,22 @@
-//! URIs of buffers and images: data URIs, and files beside the glTF file. Nothing else is followed.
+//! Resolves the URIs of buffers and images: data URIs, and files in or below the folder of the glTF file. No
+//! other URI is followed.
 
 use std::path::{Path, PathBuf};
 
 use super::document::shortened;
 use super::error::LoadProblem;
 
-/// Where the files are that URIs name.
+/// The folders to which relative URIs may refer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Base<'a> {
     /// The folder of the glTF file.
     pub folder: Option<&'a Path>,
-    /// A folder around it that URIs may lead to.
+    /// A folder above it; URIs that leave `folder` may refer to files below this one.
     pub root: Option<&'a Path>,
 }
 
 impl Base<'_> {
-    /// The file that a URI names.
+    /// The path of the file that a URI refers to.
     pub(crate) fn file(self, uri: &str, place: &str) -> Result<PathBuf, LoadProblem> {
         let refused = |problem: &str| LoadProblem::Uri {
             place: place.to_owned(),
@@ -33,11 +34,12 @@ impl Base<'_> {
     }
 }
 
-/// Why a URI with too many `..` is not followed.
+/// Why a URI that leaves the folder of the glTF file is refused.
 const LEADS_OUT: &str = "leads out of the folder of the glTF file; put the file beside it, or name a folder that holds both as the root \
                          (--root DIR, LoadOptions::root)";
 
-/// The file that a URI names that leads out of its folder, if it lies below a root. Links are followed before that is decided.
+/// The file that a URI leaving the glTF file's folder refers to, if it is below `root` after symbolic links
+/// are resolved.
 fn below(uri: &str, folder: &Path, root: &Path) -> Result<PathBuf, &'static str> {
     let decoded = percent_decoded(uri).and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
     let relative: PathBuf = decoded.split(['/', '\\']).filter(|part| !part.contains(':')).collect();
@@ -53,7 +55,7 @@ fn below(uri: &str, folder: &Path, root: &Path) -> Result<PathBuf, &'static str>
     }
 }
 
-/// The bytes that a URI stands for: inline, or a file.
+/// The bytes of a data URI or of the file that a URI refers to.
 pub(crate) fn fetch(uri: &str, base: Base<'_>, place: &str) -> Result<Vec<u8>, LoadProblem> {
     let refused = |problem: &str| LoadProblem::Uri {
         place: place.to_owned(),
@@ -75,18 +77,18 @@ pub(crate) fn fetch(uri: &str, base: Base<'_>, place: &str) -> Result<Vec<u8>, L
     read(&base.file(uri, place)?)
 }
 
-/// A whole file, if it is an ordinary one.
+/// Reads a file, which must be a regular one.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadProblem> {
     let failed = |source| LoadProblem::Read { path: path.to_owned(), source };
     let metadata = std::fs::metadata(path).map_err(failed)?;
     if !metadata.is_file() {
-        // A pipe or device would never end.
+        // Reading a pipe or device might never end.
         return Err(failed(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not an ordinary file")));
     }
     std::fs::read(path).map_err(failed)
 }
 
-/// The relative path that a URI reference names; the reason if it must not be followed.
+/// Decodes a URI reference to a relative path, or returns the reason why it must not be followed.
 pub(crate) fn relative(uri: &str) -> Result<PathBuf, &'static str> {
     let scheme = uri.split(['/', '?', '#']).next().is_some_and(|start| start.contains(':'));
     if scheme {
@@ -108,7 +110,7 @@ pub(crate) fn relative(uri: &str) -> Result<PathBuf, &'static str> {
         match part {
             "" | "." => {}
             ".." => return Err(LEADS_OUT),
-            // `C:` would start anew on Windows.
+            // On Windows, a part such as `C:` would replace the whole path.
             part if part.contains(':') => return Err(LEADS_OUT),
             part => path.push(part),
         }
@@ -135,7 +137,7 @@ fn percent_decoded(text: &str) -> Option<Vec<u8>> {
     Some(decoded)
 }
 
-/// A file name as a URI reference: everything but unreserved characters is escaped (RFC 3986).
+/// Encodes a file name as a URI reference. Everything except unreserved characters is escaped (RFC 3986).
 pub(crate) fn percent_encoded(name: &str) -> String {
     name.bytes().fold(String::new(), |mut encoded, byte| {
         if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
@@ -147,13 +149,13 @@ pub(crate) fn percent_encoded(name: &str) -> String {
     })
 }
 
-/// A relative path as a URI reference: its parts as [`percent_encoded`] has them.
+/// Encodes a relative path as a URI reference, each part as in [`percent_encoded`].
 pub(crate) fn percent_encoded_path(path: &Path) -> String {
     let parts = path.iter().map(|part| percent_encoded(&part.to_string_lossy()));
     parts.collect::<Vec<_>>().join("/")
 }
 
-/// RFC 4648 base64, with or without padding.
+/// Decodes base64 (RFC 4648) in the standard or URL-safe alphabet, with or without padding.
 fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     let end = text.len() - text.iter().rev().take_while(|&&byte| byte == b'=').count().min(2);
     let mut decoded = Vec::new();

@@ -1,4 +1,5 @@
-//! Numbers of the JSON (f64) as the f32 that components hold. Too large ones become infinite, and are refused where they are used.
+//! Converts numbers of the JSON (f64) to the f32 of components. Values beyond the range of f32 become
+//! infinite and are refused where they are used.
 
 use glam::Vec3;
 

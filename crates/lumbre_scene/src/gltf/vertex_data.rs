@@ -1,4 +1,5 @@
-//! Vertices of a file chosen anew: accessors of any type copied element by element, bit for bit. Not which vertices are chosen.
+//! Copies accessors of any type for a new selection of vertices, element by element and bit for bit. The
+//! selection is made in `lightmapped`.
 
 use std::collections::HashMap;
 
@@ -15,19 +16,19 @@ const UNSIGNED_BYTE: u64 = accessor_format::UNSIGNED_BYTE as u64;
 const UNSIGNED_SHORT: u64 = accessor_format::UNSIGNED_SHORT as u64;
 const UNSIGNED_INT: u64 = accessor_format::UNSIGNED_INT as u64;
 
-/// Bytes that a file's last buffer gets, and the views into them.
+/// Bytes appended to a buffer of the file, with buffer views that refer to them.
 pub(crate) struct NewData {
-    /// The buffer.
+    /// Index of the buffer.
     pub buffer: usize,
-    /// Bytes that it has already; a multiple of four.
+    /// Size of the buffer before, a multiple of four.
     pub start: usize,
     pub bytes: Vec<u8>,
 }
 
-/// The vertices of a primitive that takes the place of another.
+/// The new vertices of a primitive, selected from its old ones.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Vertices {
-    /// The old vertex of every new one.
+    /// The old vertex for every new one.
     pub sources: Vec<u32>,
     /// Whether every old vertex is among them.
     pub complete: bool,
@@ -48,7 +49,7 @@ impl NewData {
         patch.push("bufferViews", view)
     }
 
-    /// Texture coordinates.
+    /// Writes texture coordinates and returns their accessor.
     pub(crate) fn coordinates(
         &mut self,
         patch: &mut Patch,
@@ -65,7 +66,8 @@ impl NewData {
         patch.push("accessors", accessor)
     }
 
-    /// Indices of at most `vertices` vertices, in the component type of the accessor that they replace where that is wide enough.
+    /// Writes indices of at most `vertices` vertices and returns their accessor. They keep the component type
+    /// of the accessor they replace if it is wide enough.
     pub(crate) fn indices(
         &mut self,
         patch: &mut Patch,
@@ -75,7 +77,7 @@ impl NewData {
     ) -> usize {
         let former = replaced.and_then(|accessor| patch.get(&place!["accessors", accessor])).cloned();
         let least = former.as_ref().and_then(|former| former["componentType"].as_u64());
-        // The largest number of a type restarts primitives, and is not a vertex.
+        // The largest index of a type is the primitive restart value and must not be a vertex.
         let component = index_component(least.unwrap_or(UNSIGNED_SHORT), vertices);
         let bytes = index_bytes(values, component);
         let view = self.view(patch, &bytes, Some(ELEMENT_ARRAY_BUFFER), None);
@@ -92,10 +94,11 @@ impl NewData {
         patch.push("accessors", accessor)
     }
 
-    /// An attribute's values for other vertices, in the same format: normalized, quantized or sparse as they are.
+    /// Writes the values of an attribute for the chosen vertices, in the same format (normalized, quantized
+    /// or sparse), and returns their accessor.
     ///
     /// # Errors
-    /// [`LoadProblem`] where the accessor does not describe `vertices` values that exist.
+    /// [`LoadProblem`] if the accessor is invalid or does not have `vertices` elements.
     pub(crate) fn attribute(
         &mut self,
         patch: &mut Patch,
@@ -117,7 +120,8 @@ impl NewData {
         let size = raw.format.size();
         let zero = vec![0; size];
         let replacements: HashMap<u32, &[u8]> = raw.sparse.iter().copied().collect();
-        // What is decoded need not be what the compressed file stated.
+        // Decompressed values may lie outside of the range stated in the file, so it is recomputed for them
+        // as well.
         if !chosen.complete || buffers.is_decoded(accessor) {
             let elements = chosen.sources.iter().map(|source| {
                 let replaced = replacements.get(source).copied();
@@ -159,20 +163,22 @@ impl NewData {
     }
 }
 
-/// Normals for other vertices, as [`NewData::attribute`] writes them, but for those without a direction: zero or no number.
+/// Normals for the chosen vertices, written as by [`NewData::attribute`], except that zero and non-finite
+/// ones are replaced.
 pub(crate) struct Normals<'a> {
     pub buffers: &'a Buffers<'a>,
     pub accessor: usize,
     pub used_by: &'a str,
-    /// How many vertices there are.
+    /// Number of old vertices.
     pub vertices: usize,
     pub chosen: &'a Vertices,
-    /// What takes the place of a missing direction, by the new vertex.
+    /// The replacement for each new vertex.
     pub directions: &'a [Vec3],
 }
 
 impl Normals<'_> {
-    /// The accessor, and how many normals were mended; nothing if all have a direction.
+    /// Writes the normals with replacements. Returns their accessor and the number of replaced ones, or
+    /// `None` if nothing needs to be replaced or the accessor is not one of `vertices` 3D vectors.
     ///
     /// # Errors
     /// As [`NewData::attribute`].
@@ -226,7 +232,8 @@ impl Normals<'_> {
     }
 }
 
-/// The narrowest type from `least` on that holds the numbers of so many vertices.
+/// The narrowest index type that is at least as wide as `least` and can hold the indices of this many
+/// vertices.
 fn index_component(least: u64, vertices: usize) -> u64 {
     let fits = |component: u64| match component {
         UNSIGNED_BYTE => vertices <= usize::from(u8::MAX),
@@ -248,7 +255,7 @@ fn index_bytes(values: &[u32], component: u64) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes().into_iter().take(size)).collect()
 }
 
-/// `min` and `max` of the elements, where the accessor states them.
+/// Updates `min` and `max` of an accessor from its elements, where it states them.
 fn state_range<'a>(accessor: &mut Value, format: Format, elements: impl Iterator<Item = &'a [u8]>) {
     let stated: Vec<&str> = ["min", "max"].into_iter().filter(|key| accessor.get(key).is_some()).collect();
     if stated.is_empty() {

@@ -1,7 +1,7 @@
-//! The Khronos basic data format descriptor of the packed formats. Not the rest of a KTX2 file.
+//! The basic data format descriptor of the packed formats, as a KTX2 file contains it.
 //!
-//! Khronos Data Format Specification 1.3, chapter 5, and section 3.12 of the KTX 2.0 specification: supercompressed files keep the
-//! descriptor of what they unpack to.
+//! Khronos Data Format Specification 1.3, chapter 5, and section 3.12 of the KTX 2.0 specification:
+//! supercompressed files keep the descriptor of the uncompressed data.
 
 use super::PackedFormat;
 
@@ -12,15 +12,16 @@ const VERSION: u32 = 2;
 const EXPONENT: u32 = 0x20;
 const FLOAT: u32 = 0x80;
 
-/// The descriptor, its own total size first.
+/// The descriptor as 32-bit words, starting with its total size in bytes.
 pub(crate) fn data_format_descriptor(format: PackedFormat) -> Vec<u32> {
-    // One `sample` of four words each: where the bits are, their place in the texel block, and the numbers that stand for 0 and 1.
+    // One `sample` has four words: the bit range and the channel, the position in the texel block, and the
+    // values that represent 0 and 1.
     let sample = |channel: u32, offset: u32, bits: u32, lower: u32, upper: u32| {
         [offset | (bits - 1) << 16 | channel << 24, 0, lower, upper]
     };
     let samples: Vec<u32> = match format {
-        // A mantissa and the exponent in common for each channel; the bias is the lower bound of the exponent, and the bounds are those
-        // that the specification lists for this format.
+        // Each channel has one sample for its mantissa and one for the shared exponent. The lower bound of
+        // the exponent is its bias, and the bounds are those the specification lists for this format.
         PackedFormat::Rgb9E5 => (0..3)
             .flat_map(|channel| {
                 [sample(channel, 9 * channel, 9, 0, 8448), sample(channel | EXPONENT, 27, 5, 15, 31)]
@@ -36,10 +37,10 @@ pub(crate) fn data_format_descriptor(format: PackedFormat) -> Vec<u32> {
     let block = 24 + 4 * samples.len() as u32;
     let header = [
         block + 4,
-        // Vendor Khronos, basic format.
+        // Vendor Khronos, basic descriptor type.
         0,
         VERSION | block << 16,
-        // Straight alpha is no flag.
+        // The flags are 0: straight alpha is the default.
         MODEL_RGBSDA | PRIMARIES_BT709 << 8 | TRANSFER_LINEAR << 16,
         // Blocks of one texel.
         0,

@@ -1,26 +1,29 @@
-//! What writing light in fewer bits costs. Not the encoders, and not the error of the bake itself.
+//! The error that encoding light in fewer bits introduces. The encoders are elsewhere, and the error of the
+//! bake is not included.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// The difference between light and what its file holds.
+/// The difference between an image of light and what its file stores.
 ///
-/// Relative to the mean absolute channel over the texels that are not black: unused texels of an atlas do not dilute it. All zeros for an
-/// image without light.
+/// Errors are relative to the mean absolute channel over the texels that are not black, so that unused texels
+/// of an atlas do not dilute them. All fields are 0 for an image without light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EncodingError {
-    /// Root mean square error of the channels of texels that are not black, over their mean.
+    /// Root mean square error of the channels of texels that are not black, divided by their mean.
     pub relative_rmse: f64,
-    /// Largest error of a channel, over the same mean.
+    /// Largest error of a channel, divided by the same mean.
     pub largest: f64,
-    /// Texels with a channel beyond the format's largest number, which was written instead.
+    /// Texels with a channel outside of the format's range, which was clamped; without those counted in
+    /// `negative`.
     pub saturated: u64,
-    /// Texels with a channel below zero, written as 0 by formats without a sign.
+    /// Texels with a channel below zero in a format without a sign, which was written as 0.
     pub negative: u64,
 }
 
 impl EncodingError {
-    /// Compares texels with what a file gives back, in the same order; `range` is the least and the largest number of the format, by channel.
+    /// Compares texels with their decoded values in the same order. The last argument is the smallest and the
+    /// largest number of the format, by channel.
     pub(crate) fn between(
         texels: &[Vec3],
         decoded: impl Iterator<Item = Vec3>,

@@ -1,12 +1,14 @@
-//! A grid of ambient cubes for what moves, and its KTX2 file as Bevy's `IrradianceVolume` has it. Not the gathering of its light.
+//! A grid of ambient cubes that lights moving objects, and its KTX2 file in the layout of Bevy's
+//! `IrradianceVolume`. The light itself is gathered by the baker.
 //!
-//! The file is a 3D texture of (Rx, 2 Ry, 3 Rz) texels. The side of the cube (x, y, z) that surfaces with a normal along +X, +Y or +Z see is at
-//! (x, y, z + axis · Rz), that of the opposite normal at (x, y + Ry, z + axis · Rz), with axis 0 for X, 1 for Y and 2 for Z. (Bevy's shader
-//! adds half the height where a component of the normal is negative. The table in its documentation has the two signs the other way
-//! round, as it names sides by where their light goes.)
+//! The file is a 3D texture of (Rx, 2 Ry, 3 Rz) texels. For the cube (x, y, z), the side for surface normals
+//! along +X, +Y or +Z is at (x, y, z + axis · Rz) and the side for the opposite normal at (x, y + Ry, z +
+//! axis · Rz), where axis is 0 for X, 1 for Y and 2 for Z. (This follows Bevy's shader, which adds half the
+//! height where a component of the normal is negative. The table in Bevy's documentation has the two signs
+//! swapped, because it names a side by the direction in which its light travels.)
 //!
-//! Bevy stretches the grid over the unit cube around the origin of the entity, and rotates neither normals nor sides: volumes are aligned
-//! with the world's axes.
+//! Bevy stretches the grid over the unit cube around the entity's origin and rotates neither normals nor
+//! sides, so volumes must be aligned with the world axes.
 
 use bevy_ecs::component::Component;
 use glam::{UVec3, Vec3};
@@ -14,13 +16,13 @@ use glam::{UVec3, Vec3};
 use super::{EncodingError, Ktx2Error, Ktx2Texture, LightmapFileError, PackedFormat, Supercompression};
 use crate::Transform;
 
-/// The light at a point: E/π for surfaces that face +X, −X, +Y, −Y, +Z and −Z.
+/// The light at a point: E/π for surfaces with the normals +X, −X, +Y, −Y, +Z and −Z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AmbientCube(pub [Vec3; 6]);
 
 impl AmbientCube {
-    /// E/π for a surface with a normal of unit length: the three sides that it faces, weighted by the squares of its components
-    /// (Mitchell, McTaggart and Green, "Shading in Valve's Source Engine", 2006).
+    /// E/π for a surface with this unit normal: the three sides that face it, weighted by the squares of the
+    /// normal's components (Mitchell, McTaggart and Green, "Shading in Valve's Source Engine", 2006).
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
         let weights = (normal * normal).to_array();
         let negative = normal.cmplt(Vec3::ZERO);
@@ -28,27 +30,30 @@ impl AmbientCube {
     }
 }
 
-/// Ambient cubes at the centres of the cells of a grid: the baked light for what moves.
+/// Ambient cubes at the cell centres of a grid: the baked light for moving objects.
 ///
-/// The entity's transform maps the unit cube [-1/2, 1/2]^3 to the grid; it may move and stretch it, but not rotate it.
+/// The entity's transform maps the unit cube [-1/2, 1/2]^3 to the grid. It may translate and scale it, but
+/// not rotate it.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(Transform)]
 pub struct IrradianceVolume {
     /// Cells along x, y and z.
     pub resolution: UVec3,
-    /// Along x first, then y, then z.
+    /// One cube per cell; x varies fastest, then y, then z.
     pub cubes: Vec<AmbientCube>,
-    /// In the same order, whether a probe lies inside of geometry, where nothing is lit; empty where none does, or nobody has looked. Its cube is what the bake put
-    /// there in place of nothing, for readers that ask no further. The KTX2 file does not hold these marks, the glTF that names it does.
+    /// For each probe, in the same order, whether it lies inside geometry and thus receives no light; empty
+    /// if none does or if this is unknown. The cube of such a probe holds substitute light from the bake, for
+    /// readers that ignore these flags. The KTX2 file does not store them; the glTF file that refers to it
+    /// does.
     pub inside: Vec<bool>,
 }
 
 impl IrradianceVolume {
-    /// The file, and what its encoding costs over all sides of all cubes.
+    /// Encodes the volume as a KTX2 file. Also returns the encoding error over all sides of all cubes.
     ///
     /// # Errors
-    /// [`LightmapFileError`] if there are no cubes, not as many as the resolution says, or light that is not finite (its row counts
-    /// through all slices).
+    /// [`LightmapFileError`] if there are no cubes, if their number does not match the resolution, or if
+    /// light is not finite (the row in that error counts through all slices).
     pub fn to_ktx2(
         &self,
         format: PackedFormat,
@@ -56,7 +61,8 @@ impl IrradianceVolume {
     ) -> Result<(Vec<u8>, EncodingError), LightmapFileError> {
         let count = self.cubes.len();
         let UVec3 { x: width, y, z } = self.resolution;
-        // Products of the sizes fit once they are the number of cubes; the texture's sides are checked to.
+        // Once the product equals the number of cubes, the smaller products fit as well; the sides of the
+        // texture are checked separately.
         let expected = u128::from(width) * u128::from(y) * u128::from(z);
         let sides = (y.checked_mul(2), z.checked_mul(3));
         let (Some(height), Some(depth), true) = (sides.0, sides.1, expected == count as u128 && count > 0)
@@ -78,10 +84,11 @@ impl IrradianceVolume {
         Ok((texture.to_bytes(supercompression)?, error))
     }
 
-    /// Reads a file of at most `most_texels` (six per cube).
+    /// Decodes a KTX2 file of at most `most_texels` texels (six per cube).
     ///
     /// # Errors
-    /// [`Ktx2Error`] if it is no KTX2 file of the kind, has other sides than such a volume, or holds infinity or NaN.
+    /// [`Ktx2Error`] if the file is not a supported KTX2 file, its sides are not those of such a volume, or a
+    /// texel is infinite or NaN.
     pub fn from_ktx2(bytes: &[u8], most_texels: u64) -> Result<Self, Ktx2Error> {
         let texture = Ktx2Texture::from_bytes(bytes, most_texels)?;
         let sides = [("pixelHeight", texture.height, 2), ("pixelDepth", texture.depth.unwrap_or(0), 3)];
@@ -105,7 +112,7 @@ impl IrradianceVolume {
     }
 }
 
-/// The cube and its side that a texel of the file holds.
+/// The cube and the side of it that a texel of the file stores.
 fn place(resolution: UVec3, at: usize) -> (usize, usize) {
     let [width, height, depth] = resolution.to_array().map(|side| side as usize);
     let (s, t, p) = (at % width, at / width % (2 * height), at / width / (2 * height));

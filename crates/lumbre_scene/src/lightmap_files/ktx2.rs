@@ -1,4 +1,5 @@
-//! A KTX2 texture of packed colours, and what can be wrong with one. Not its reading or writing.
+//! A KTX2 texture with packed colours, its errors, and constants of the format. Reading and writing are in
+//! `ktx2_reader` and `ktx2_writer`.
 
 use glam::Vec3;
 
@@ -7,25 +8,25 @@ use super::PackedFormat;
 /// The first twelve bytes of every KTX2 file.
 pub(crate) const IDENTIFIER: [u8; 12] =
     [0xab, 0x4b, 0x54, 0x58, 0x20, 0x32, 0x30, 0xbb, 0x0d, 0x0a, 0x1a, 0x0a];
-/// Bytes of the header with its index, before the level index.
+/// Size in bytes of the header with its index, before the level index.
 pub(crate) const HEADER_BYTES: usize = 80;
-/// Bytes of an entry of the level index.
+/// Size in bytes of an entry of the level index.
 pub(crate) const LEVEL_BYTES: usize = 24;
-/// The metadata that says which way rows go.
+/// The metadata key for the directions of rows and slices.
 pub(crate) const ORIENTATION_KEY: &str = "KTXorientation";
 
-/// How the texels of a KTX2 file are compressed as a whole.
+/// Compression of the texel data of a KTX2 file as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Supercompression {
-    /// As they are: readers need no decoder.
+    /// Uncompressed: readers need no decoder.
     None,
-    /// As a Zstandard frame, without loss.
+    /// One Zstandard frame (lossless).
     #[default]
     Zstandard,
 }
 
 impl Supercompression {
-    /// The number that a file has for it.
+    /// The value of the `supercompressionScheme` field.
     pub(crate) fn scheme(self) -> u32 {
         match self {
             Self::None => 0,
@@ -34,29 +35,30 @@ impl Supercompression {
     }
 }
 
-/// A 2D or 3D texture of one level, without layers.
+/// A 2D or 3D texture with one mip level and no layers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ktx2Texture {
-    /// How a texel packs its colour.
+    /// Format of the texels.
     pub format: PackedFormat,
-    /// Texels along a row.
+    /// Texels per row.
     pub width: u32,
-    /// Rows of a slice. Bevy takes a picture of a single row for a 1D texture.
+    /// Rows per slice. Bevy reads a texture of a single row as a 1D texture.
     pub height: u32,
     /// Slices of a 3D texture; `None` for a 2D texture.
     pub depth: Option<u32>,
-    /// Row by row from the top, slice by slice from the front.
+    /// Packed texels: row by row from the top, slice by slice from the front.
     pub texels: Vec<u32>,
 }
 
 impl Ktx2Texture {
-    /// The colours of the texels, in their order.
+    /// The decoded colours of the texels, in the same order.
     pub fn colors(&self) -> impl Iterator<Item = Vec3> {
         self.texels.iter().map(|&texel| self.format.decode(texel))
     }
 }
 
-/// Why a KTX2 file cannot be read or written. Only files of the kind that this crate writes are read.
+/// Why a KTX2 file cannot be read or written. The reader supports only the kind of files that this crate
+/// writes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Ktx2Error {
@@ -68,61 +70,61 @@ pub enum Ktx2Error {
         "its {what} ends at byte {needed}, but the file at {found}; it is truncated, copy or write it again"
     )]
     Truncated {
-        /// The part.
+        /// The part of the file.
         what: &'static str,
-        /// Where it should end.
+        /// Offset at which the part should end.
         needed: u64,
-        /// Bytes of the file.
+        /// Size of the file in bytes.
         found: u64,
     },
-    /// The texels are of another format.
+    /// The texels have an unsupported format.
     #[error(
         "has VkFormat {found}; only 123 (E5B9G9R9) and 122 (B10G11R11) are read, write it as one of them"
     )]
     Format {
-        /// The number in the file.
+        /// The `VkFormat` in the file.
         found: u32,
     },
-    /// A field has a value that is not read.
+    /// A field has an unsupported value.
     #[error("its {field} is {found}, but {expected} is wanted; write it again")]
     Field {
-        /// The name that the specification has for it.
+        /// The field's name in the specification.
         field: &'static str,
-        /// What it holds.
+        /// The value found.
         found: u64,
-        /// What would be right.
+        /// The values that are supported.
         expected: String,
     },
-    /// Rows go another way.
+    /// The rows or slices run in an unsupported direction.
     #[error("has the orientation {found:?}; only {expected:?} is read, flip and write it again")]
     Orientation {
-        /// What it says.
+        /// The orientation found.
         found: String,
-        /// What would be right.
+        /// The orientation that is supported.
         expected: &'static str,
     },
-    /// The sizes do not fit the texels that are to be written.
+    /// The number of texels to be written does not match the size.
     #[error("{texels} texels are not {size}")]
     Size {
-        /// How many there are.
+        /// Number of texels.
         texels: usize,
         /// Width, height and depth.
         size: String,
     },
-    /// The compressed texels cannot be packed or unpacked.
+    /// The texels cannot be compressed or decompressed.
     #[error("its Zstandard data is not good: {problem}; write it again")]
     Zstandard {
-        /// What is wrong with them.
+        /// What the codec reports.
         problem: String,
     },
 }
 
-/// The little-endian word at an offset that is known to be inside.
+/// The little-endian 32-bit word at an offset, which must be within the bytes.
 pub(crate) fn word(bytes: &[u8], offset: usize) -> u32 {
     bytes[offset..].iter().take(4).rev().fold(0, |word, &byte| word << 8 | u32::from(byte))
 }
 
-/// Bytes of a file from an offset, checked against those that exist.
+/// The bytes of a part of a file, or [`Ktx2Error::Truncated`] if the file ends before the part does.
 pub(crate) fn part<'a>(
     bytes: &'a [u8],
     what: &'static str,
@@ -131,7 +133,7 @@ pub(crate) fn part<'a>(
 ) -> Result<&'a [u8], Ktx2Error> {
     let needed = start.saturating_add(length);
     let found = bytes.len() as u64;
-    // Both are at most the length of a slice, or refused.
+    // The casts are lossless: both numbers are at most the length of the slice.
     if needed > found {
         return Err(Ktx2Error::Truncated { what, needed, found });
     }

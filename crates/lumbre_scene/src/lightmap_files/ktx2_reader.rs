@@ -1,31 +1,32 @@
-//! Reads KTX2 files of the kind that this crate writes, from bytes that nothing is known about. Not other kinds.
+//! Reads KTX2 files of the kind that this crate writes, from untrusted bytes. Other kinds are refused.
 
 use super::ktx2::{HEADER_BYTES, IDENTIFIER, LEVEL_BYTES, ORIENTATION_KEY, part, word};
 use super::{Ktx2Error, Ktx2Texture, PackedFormat, Supercompression, zstandard};
 
-/// Most texels per byte of a Zstandard frame: a block of four bytes can stand for 128 KiB.
+/// Most texels per byte of a Zstandard frame: a block of four bytes can expand to 128 KiB.
 const MOST_TEXELS_PER_BYTE: u64 = (128 << 10) / 4 / 4;
 
-/// What the header says, before any texel is unpacked.
+/// The validated header of a file, available before any texel is decompressed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Header<'a> {
     pub format: PackedFormat,
     pub width: u32,
     pub height: u32,
     pub depth: Option<u32>,
-    /// Texels in all; their bytes fit `usize`, and the file's bytes can hold them.
+    /// Number of texels. Their size in bytes fits `usize`, and the compressed level is long enough to hold
+    /// them.
     pub texels: u64,
     supercompression: Supercompression,
     level: &'a [u8],
 }
 
 impl<'a> Header<'a> {
-    /// Whether bytes start as a KTX2 file does.
+    /// Returns true if the bytes start with the KTX2 identifier.
     pub(crate) fn recognizes(bytes: &[u8]) -> bool {
         bytes.starts_with(&IDENTIFIER)
     }
 
-    /// Checks everything but the texels.
+    /// Checks everything except the texels.
     pub(crate) fn read(bytes: &'a [u8]) -> Result<Self, Ktx2Error> {
         if !Self::recognizes(bytes) {
             return Err(Ktx2Error::Identifier);
@@ -66,13 +67,13 @@ impl<'a> Header<'a> {
         let long = |offset: usize| u64::from(word(bytes, offset)) | u64::from(word(bytes, offset + 4)) << 32;
         let [start, length, unpacked] = [0, 8, 16].map(|offset| long(HEADER_BYTES + offset));
         let level = part(bytes, "level 0", start, length)?;
-        // 96 bits of sizes in 128.
+        // Three 32-bit sizes need up to 96 bits.
         let texels = u128::from(width) * u128::from(height) * u128::from(depth.unwrap_or(1));
         let wrong = |field, found, expected: String| Err(Ktx2Error::Field { field, found, expected });
         if u128::from(unpacked) != 4 * texels {
             return wrong("uncompressedByteLength", unpacked, format!("{} (4 a texel)", 4 * texels));
         }
-        // Both are what 64 bits hold, now that they are the same.
+        // The count fits u64, since the 64-bit field holds four times as much.
         let texels = unpacked / 4;
         let possible = match supercompression {
             Supercompression::None if length != unpacked => {
@@ -87,7 +88,7 @@ impl<'a> Header<'a> {
         Ok(Self { format, width, height, depth, texels, supercompression, level })
     }
 
-    /// Unpacks the texels: four bytes each, and as much again for the texture.
+    /// Decompresses the texels. This takes four bytes per texel, and another four for the texture.
     pub(crate) fn texture(self) -> Result<Ktx2Texture, Ktx2Error> {
         let unpacked;
         let bytes = match self.supercompression {
@@ -104,11 +105,13 @@ impl<'a> Header<'a> {
 }
 
 impl Ktx2Texture {
-    /// Reads a file of RGB9E5 or B10G11R11 texels with one level and no layers, compressed with Zstandard or not.
-    /// At most `most_texels` are unpacked, which need eight bytes each.
+    /// Reads a file of RGB9E5 or B10G11R11 texels with one level and no layers, with or without Zstandard
+    /// compression.
+    ///
+    /// At most `most_texels` texels are decompressed, which takes eight bytes each.
     ///
     /// # Errors
-    /// [`Ktx2Error`] with the field and what it should be.
+    /// [`Ktx2Error`] with the field and the values that are supported.
     pub fn from_bytes(bytes: &[u8], most_texels: u64) -> Result<Self, Ktx2Error> {
         let header = Header::read(bytes)?;
         if header.texels > most_texels {
@@ -120,7 +123,8 @@ impl Ktx2Texture {
     }
 }
 
-/// Looks for an orientation other than the default; entries that are damaged end the search, as nothing else is asked of them.
+/// Refuses a stated orientation other than `expected`. A damaged entry ends the search without an error,
+/// since no other metadata is needed.
 fn orientation(mut entries: &[u8], expected: &'static str) -> Result<(), Ktx2Error> {
     while entries.len() > 4 {
         let length = word(entries, 0) as usize;

@@ -1,14 +1,15 @@
-//! Writes KTX2 files of one level (KTX File Format Specification 2.0). Not their texels' encoding.
+//! Writes KTX2 files with one level (KTX File Format Specification 2.0). The texels are encoded before.
 
 use super::data_format_descriptor::data_format_descriptor;
 use super::ktx2::{HEADER_BYTES, IDENTIFIER, LEVEL_BYTES, ORIENTATION_KEY};
 use super::{Ktx2Error, Ktx2Texture, Supercompression, zstandard};
 
 impl Ktx2Texture {
-    /// The whole file.
+    /// Encodes the texture as a KTX2 file.
     ///
     /// # Errors
-    /// [`Ktx2Error::Size`] if the texels are not as many as the sizes say, or none.
+    /// [`Ktx2Error::Size`] if the number of texels is 0 or does not match the size, [`Ktx2Error::Zstandard`]
+    /// if compression fails.
     pub fn to_bytes(&self, supercompression: Supercompression) -> Result<Vec<u8>, Ktx2Error> {
         let count = [self.height, self.depth.unwrap_or(1)]
             .into_iter()
@@ -28,13 +29,13 @@ impl Ktx2Texture {
         let metadata = metadata(if self.depth.is_some() { "rdi" } else { "rd" });
         let descriptor_offset = HEADER_BYTES + LEVEL_BYTES;
         let metadata_offset = descriptor_offset + 4 * descriptor.len();
-        // A multiple of 4, as texels without supercompression must start at.
+        // A multiple of 4, as the specification requires for levels without supercompression.
         let level_offset = metadata_offset + metadata.len();
 
         let mut file = IDENTIFIER.to_vec();
         let words = [
             self.format.vulkan_format(),
-            // Bytes of the type that texels are uploaded as: a word of 32 bits.
+            // typeSize: texels are uploaded as 32-bit words.
             4,
             self.width,
             self.height,
@@ -50,7 +51,7 @@ impl Ktx2Texture {
             metadata.len() as u32,
         ];
         file.extend(words.into_iter().flat_map(u32::to_le_bytes));
-        // Data common to all levels: neither scheme has any. Then the only level.
+        // No supercompression global data: neither scheme has any. Then the index entry of the only level.
         let longs = [0, 0, level_offset as u64, level.len() as u64, unpacked];
         file.extend(longs.into_iter().flat_map(u64::to_le_bytes));
         file.extend(descriptor.into_iter().flat_map(u32::to_le_bytes));
@@ -60,7 +61,7 @@ impl Ktx2Texture {
     }
 }
 
-/// Keys and values, sorted by key, each padded to a multiple of four bytes.
+/// The key/value data, sorted by key, each entry padded to a multiple of four bytes.
 fn metadata(orientation: &str) -> Vec<u8> {
     let writer = concat!("Lumbre ", env!("CARGO_PKG_VERSION"));
     let mut bytes = Vec::new();

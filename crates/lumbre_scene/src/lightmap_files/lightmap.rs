@@ -1,39 +1,39 @@
-//! Lightmaps as bytes of files. Not the formats themselves.
+//! Encodes lightmaps as OpenEXR or KTX2 files. The formats themselves are in `open_exr` and `ktx2_writer`.
 
 use glam::Vec3;
 
 use super::{EncodingError, Ktx2Error, Ktx2Texture, PackedFormat, Supercompression, open_exr};
 use crate::{LightmapEncoding, LightmapImage};
 
-/// Why light cannot be written to a file.
+/// Why baked light cannot be written to a file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LightmapFileError {
-    /// The sizes and the texels do not fit.
+    /// The number of texels is 0 or does not match the size.
     #[error("{texels} texels are not {width} x {height}")]
     Size {
-        /// How many there are.
+        /// Number of texels.
         texels: usize,
-        /// Texels of a row.
+        /// Width in texels.
         width: u32,
-        /// Rows.
+        /// Height in texels.
         height: u32,
     },
-    /// A texel is not finite.
+    /// A texel is infinite or NaN.
     #[error("texel {column} of row {row} is NaN or infinite")]
     NotFinite {
-        /// Counted from the left, from 0.
+        /// Column, counted from 0 at the left.
         column: usize,
-        /// Counted from the top, from 0.
+        /// Row, counted from 0 at the top.
         row: usize,
     },
-    /// OpenEXR cannot hold it.
+    /// The OpenEXR file cannot be written.
     #[error("OpenEXR: {problem}")]
     OpenExr {
-        /// What its writer said.
+        /// What the OpenEXR writer reports.
         problem: String,
     },
-    /// KTX2 cannot hold it.
+    /// The KTX2 file cannot be written.
     #[error("KTX2: it {source}")]
     Ktx2 {
         /// What is wrong.
@@ -42,11 +42,12 @@ pub enum LightmapFileError {
     },
 }
 
-/// A lightmap as an OpenEXR file and what that costs: half floats for [`LightmapEncoding::Rgb16Float`], else 32-bit floats, from which
-/// other encodings can be made. The image's own encoding is not asked.
+/// Encodes a lightmap as an OpenEXR file and returns the encoding error: half floats for
+/// [`LightmapEncoding::Rgb16Float`], 32-bit floats for the other encodings, which can be made from these
+/// later. The image's own `encoding` is ignored.
 ///
 /// # Errors
-/// [`LightmapFileError`] if it is empty, of another size than it says, or not finite.
+/// [`LightmapFileError`] if the image is empty, its texels do not match its size, or a texel is not finite.
 pub fn lightmap_to_open_exr(
     image: &LightmapImage,
     encoding: LightmapEncoding,
@@ -58,12 +59,14 @@ pub fn lightmap_to_open_exr(
     }
 }
 
-/// A lightmap as a KTX2 file of one level, whatever its own encoding, and what that costs.
+/// Encodes a lightmap as a KTX2 file with one level and returns the encoding error. The image's own
+/// `encoding` is ignored.
 ///
-/// Bevy's `Lightmap` shows it as it is: texel · exposure · diffuse colour, which is the reflected radiance ρ E/π.
+/// Bevy's `Lightmap` can show the file without conversion: texel · exposure · diffuse colour is the reflected
+/// radiance ρ E/π.
 ///
 /// # Errors
-/// [`LightmapFileError`] if it is empty, of another size than it says, or not finite.
+/// [`LightmapFileError`] if the image is empty, its texels do not match its size, or a texel is not finite.
 pub fn lightmap_to_ktx2(
     image: &LightmapImage,
     format: PackedFormat,

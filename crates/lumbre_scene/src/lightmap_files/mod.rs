@@ -1,13 +1,15 @@
-//! Files that hold baked light: OpenEXR and KTX2 lightmaps, KTX2 irradiance volumes. Not the glTF that names them, not the baking.
+//! Files of baked light: OpenEXR and KTX2 lightmaps, and KTX2 irradiance volumes. The glTF files that refer
+//! to them and the baking are elsewhere.
 //!
 //! ```text
 //!   LightmapImage ──► open_exr ─────────────────────────────────────► .exr   half or float, ZIP; the master
-//!                └──► packed_format ──► ktx2_writer ──► zstandard ──► .ktx2  RGB9E5 or B10G11R11, as Bevy's Lightmap reads it
+//!                └──► packed_format ──► ktx2_writer ──► zstandard ──► .ktx2  RGB9E5 or B10G11R11, for Bevy
 //!   IrradianceVolume ─┘      ▲                              │
 //!                            └──── ktx2_reader ◄────────────┘
 //! ```
 //!
-//! Every encoder returns what it cost as an [`EncodingError`]. Numbers are little-endian, rows go from top to bottom.
+//! Every encoder returns its error as an [`EncodingError`]. Numbers are little-endian, and rows go from top
+//! to bottom.
 
 mod data_format_descriptor;
 mod encoding_error;

@@ -1,4 +1,4 @@
-//! OpenEXR files of three channels, compressed with ZIP. Not their reading: the `image` crate does that.
+//! Writes OpenEXR files with three channels and ZIP compression. The `image` crate reads them.
 
 use exr::prelude::{
     Blocks, Compression, Encoding, Image, IntoSample, Layer, LayerAttributes, LineOrder, SpecificChannels,
@@ -10,9 +10,9 @@ use half::f16;
 use super::{EncodingError, LightmapFileError};
 use crate::LightmapImage;
 
-/// An image as half floats, nearest with ties to even; beyond 65504 it is 65504.
+/// Encodes an image as half floats, rounded to nearest with ties to even and clamped to ±65504.
 ///
-/// The error is at most 2^-11 of a channel, and at most 2^-25 where that is less.
+/// The error of a channel c within that range is at most max(2^-11 |c|, 2^-25).
 pub(crate) fn as_halves(image: &LightmapImage) -> Result<(Vec<u8>, EncodingError), LightmapFileError> {
     let halves: Vec<[f16; 3]> = image
         .texels
@@ -26,14 +26,14 @@ pub(crate) fn as_halves(image: &LightmapImage) -> Result<(Vec<u8>, EncodingError
     Ok((file(image, |at| halves[at].into())?, error))
 }
 
-/// An image as 32-bit floats: exactly as it is.
+/// Encodes an image as 32-bit floats, without error.
 pub(crate) fn as_floats(image: &LightmapImage) -> Result<(Vec<u8>, EncodingError), LightmapFileError> {
     Ok((file(image, |at| image.texels[at].into())?, EncodingError::default()))
 }
 
 const LARGEST_HALF: f32 = 65_504.0;
 
-/// Scan lines in blocks of 16, one after the other: the same bytes on any number of threads.
+/// Writes scan lines in blocks of 16, in order and on one thread, so that equal images give equal bytes.
 fn file<T: IntoSample + Sync>(
     image: &LightmapImage,
     texel: impl Fn(usize) -> (T, T, T) + Sync,

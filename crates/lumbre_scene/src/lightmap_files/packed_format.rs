@@ -1,4 +1,4 @@
-//! Colours of three positive floats in 32 bits, as GPUs read them. Not the file around them.
+//! GPU texture formats that pack three unsigned floats into 32 bits. The KTX2 file around them is elsewhere.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -6,22 +6,24 @@ use serde::{Deserialize, Serialize};
 use super::shared_exponent;
 use super::unsigned_float::{FLOAT_10, FLOAT_11};
 
-/// How a KTX2 file packs a colour into 32 bits. Both have no sign; both are filtered by every GPU, and half floats hold every colour of
-/// either exactly.
+/// How a KTX2 file packs a colour into 32 bits. Both formats are unsigned, every GPU can filter both, and
+/// half floats represent every colour of either exactly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PackedFormat {
-    /// Nine bits per channel and an exponent in common: the error is at most largest channel / 511.5. Up to 65408.
+    /// Nine bits per channel and a shared exponent. The error is at most 1/511.5 of the largest channel;
+    /// largest value 65408.
     #[default]
     Rgb9E5,
-    /// Floats of 11, 11 and 10 bits: the error is at most 1/128 of red and of green, 1/64 of blue. Up to 65024 (blue 64512).
+    /// Floats of 11, 11 and 10 bits. The error is at most 1/128 of red and green and 1/64 of blue; largest
+    /// value 65024 (blue 64512).
     B10G11R11,
 }
 
 impl PackedFormat {
-    /// Both.
+    /// Both formats.
     pub const ALL: [Self; 2] = [Self::Rgb9E5, Self::B10G11R11];
 
-    /// `rgb9e5` or `b10g11r11`.
+    /// The name on the command line: `rgb9e5` or `b10g11r11`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rgb9E5 => "rgb9e5",
@@ -29,7 +31,7 @@ impl PackedFormat {
         }
     }
 
-    /// The number of its `VkFormat`: E5B9G9R9_UFLOAT_PACK32 or B10G11R11_UFLOAT_PACK32.
+    /// The value of the `VkFormat`: E5B9G9R9_UFLOAT_PACK32 or B10G11R11_UFLOAT_PACK32.
     pub fn vulkan_format(self) -> u32 {
         match self {
             Self::Rgb9E5 => 123,
@@ -37,7 +39,7 @@ impl PackedFormat {
         }
     }
 
-    /// The largest number of each channel; what is above is written as this.
+    /// The largest number of each channel, to which larger ones are clamped.
     pub fn largest(self) -> Vec3 {
         match self {
             Self::Rgb9E5 => Vec3::splat(shared_exponent::LARGEST),
@@ -45,7 +47,7 @@ impl PackedFormat {
         }
     }
 
-    /// How far a channel of a colour can be from what is written for it, if the colour is within [0, largest]: the closed bound.
+    /// Upper bound on the encoding error of each channel of a colour within [0, largest], in closed form.
     pub fn largest_error(self, color: Vec3) -> Vec3 {
         match self {
             Self::Rgb9E5 => Vec3::splat((color.max_element() / 511.5).max(2f32.powi(-25))),
@@ -57,7 +59,8 @@ impl PackedFormat {
         }
     }
 
-    /// The nearest colour of the format; below 0 is 0, above the largest is the largest. `None` if a channel is NaN or infinite.
+    /// Encodes a colour as the nearest one of the format, clamped to [0, largest]. `None` if a channel is NaN
+    /// or infinite.
     pub fn encode(self, color: Vec3) -> Option<u32> {
         color.is_finite().then(|| match self {
             Self::Rgb9E5 => shared_exponent::encode(color),
@@ -67,7 +70,8 @@ impl PackedFormat {
         })
     }
 
-    /// The colour that 32 bits stand for, exactly. B10G11R11 can hold infinity and NaN, though [`PackedFormat::encode`] never writes them.
+    /// Decodes 32 bits exactly. B10G11R11 can represent infinity and NaN, though [`PackedFormat::encode`]
+    /// never writes them.
     pub fn decode(self, bits: u32) -> Vec3 {
         match self {
             Self::Rgb9E5 => shared_exponent::decode(bits),

@@ -1,7 +1,8 @@
-//! RGB9E5: three nine-bit mantissas that share a five-bit exponent, 32 bits a colour. Not formats with an exponent per channel.
+//! RGB9E5: three nine-bit mantissas that share a five-bit exponent, 32 bits per colour.
 //!
-//! A channel is m · 2^(e − 24), m < 512, e < 32 (`EXT_texture_shared_exponent`, N = 9, B = 15, Emax = 31; the same numbers are
-//! `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`): red in bits 0 to 8, green 9 to 17, blue 18 to 26, the exponent 27 to 31.
+//! A channel is m · 2^(e − 24), m < 512, e < 32 (`EXT_texture_shared_exponent`, N = 9, B = 15, Emax = 31; the
+//! same format is `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`). Red is in bits 0 to 8, green in 9 to 17, blue in 18 to 26,
+//! and the exponent in 27 to 31.
 
 use glam::{DVec3, Vec3};
 
@@ -9,22 +10,26 @@ use glam::{DVec3, Vec3};
 pub(crate) const LARGEST: f32 = 65_408.0;
 
 const MANTISSA: u32 = 9;
-/// The exponent's bias and the mantissa's bits.
+/// The exponent's bias plus the bits of the mantissa.
 const SHIFT: i32 = 15 + MANTISSA as i32;
 
-/// The nearest shared-exponent colour of a finite colour; ties go up. Channels below 0 become 0, those above 65408 become 65408.
+/// Encodes a finite colour as the nearest shared-exponent colour; ties round up. Channels are clamped to [0,
+/// 65408].
 ///
-/// Each channel is within half a unit of its colour: at most largest channel / 511.5, and at most 2^-25 where that is less
-/// (the rule of `EXT_texture_shared_exponent`, evaluated without rounding in f64).
+/// Each channel of a colour in that range is rounded to within half a unit: its error is at most max(largest
+/// channel / 511.5, 2^-25). This is the rule of `EXT_texture_shared_exponent`, evaluated without rounding in
+/// f64.
 pub(crate) fn encode(color: Vec3) -> u32 {
     let color = color.clamp(Vec3::ZERO, Vec3::splat(LARGEST)).as_dvec3();
     let largest = color.max_element();
-    // floor(log2) from the bits: exact. f64 has an exponent of its own for every f32 but 0, whose field is far below the bias as well.
+    // floor(log2) read from the bits, so it is exact. Every f32 except 0 is a normal f64; 0 gives a value far
+    // below -16.
     let floor_log2 = ((largest.to_bits() >> 52) & 0x7ff) as i32 - 1023;
     let mut exponent = floor_log2.max(-16) + 16;
     let round = |color: DVec3, exponent: i32| (color * power_of_two(SHIFT - exponent) + 0.5).floor();
     if round(color, exponent).max_element() > 511.0 {
-        // The largest channel rounded up to the next power of two. Never at exponent 31: 65408 is its largest mantissa.
+        // The largest channel rounds up to the next power of two. This never happens at exponent 31, as the
+        // largest input is exactly 511/512 · 2^16.
         exponent += 1;
     }
     let mantissas = round(color, exponent).as_uvec3();
@@ -34,7 +39,7 @@ pub(crate) fn encode(color: Vec3) -> u32 {
         | (exponent as u32) << (3 * MANTISSA)
 }
 
-/// The colour that 32 bits stand for, exactly.
+/// Decodes 32 bits exactly.
 pub(crate) fn decode(bits: u32) -> Vec3 {
     let exponent = (bits >> (3 * MANTISSA)) as i32;
     let mantissa = |channel: u32| f64::from(bits >> (channel * MANTISSA) & 0x1ff);
@@ -54,7 +59,7 @@ mod tests {
     fn every_code_decodes_and_encodes_to_the_same_color() {
         for exponent in 0..32u32 {
             for red in 0..512u32 {
-                // Green and blue run through all mantissas as well, in orders of their own.
+                // Green and blue run through all mantissas as well, in other orders.
                 let code = red | ((red * 5 + 3) % 512) << 9 | ((red * 301 + 77) % 512) << 18 | exponent << 27;
                 let color = decode(code);
                 assert_eq!(color.x, red as f32 * 2f32.powi(exponent as i32 - 24));
@@ -67,13 +72,13 @@ mod tests {
         assert_eq!(encode(Vec3::ONE), 256 | 256 << 9 | 256 << 18 | 16 << 27);
     }
 
-    /// Whether a channel can be written nearer with the same exponent: brute force over the neighbours.
+    /// Checks that the code is the nearest one to the colour and has the smallest exponent that can hold it.
     fn nearest(color: Vec3, code: u32) {
         let (decoded, exponent) = (decode(code).as_dvec3(), (code >> 27) as i32);
         let unit = 2f64.powi(exponent - 24);
         let difference = (decoded - color.as_dvec3()).abs();
         assert!(difference.max_element() <= 0.5 * unit, "{color} became {decoded}, unit {unit}");
-        // The smallest exponent that holds the colour: with one less its largest channel rounds beyond 511.
+        // The exponent is the smallest possible: with one less the largest channel would round to above 511.
         if exponent > 0 {
             let mantissa = (color.max_element() as f64 / (0.5 * unit) + 0.5).floor();
             assert!(mantissa > 511.0, "{color} would fit exponent {}", exponent - 1);
@@ -90,7 +95,7 @@ mod tests {
             state
         };
         for _ in 0..400_000 {
-            // Any positive float up to the largest, log-uniform, subnormals included.
+            // Any positive float up to the largest value, log-uniform, including subnormals.
             let mut channel = || f32::from_bits((random() >> 32) as u32 % (LARGEST.to_bits() + 1));
             let color = Vec3::new(channel(), channel(), channel());
             let code = encode(color);
@@ -100,7 +105,7 @@ mod tests {
             let difference = (decode(code).as_dvec3() - color.as_dvec3()).abs().max_element();
             assert!(difference <= bound, "{color}: {difference} above {bound}");
         }
-        // Where the largest channel rounds up to a power of two and takes the next exponent.
+        // Values whose largest channel rounds up to a power of two and needs the next exponent.
         for power in -14..16 {
             for step in 0..64 {
                 let red = f32::from_bits((2f32.powi(power)).to_bits() - step * 1024);
@@ -115,7 +120,7 @@ mod tests {
         assert_eq!(decode(encode(Vec3::new(-1.0, 1e30, f32::MAX))), Vec3::new(0.0, LARGEST, LARGEST));
         assert_eq!(encode(Vec3::splat(-0.0)), 0);
         assert_eq!(encode(Vec3::splat(f32::MIN_POSITIVE)), 0);
-        // Half the smallest unit goes up, as the rule has it.
+        // Half of the smallest unit rounds up, as the rule requires.
         assert_eq!(decode(encode(Vec3::splat(2f32.powi(-25)))), Vec3::splat(2f32.powi(-24)));
     }
 }

@@ -1,17 +1,18 @@
-//! Unsigned floats of 11 and 10 bits: five of exponent, no sign. Not the packing of three of them into a word.
+//! Unsigned floats of 11 and 10 bits with five exponent bits. Packing three of them into a word is in
+//! `packed_format`.
 //!
-//! (1 + m / 2^M) · 2^(e − 15) for 0 < e < 31, m / 2^M · 2^−14 for e = 0; e = 31 is infinity or NaN (Vulkan 1.3, sections
-//! "Unsigned 11-Bit Floating-Point Numbers" and "Unsigned 10-Bit Floating-Point Numbers").
+//! A number is (1 + m / 2^M) · 2^(e − 15) for 0 < e < 31 and m / 2^M · 2^−14 for e = 0; e = 31 is infinity or NaN
+//! (Vulkan 1.3, sections "Unsigned 11-Bit Floating-Point Numbers" and "Unsigned 10-Bit Floating-Point Numbers").
 
-/// A format by the bits of its mantissa.
+/// A format, given by the number of its mantissa bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct UnsignedFloat {
     mantissa: u32,
 }
 
-/// Six bits of mantissa: largest 65024.
+/// 11-bit float with six mantissa bits; the largest number is 65024.
 pub(crate) const FLOAT_11: UnsignedFloat = UnsignedFloat { mantissa: 6 };
-/// Five bits of mantissa: largest 64512.
+/// 10-bit float with five mantissa bits; the largest number is 64512.
 pub(crate) const FLOAT_10: UnsignedFloat = UnsignedFloat { mantissa: 5 };
 
 impl UnsignedFloat {
@@ -26,22 +27,23 @@ impl UnsignedFloat {
         (65_536 - (1 << (15 - self.mantissa))) as f32
     }
 
-    /// The nearest code of a finite number, ties to even. Below 0 is 0, above the largest is the largest.
+    /// The code nearest to a finite number, with ties to even, clamped to [0, largest].
     ///
-    /// The error is at most 2^−(M+1) of the number, and at most 2^−(15+M) where that is less.
+    /// The error of a number in that range is at most max(2^−(M+1) · number, 2^−(15+M)), where M is the
+    /// number of mantissa bits.
     pub(crate) fn encode(self, value: f32) -> u32 {
         let value = f64::from(value.clamp(0.0, self.largest()));
-        // floor(log2) from the bits: exact.
+        // floor(log2) read from the bits, so it is exact.
         let exponent = (((value.to_bits() >> 52) & 0x7ff) as i32 - 1023).max(-14);
         let unit = f64::from_bits(((exponent - self.mantissa as i32 + 1023) as u64) << 52);
-        // Subnormal numbers have no hidden bit and the exponent of the smallest normal ones, so that one formula serves both, and a
-        // mantissa that rounds up to the next power of two carries into the exponent.
+        // Subnormal numbers have no hidden bit and use the exponent of the smallest normal ones, so one
+        // formula serves both. A mantissa that rounds up to the next power of two carries into the exponent.
         let units = (value / unit).round_ties_even() as u32;
         let code = (((exponent + 14) as u32) << self.mantissa) + units;
         code.min(self.largest_code())
     }
 
-    /// The number that the low bits of a code stand for, exactly; infinite or NaN if the exponent is 31.
+    /// Decodes the low bits of a code exactly; infinite or NaN if the exponent is 31.
     pub(crate) fn decode(self, code: u32) -> f32 {
         let mantissa = code & ((1 << self.mantissa) - 1);
         let exponent = code >> self.mantissa & 31;
@@ -78,7 +80,7 @@ mod tests {
         assert_eq!(FLOAT_10.encode(1.0), 0x1e0);
     }
 
-    /// Between any two neighbours: the nearer one, and the even one in the middle.
+    /// Values between two neighbouring numbers round to the nearer one, and ties to the even one.
     #[test]
     fn rounds_to_the_nearest() {
         for format in FORMATS {

@@ -1,7 +1,8 @@
-//! Zstandard frames around texels: the reference encoder writes, a decoder in Rust reads. Not the file around them.
+//! Zstandard compression of texel data: the C reference library encodes, the Rust crate `ruzstd` decodes.
 //!
-//! Two libraries on purpose: `ruzstd` encodes at its fastest level only (a fifth to a half larger on lightmaps), and the reference library,
-//! written in C, is no reader for files from elsewhere. So every file is also read by another hand than the one that wrote it.
+//! Two libraries are used on purpose. `ruzstd` encodes at its fastest level only, which makes lightmaps a
+//! fifth to a half larger; and files from elsewhere should not be parsed by a library written in C. As a
+//! result, every file is decoded by an implementation independent of the one that wrote it.
 
 use std::io::Read;
 
@@ -11,12 +12,14 @@ use zstd::zstd_safe::CParameter;
 
 use super::Ktx2Error;
 
-/// A tenth of a second for a map of 2048 x 2048 texels; the highest levels save another tenth for ten times as long.
+/// Takes a tenth of a second for a map of 2048 x 2048 texels. The highest levels save another tenth of the
+/// size for ten times as long.
 const LEVEL: i32 = 9;
-/// 4 MiB: every decoder takes it, while some refuse windows as large as a large map (Bevy's stops at 100 MiB).
+/// A window of 4 MiB, which every decoder accepts. Some refuse windows as large as a large map (Bevy's stops
+/// at 100 MiB).
 const WINDOW_LOG: u32 = 22;
 
-/// One frame with its checksum.
+/// Compresses bytes to one frame with a checksum.
 pub(crate) fn compress(bytes: &[u8]) -> Result<Vec<u8>, Ktx2Error> {
     let frame = || {
         let mut compressor = Compressor::new(LEVEL)?;
@@ -27,10 +30,11 @@ pub(crate) fn compress(bytes: &[u8]) -> Result<Vec<u8>, Ktx2Error> {
     frame().map_err(|source| Ktx2Error::Zstandard { problem: source.to_string() })
 }
 
-/// What a frame holds, if that is exactly `length` bytes, of which the caller has seen that they may be allocated.
+/// Decompresses a frame that must hold exactly `length` bytes. The caller must have checked that `length`
+/// bytes may be allocated.
 pub(crate) fn decompress(frame: &[u8], length: usize) -> Result<Vec<u8>, Ktx2Error> {
     let failed = |problem: String| Ktx2Error::Zstandard { problem };
-    // Writers take a window of the next power of two at most.
+    // Writers choose a window of at most the next power of two.
     let window = (2 * length as u64).max(1 << 20);
     let mut decoder = StreamingDecoder::new_with_max_window_size(frame, window)
         .map_err(|error| failed(error.to_string()))?;

@@ -1,8 +1,9 @@
-//! A file beside its baked twin: differences of their JSON, and of the attributes of every corner. Not the files.
+//! Compares a file with its baked version: the differences of their JSON, and the attributes of every
+//! triangle corner.
 
 use super::*;
 
-/// A file of JSON and buffers, read independently of the crate.
+/// The JSON and buffers of a file, read without the crate under test.
 pub struct Read {
     pub root: Value,
     pub buffers: Vec<Vec<u8>>,
@@ -102,7 +103,7 @@ impl Read {
         elements
     }
 
-    /// The vertex at each corner of each triangle that has an area in the list.
+    /// The vertex at each corner of each triangle, without triangles of a strip that repeat a vertex.
     pub fn corners(&self, primitive: &Value) -> Vec<usize> {
         let order: Vec<usize> = match &primitive["indices"] {
             Value::Null => (0..self.elements(&primitive["attributes"]["POSITION"]).len()).collect(),
@@ -130,7 +131,7 @@ pub fn whole(bytes: &[u8]) -> usize {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | usize::from(byte))
 }
 
-/// The places at which two values differ.
+/// Collects the places (JSON pointers) at which two values differ.
 pub fn differences(before: &Value, after: &Value, place: &str, found: &mut Vec<String>) {
     match (before, after) {
         (Value::Object(before), Value::Object(after)) => {
@@ -157,10 +158,10 @@ pub fn differences(before: &Value, after: &Value, place: &str, found: &mut Vec<S
     }
 }
 
-/// Extensions whose data a bake writes out.
+/// Extensions whose data a bake expands or decompresses.
 const WRITTEN_OUT: [&str; 2] = ["KHR_draco_mesh_compression", "EXT_mesh_gpu_instancing"];
 
-/// Whether a bake may change what is at a place.
+/// Returns true if a bake may change the value at this place.
 pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
     let parts: Vec<&str> = place.split('/').skip(1).collect();
     let index = |at: usize| parts.get(at).and_then(|part| part.parse::<usize>().ok());
@@ -197,7 +198,7 @@ pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
         }
         ["meshes", _, "primitives", _, "targets", _, _] => new("accessors", &at(after, place)),
         ["meshes", _, "primitives", _, "material"] => new("materials", &at(after, place)),
-        // What was compressed has no place for the lightmap's coordinates.
+        // Compressed data cannot hold the lightmap coordinates.
         ["meshes", _, "primitives", _, "extensions", "KHR_draco_mesh_compression"] => true,
         ["meshes", _, "primitives", _, "extensions", "KHR_materials_variants", "mappings", _, "material"] => {
             new("materials", &at(after, place))
@@ -230,7 +231,7 @@ pub fn is_of_the_bake(place: &str, before: &Value, after: &Value) -> bool {
     }
 }
 
-/// Loads a file, bakes it and writes it.
+/// Loads, bakes and saves a file.
 pub fn baked(input: &Path, output: &Path) -> (LoadReport, SaveReport) {
     let mut world = World::new();
     let mut source = SourceFile::read(input, &LoadOptions::default()).unwrap();
@@ -239,7 +240,8 @@ pub fn baked(input: &Path, output: &Path) -> (LoadReport, SaveReport) {
     (loaded, save_baked(&mut world, &source, output, &SaveOptions::default()).unwrap())
 }
 
-/// Everything that has to hold between a file and its baked twin. How many primitives have light.
+/// Checks everything that must hold between a file and its baked version. Returns the number of lightmapped
+/// primitives.
 pub fn compare(what: &str, input: &Path, output: &Path) -> usize {
     let (before, after) = (read(input), read(output));
     let mut found = Vec::new();
@@ -275,7 +277,7 @@ pub fn compare(what: &str, input: &Path, output: &Path) -> usize {
     lit
 }
 
-/// Every attribute of every corner is what it was, and textures read what they read.
+/// Checks that every attribute of every corner is unchanged, and that textures read the same coordinates.
 pub fn same_corners(what: &str, before: &Read, old: &Value, after: &Read, new: &Value) {
     let (old_corners, new_corners) = (before.corners(old), after.corners(new));
     assert_eq!(old_corners.len(), new_corners.len(), "{what}");
@@ -301,7 +303,7 @@ pub fn same_corners(what: &str, before: &Read, old: &Value, after: &Read, new: &
             same(accessor, &new[name], name);
         }
     }
-    // Counts agree and ranges are true.
+    // Element counts agree, and stated ranges are correct.
     let count = after.elements(&new["attributes"]["POSITION"]).len();
     for (name, accessor) in new["attributes"].as_object().unwrap() {
         assert_eq!(after.elements(accessor).len(), count, "{what}: {name}");
@@ -317,7 +319,7 @@ pub fn same_corners(what: &str, before: &Read, old: &Value, after: &Read, new: &
     }
 }
 
-/// Where the sets of texture coordinates are now, by what the materials say.
+/// The new number of each texture coordinate set, derived from the materials.
 pub fn moved_sets(before: &Read, old: &Value, after: &Read, new: &Value) -> impl Fn(u64) -> u64 + use<> {
     let texture_sets = |read: &Read, primitive: &Value| -> BTreeMap<String, u64> {
         let Some(material) = primitive["material"].as_u64() else { return BTreeMap::new() };

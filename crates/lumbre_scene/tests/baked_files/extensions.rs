@@ -1,9 +1,10 @@
-//! Baked files whose source is compressed, instanced or has variants: what is written of it. Not plain features.
+//! Bakes files with compressed data, instances or material variants, and checks what is written.
 
 use super::encoded::{MESHES, PICTURES, compressed_mesh, encoded_picture, instanced};
 use super::*;
 
-/// Bakes twice and takes the bake back: the second bake gives the same bytes, and what was taken back is the artist's JSON.
+/// Bakes a file twice and undoes the bake: the second bake gives the same bytes, and undoing gives the
+/// artist's JSON.
 fn baked_twice(what: &str, input: &Path, output: &Path) -> Read {
     baked(input, output);
     let first = fs::read(output).unwrap();

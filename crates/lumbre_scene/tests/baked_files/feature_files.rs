@@ -1,8 +1,9 @@
-//! The files that are baked: one for each feature that a bake has to carry. Not what is compared.
+//! The test files to be baked: one for each feature that a bake must preserve. The comparison is in
+//! `comparison`.
 
 use super::*;
 
-/// A cube of eight vertices, which six charts split, with attributes by `change`.
+/// A cube of eight vertices, which its six charts split. `change` adds attributes.
 pub fn cube(file: &mut File, change: impl FnOnce(&mut File, &mut Value)) -> usize {
     let positions: Vec<f32> = (0..8)
         .flat_map(|corner: u32| (0..3).map(move |axis| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 }))
@@ -22,7 +23,7 @@ pub fn cube(file: &mut File, change: impl FnOnce(&mut File, &mut Value)) -> usiz
     file.node(json!({"name": "cube", "mesh": mesh}))
 }
 
-/// Eight values of so many components that all differ.
+/// Eight distinct values with this many components.
 pub fn values(components: usize, offset: f32) -> Vec<f32> {
     (0..8 * components).map(|at| offset + at as f32 * 0.125).collect()
 }
@@ -52,7 +53,7 @@ pub fn texture(file: &mut File) -> usize {
     file.push("textures", json!({"name": "wall", "source": image, "sampler": sampler}))
 }
 
-/// The files, by what each of them has.
+/// All test files, named by their feature.
 pub fn files() -> Vec<(&'static str, File)> {
     let mut all = Vec::new();
     let mut add = |name, make: &dyn Fn(&mut File)| {
@@ -97,7 +98,7 @@ pub fn files() -> Vec<(&'static str, File)> {
             file.push("skins", json!({"joints": [joint], "inverseBindMatrices": matrix, "name": "armature"}));
         let node = cube(file, joints);
         file.root["nodes"][node]["skin"] = skin.into();
-        // The same with the word of the artist that it stands still.
+        // The same, but marked as static by the artist.
         let still = cube(file, joints);
         file.root["nodes"][still]["skin"] = skin.into();
         file.root["nodes"][still]["extensions"] = json!({"LUMBRE_object": {"dynamic": false}});

@@ -1,5 +1,5 @@
-//! A baked file is the artist's file and light: one small file per feature, its JSON compared with that of its baked twin, and every
-//! attribute of every corner bit for bit.
+//! A baked file must be the artist's file plus light. For one small file per feature, the JSON is compared
+//! with that of the baked version, and every attribute of every corner bit for bit.
 
 #![allow(clippy::unwrap_used, reason = "a test stops where something is not as it has to be")]
 
@@ -27,7 +27,7 @@ use lumbre_scene::*;
 use serde_json::{Value, json};
 use support::{File, png};
 
-/// Gives every static mesh lightmap coordinates and a map, as the baker does.
+/// Gives every static mesh lightmap coordinates and a lightmap, as the baker does.
 fn bake(world: &mut World) {
     let mut query = world.query_filtered::<(Entity, &Mesh, Option<&MaterialTextures>), (With<StaticObject>, Without<DynamicObject>)>();
     let found: Vec<_> = query
@@ -63,7 +63,7 @@ fn bake(world: &mut World) {
     }
 }
 
-/// Texels per metre for some sixteen across a mesh of any size.
+/// Texels per metre that give about sixteen texels across a mesh of any size.
 fn density(mesh: &TriangleMesh) -> f64 {
     let size =
         mesh.positions.iter().map(|position| f64::from(position.abs().max_element())).fold(0.0, f64::max);
@@ -87,11 +87,11 @@ fn only_light_is_added() {
         ] {
             baked(&at(input), &at(output));
             counts.push(compare(what, &at(input), &at(output)));
-            // Once more: the file does not grow, and loses nothing either.
+            // Bake again: the file neither grows nor loses anything.
             let first = fs::read(at(output)).unwrap();
             baked(&at(output), &at(output));
             assert!(fs::read(at(output)).unwrap() == first, "{what}: {output} baked again");
-            // What is read of it is the artist's file.
+            // Reading the baked file gives the artist's file.
             let mut world = World::new();
             let report = load(&mut world, &at(output)).unwrap();
             assert!(
@@ -123,7 +123,7 @@ fn what_moves_with_a_skeleton_is_not_baked_unless_the_file_says_so() {
     assert!(note.to_string().contains("not baked") && note.to_string().contains("cube"), "{note}");
 }
 
-/// A .gltf with a buffer and an image beside it.
+/// A .gltf with an external buffer and an external image.
 fn with_files(folder: &Path) -> PathBuf {
     let mut file = File::new();
     file.push("images", json!({"uri": "textures/a%20wall.png"}));
@@ -158,7 +158,7 @@ fn files_beside_are_referred_to_or_copied() {
         fs::create_dir(folder).unwrap();
     }
     let input = with_files(&level);
-    // In the same folder nothing is copied.
+    // Nothing is copied within the same folder.
     baked(&input, &level.join("room.baked.gltf"));
     compare("beside", &input, &level.join("room.baked.gltf"));
     let own = [
@@ -171,7 +171,7 @@ fn files_beside_are_referred_to_or_copied() {
     ];
     assert_eq!(names(&level), own);
 
-    // In another everything is, and what was not there from an earlier bake stays.
+    // Everything is copied to another folder, and existing files that are not from an earlier bake stay.
     fs::write(out.join("room.bin"), "of another file").unwrap();
     let output = out.join("room.gltf");
     let (_, saved) = baked(&input, &output);
@@ -184,14 +184,14 @@ fn files_beside_are_referred_to_or_copied() {
     assert!(saved.files.contains(&out.join("textures/a wall.png")), "{:?}", saved.files);
     assert!(load(&mut World::new(), &output).is_ok());
 
-    // The artist paints the wall anew: the copy follows.
+    // The artist changes the image: the copy is updated.
     fs::write(level.join("textures/a wall.png"), png(5, 5)).unwrap();
     let before = names(&out);
     baked(&input, &output);
     assert_eq!(fs::read(out.join("textures/a wall.png")).unwrap(), png(5, 5));
     assert_eq!(names(&out), before);
 
-    // A .glb takes the first buffer in, and images stay beside.
+    // A .glb takes in the first buffer, and images stay external.
     fs::remove_dir_all(&out).unwrap();
     fs::create_dir(&out).unwrap();
     baked(&input, &out.join("room.glb"));
@@ -232,7 +232,7 @@ fn volumes_lights_and_the_sky_are_written_and_taken_back() {
     assert_eq!(*transform, Transform::from_xyz(1.0, 2.0, 3.0));
     assert_eq!(report.nodes.len(), 3);
 
-    // Back to the artist's file, whose own sky is black.
+    // Undo the bake: the artist's own sky is black.
     let mut pristine = World::new();
     let mut source = SourceFile::read(&output, &LoadOptions::default()).unwrap();
     let report = source.load_into(&mut pristine).unwrap();
@@ -279,7 +279,7 @@ fn settings_change_and_baked_light_stays_in_any_folder() {
         let tuned = folder.join("tuned.glb");
         save_settings(&output, &tuned, settings).unwrap();
         assert_eq!(light(&tuned), (Shading::Gouraud, frame, maps.clone()));
-        // Taken back, nothing is left of them.
+        // With the default settings again, nothing of the former ones is left in the file.
         let again = folder.join("again.glb");
         save_settings(&tuned, &again, FileSettings { frame: usual, ..settings }).unwrap();
         assert_eq!(light(&again), (Shading::Gouraud, usual, maps.clone()));
@@ -322,7 +322,8 @@ fn another_mesh_is_not_written_into_the_file() {
     assert_eq!(names(place.path()), ["a.glb"]);
 }
 
-/// Every file below the folder that the variable LUMBRE_CORPUS names. Without it there is nothing to do, and that is said.
+/// Checks all files below the folder in the variable LUMBRE_CORPUS. Without the variable the test prints that
+/// it is skipped.
 #[test]
 fn only_light_is_added_to_any_folder_of_files() {
     let Some(corpus) = std::env::var_os("LUMBRE_CORPUS") else {
@@ -367,7 +368,7 @@ fn only_light_is_added_to_any_folder_of_files() {
                     let allowed = is_of_the_bake(place, &before, &text) || place.ends_with("/uri");
                     assert!(allowed, "{}: {place}", input.display());
                 }
-                // Taken back, it is the artist's JSON again.
+                // Undoing the bake gives a file that can be loaded.
                 let again = SourceFile::read(&output, &lenient).unwrap().load_into(&mut World::new());
                 assert!(again.is_ok(), "{}", input.display());
                 kept += 1;

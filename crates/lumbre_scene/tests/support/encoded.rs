@@ -1,11 +1,12 @@
-//! Files of the reference encoders in glTF files, with what the reference decoders find in them. `encoded/make.mjs` makes the files.
+//! glTF files that contain data from the reference encoders, with the output of the reference decoders for
+//! comparison. `encoded/make.mjs` makes the data.
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use serde_json::{Value, json};
 
 use super::support::File;
 
-/// The pictures' sides.
+/// Width and height of the images.
 pub const SIZE: (u32, u32) = (22, 17);
 
 macro_rules! encoded {
@@ -18,7 +19,7 @@ macro_rules! encoded {
     };
 }
 
-/// Name, file and what the reference decoder finds in it.
+/// Name, encoded data, and the output of the reference decoder for it.
 pub type Encoded = (&'static str, &'static [u8], &'static [u8]);
 
 pub const MESHES: [Encoded; 3] = [
@@ -37,7 +38,7 @@ pub const PICTURES: [Encoded; 7] = [
     encoded!("lossless.webp", ".rgba"),
 ];
 
-/// A file whose only mesh is compressed, with the accessors that the reference decoder's numbers ask for.
+/// A file with one compressed mesh, and accessors as required by the reference decoder's output.
 pub fn compressed_mesh(bytes: &[u8], expected: &Value) -> File {
     let mut file = File::new();
     let view = file.view(bytes);
@@ -70,7 +71,7 @@ pub fn compressed_mesh(bytes: &[u8], expected: &Value) -> File {
     file
 }
 
-/// A square with a picture.
+/// A square with an image as its texture.
 pub fn pictured(bytes: &[u8], kind: &str, extension: Option<&str>) -> File {
     let mut file = File::new();
     let view = file.view(bytes);

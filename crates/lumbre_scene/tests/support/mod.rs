@@ -1,4 +1,4 @@
-//! Shared by the tests: glTF files put together by hand, and a World as text that two of them can be compared by.
+//! Shared by the tests: glTF files assembled by hand, and a text form of a World for comparisons.
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use std::fmt::Write;
@@ -8,20 +8,20 @@ use lumbre_optics::{Light, Material, Shading};
 use lumbre_scene::*;
 use serde_json::{Value, json};
 
-/// A glTF file in the making.
+/// A glTF file under construction.
 pub struct File {
     pub root: Value,
     pub binary: Vec<u8>,
 }
 
 impl File {
-    /// A file with one scene and nothing in it.
+    /// A file with one empty scene.
     pub fn new() -> Self {
         let root = json!({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{}]});
         Self { root, binary: Vec::new() }
     }
 
-    /// Adds to a list of the file and returns the index.
+    /// Appends to a list of the file and returns the index.
     pub fn push(&mut self, list: &str, value: Value) -> usize {
         let entry = &mut self.root[list];
         if entry.is_null() {
@@ -32,7 +32,7 @@ impl File {
         entries.len() - 1
     }
 
-    /// A buffer view of some bytes, aligned to four.
+    /// Adds a buffer view of these bytes, aligned to four.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
         let offset = self.binary.len();
@@ -40,7 +40,7 @@ impl File {
         self.push("bufferViews", json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}))
     }
 
-    /// A float accessor.
+    /// Adds a float accessor.
     pub fn floats(&mut self, shape: &str, components: usize, values: &[f32]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes);
@@ -51,7 +51,7 @@ impl File {
         )
     }
 
-    /// An accessor of u16 indices.
+    /// Adds an accessor of u16 indices.
     pub fn indices(&mut self, values: &[u16]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes);
@@ -61,7 +61,7 @@ impl File {
         )
     }
 
-    /// A node in the scene.
+    /// Adds a node to the scene.
     pub fn node(&mut self, node: Value) -> usize {
         let index = self.push("nodes", node);
         let nodes = &mut self.root["scenes"][0]["nodes"];
@@ -72,7 +72,8 @@ impl File {
         index
     }
 
-    /// A unit square of four vertices in the plane z = 0, as a mesh on a node, with one primitive that is changed by `change`.
+    /// Adds a node with a mesh of one primitive, a unit square of four vertices in the plane z = 0, changed
+    /// by `change`.
     pub fn square(&mut self, change: impl FnOnce(&mut Self, &mut Value)) -> usize {
         let position = self.floats("VEC3", 3, &[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
         let indices = self.indices(&[0, 1, 2, 0, 2, 3]);
@@ -82,7 +83,7 @@ impl File {
         self.node(json!({"name": "square", "mesh": mesh}))
     }
 
-    /// A light on a node.
+    /// Adds a node with a light.
     pub fn light(&mut self, light: Value) -> usize {
         let lights = &mut self.root["extensions"]["KHR_lights_punctual"]["lights"];
         if lights.is_null() {
@@ -94,7 +95,7 @@ impl File {
         self.node(json!({"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": index}}}))
     }
 
-    /// As a .glb.
+    /// The file as a .glb.
     pub fn glb(mut self) -> Vec<u8> {
         if !self.binary.is_empty() {
             self.root["buffers"] = json!([{"byteLength": self.binary.len()}]);
@@ -102,7 +103,7 @@ impl File {
         container(self.root.to_string().as_bytes(), &self.binary)
     }
 
-    /// As a .gltf with its data inline.
+    /// The file as a .gltf with its data inline.
     pub fn gltf(mut self) -> Vec<u8> {
         let data: String = self.binary.iter().fold(String::new(), |mut data, byte| {
             let _ = write!(data, "%{byte:02X}");
@@ -113,12 +114,12 @@ impl File {
         serde_json::to_vec_pretty(&self.root).expect("it is JSON")
     }
 
-    /// Loads it into a World of its own.
+    /// Loads the file into a new World.
     pub fn load(self) -> Result<(World, LoadReport), LoadError> {
         load_bytes(&self.glb())
     }
 
-    /// What loading complains about.
+    /// The error of loading the file, which must fail.
     pub fn problem(self) -> LoadProblem {
         match self.load() {
             Ok(_) => panic!("it was loaded, but has to be refused"),
@@ -136,7 +137,7 @@ pub fn load_bytes(bytes: &[u8]) -> Result<(World, LoadReport), LoadError> {
     Ok((world, report))
 }
 
-/// The binary container, written independently of the crate.
+/// Assembles a .glb without the crate under test.
 pub fn container(json: &[u8], binary: &[u8]) -> Vec<u8> {
     let mut json = json.to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -156,7 +157,7 @@ pub fn container(json: &[u8], binary: &[u8]) -> Vec<u8> {
     file
 }
 
-/// A small PNG: `width * height` texels that all differ.
+/// A small PNG whose texels are all different.
 pub fn png(width: u32, height: u32) -> Vec<u8> {
     let image = image::RgbaImage::from_fn(width, height, |x, y| {
         image::Rgba([x as u8 * 7, y as u8 * 5, (x * y) as u8, 255 - x as u8])
@@ -166,7 +167,7 @@ pub fn png(width: u32, height: u32) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// Everything that a file keeps, one line per entity; equal Worlds give equal text.
+/// A text with everything that a file stores, one line per entity. Equal Worlds give equal text.
 pub fn described(world: &mut World) -> String {
     let mut roots: Vec<Entity> =
         world.query_filtered::<Entity, (With<Transform>, Without<ChildOf>)>().iter(world).collect();
@@ -203,7 +204,7 @@ fn describe(world: &World, entity: Entity, depth: usize, text: &mut String) {
     let _ = writeln!(text, "{lightmap:?}");
     let mut children: Vec<Entity> =
         world.get::<Children>(entity).into_iter().flat_map(|list| list.iter()).collect();
-    // Primitives may come before or after the nodes; among themselves both keep their order.
+    // Primitives may come before or after child nodes; within each group the order is stable.
     children.sort_by_key(|&child| world.get::<Primitive>(child).map(|primitive| primitive.index));
     for child in children {
         describe(world, child, depth + 1, text);
