@@ -1,4 +1,5 @@
-//! Lumbre: lighting for games that tells you what it costs. The crates under one name; the program of the same name is in `main.rs`.
+//! Lumbre: lighting for games that tells you what it costs. This crate re-exports all crates under one name;
+//! the program of the same name is in `main.rs`.
 //!
 //! ```text
 //!    level.glb ─► scene ─► bake ─► level.baked.glb ─► scene ─► render ─► frame
