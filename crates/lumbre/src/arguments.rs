@@ -140,7 +140,7 @@ pub enum Exposure {
 
 #[derive(Args, Debug)]
 pub struct Play {
-    /// A .glb or .gltf file; without one, the demo level, which is baked first if necessary.
+    /// A .glb or .gltf file; without one, the demo level, which is baked if necessary.
     #[arg(value_name = "FILE", value_parser = gltf_file)]
     pub level: Option<PathBuf>,
     #[command(flatten)]
@@ -546,8 +546,8 @@ pub enum ExplainFormat {
 /// Options of how a frame is drawn.
 #[derive(Args, Clone, Debug)]
 pub struct Frame {
-    /// Camera by name or index; without this the first one, or one that sees the whole scene if there is
-    /// none.
+    /// Camera by name or index; without this the active or first one, or one that sees the whole scene if
+    /// there is none.
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
     /// Shading of every object, instead of the file's. auto:ERROR, like auto:0.01, chooses for each object

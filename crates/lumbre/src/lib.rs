@@ -6,7 +6,7 @@
 //!                   │  └─► trace ─► reference picture            │
 //!                 optics, mesh, rays                           graph
 //!
-//!    cost: studies of all of these, and their page
+//!    cost: studies of all of these, with a report page
 //! ```
 //!
 //! ```

@@ -1,15 +1,17 @@
 //! Serialization of a partly finished path-traced picture, so that a later run goes on from there and ends
 //! with the same bits. Reading and writing the files is left to the caller.
+//!
 //! ```text
 //!   magic      8 bytes   "LUMBRETR"
 //!   version    u32       VERSION; everything is little endian
 //!   identity  96 bytes   BLAKE3 of the program's version, of the scene, of the view and the options
-//!   checksum  32 bytes   BLAKE3 of all that follows
-//!   round      u32       rounds that are complete
-//!   shares     u8        whether samples are distributed by noise already
-//!   pixels               of each: sum, means and squares of its passes (3 f64 each), the brightest sample (f64), passes, samples, rays (u32)
-//!   light                of each auxiliary picture of light: of each pixel its sum (3 f64)
-//!   shares               f64 of each pixel, if there are any
+//!   checksum  32 bytes   BLAKE3 of everything after it
+//!   round      u32       number of complete rounds
+//!   shares     u8        1 if samples are already distributed by noise, else 0
+//!   pixels               for each pixel: sum, means and squares of its passes (3 f64 each),
+//!                        the brightest sample (f64), passes, samples, rays (u32 each)
+//!   light                for each auxiliary picture of light and each pixel: the sum (3 f64)
+//!   shares               for each pixel an f64, if samples are distributed by noise
 //! ```
 //!
 //! A pass of a pixel depends on the pixel and the number of the pass alone, so that the accumulated passes of

@@ -11,8 +11,8 @@
 //!    tiles, rendering    ray_tree (Whitted)                          path (all light)
 //!                          direct_light ─► shadow_ray                  light_sampling ─► shadow_ray
 //!                          interface: mirror, Snell, Fresnel           lobe_sampling, interface
-//!                          medium: what rays are inside of             medium
-//!                          branch: the tree as data
+//!                          medium: the media around a ray              medium
+//!                          branch: the recorded tree
 //! ```
 //!
 //! - One lighting equation: every term comes from `lumbre_optics`, whose shader twins light the frames. With

@@ -5,7 +5,7 @@
 //!        │   │
 //!        │ o │    capsule against walls: pushed out sideways, so it slides
 //!        │   │
-//!        └───┘  ─ feet + 0.35 m: what is lower is stepped upon
+//!        └───┘  ─ feet + 0.35 m: lower obstacles are stepped onto
 //!         |||     nine rays find the ground
 //!         feet
 //! ```
