@@ -1,4 +1,5 @@
-//! Loads and draws every glTF file below a folder, and says what became of each: outcome, time, notes, and whether its picture shows anything.
+//! Loads and draws every glTF file below a folder, and prints for each the outcome, the time, the notes, and
+//! whether its picture shows anything.
 //!
 //! ```sh
 //! cargo run --release -p lumbre --example corpus -- DIR [PICTURES] [--bare] [--strict] [--notes]
@@ -23,10 +24,10 @@ use lumbre::scene::{
 
 /// Width and height of the pictures in pixels.
 const SIZE: (u32, u32) = (384, 216);
-/// A picture of which so many pixels in a thousand have one end of the range, and of which none differs, shows nothing.
+/// A picture with at least this many black pixels in a thousand, and nearly no others, counts as black.
 const ALIKE: usize = 995;
 
-/// What can be asked for.
+/// The options of the program.
 struct Asked {
     bare: bool,
     strict: bool,
@@ -85,7 +86,7 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the picture of a file shows, and what was noted.
+/// Draws a file and returns what its picture shows, and the notes.
 fn draw(gpu: &Gpu, file: &Path, folder: &Path, asked: &Asked) -> anyhow::Result<(&'static str, Vec<String>)> {
     let mut world = World::new();
     let root = (!asked.strict).then(|| folder.to_owned());
@@ -136,7 +137,8 @@ fn draw(gpu: &Gpu, file: &Path, folder: &Path, asked: &Asked) -> anyhow::Result<
     Ok((outcome, notes))
 }
 
-/// Whether pixels are all black or all white, as far as anybody sees; those of the black background do not count as a part of a white picture.
+/// Classifies a picture as empty, black, white, or a picture. Pixels of the black background are ignored when
+/// it is tested for white.
 fn judged(pixels: &[u8], triangles: usize) -> &'static str {
     let pixels: Vec<&[u8]> = pixels.chunks_exact(4).collect();
     let is_dark = |pixel: &[u8]| pixel[..3].iter().all(|&channel| channel < 8);

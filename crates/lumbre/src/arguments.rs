@@ -1,4 +1,5 @@
-//! The command line: what can be asked for. Not what is done about it.
+//! The command line: its commands and options, and how their values are parsed. The doc comments of options
+//! are their help texts.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -26,7 +27,7 @@ Examples:
   lumbre cost -o report                          what accuracy costs in time, on this machine"
 )]
 pub struct Arguments {
-    /// What to do; without it, a file is shown, or the demo level played.
+    /// The command; without one, a file is opened in a window, or the demo level is played.
     #[command(subcommand)]
     pub command: Option<Command>,
     #[command(flatten)]
@@ -35,7 +36,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Play a level, or look at any glTF file; without a display, draw a short tour of it to PNG frames.
+    /// Play a level, or view any glTF file; without a display, write a short tour of it to PNG files.
     #[command(after_help = "\
 Keys:
   drag with the left button   turn            O, Home   show everything, turn around it
@@ -68,7 +69,7 @@ Examples:
   lumbre render room.glb -o room.png --frames 20 --timings times.json
   lumbre render room.glb -o room.png --frames 5 --timings account.txt --count-lights")]
     Render(Render),
-    /// Trace rays: mirrors, glass and shadows, or all light as it is.
+    /// Trace rays: Whitted ray tracing with mirrors, glass and shadows, or path tracing of all light.
     #[command(after_help = "\
 Examples:
   lumbre trace room.glb -o room.png --depth 8
@@ -78,18 +79,19 @@ Examples:
   lumbre trace room.glb --pixel 640,360 --tree text
   lumbre trace room.glb --pixel 640,360 --tree svg > rays.svg")]
     Trace(Trace),
-    /// Say how far one picture is from another: in light, and to the eye (FLIP).
+    /// Measure the difference between two pictures, in radiance and as perceived (FLIP).
     #[command(after_help = "\
 Examples:
   lumbre compare traced.exr frame.exr
   lumbre compare traced.png frame.png -o heat.png --json")]
     Compare(Compare),
-    /// Say what a scene calls for, which passes run and why the others do not.
+    /// Show what effects a scene calls for, which passes run, and why the others do not.
     #[command(
         after_help = "Examples:\n  lumbre explain room.glb\n  lumbre explain room.glb --measure\n  lumbre explain room.glb --format dot | dot -Tsvg > frame.svg"
     )]
     Explain(Explain),
-    /// Measure what accuracy costs in time: a page with plots and pictures, and the same as JSON and CSV.
+    /// Measure what accuracy costs in time; writes a page with plots and pictures, and the same as JSON and
+    /// CSV.
     #[command(after_help = "\
 Studies:
   shading        flat, Gouraud and Phong shading
@@ -110,66 +112,68 @@ Examples:
   lumbre cost -o report --resume
   lumbre cost --compare before/cost.json after/cost.json")]
     Cost(Cost),
-    /// Measures every way to draw a level, and says which keeps a time or an error; writes the level with it.
+    /// Measure all ways to draw a level and find the one that keeps a time or an error; can write the level
+    /// with it.
     #[command(after_help = "lumbre tune level.glb --frame-ms 16 -o level.tuned.glb")]
     Tune(Tune),
 }
 
-/// How files are read.
+/// Options for reading files.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Reading {
-    /// Refuses files with faults that can be repaired, instead of repairing them with a note.
+    /// Refuse files with repairable faults, instead of repairing them with a note.
     #[arg(long)]
     pub strict: bool,
-    /// Lets a .gltf name files outside of its own folder, below DIR.
+    /// Let a .gltf refer to files outside its own folder, below DIR.
     #[arg(long, value_name = "DIR")]
     pub root: Option<PathBuf>,
 }
 
-/// How bright pictures are.
+/// How the brightness of pictures is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
-    /// As metered from the frame.
+    /// Metered from the frame.
     Auto,
-    /// A factor on radiance.
+    /// A fixed factor on radiance.
     Factor(f32),
 }
 
 #[derive(Args, Debug)]
 pub struct Play {
-    /// A .glb or .gltf file; without one the demo level, baked first if it is not baked.
+    /// A .glb or .gltf file; without one, the demo level, which is baked if necessary.
     #[arg(value_name = "FILE", value_parser = gltf_file)]
     pub level: Option<PathBuf>,
     #[command(flatten)]
     pub reading: Reading,
-    /// Factor on radiance, an exposure value like 12EV, or auto; without this auto for lights in candela or lux that would be white.
+    /// Factor on radiance, an exposure value like 12EV, or auto; without this, auto for lights in candela or
+    /// lux that would be overexposed.
     #[arg(long, value_name = "auto|EV|X", value_parser = exposure, allow_negative_numbers = true)]
     pub exposure: Option<Exposure>,
-    /// Leaves a level without lights dark, instead of lighting it from the camera.
+    /// Leave a level without lights dark, instead of lighting it from the camera.
     #[arg(long)]
     pub no_default_light: bool,
-    /// Draws a tour to PNG frames even if there is a display.
+    /// Write a tour to PNG files even if there is a display.
     #[arg(long)]
     pub headless: bool,
-    /// Where the tour's frames go.
+    /// Folder for the tour's frames.
     #[arg(long, value_name = "DIR", default_value = "frames")]
     pub frames_dir: PathBuf,
-    /// How many frames the tour has.
+    /// Number of frames of the tour.
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100_000), allow_negative_numbers = true)]
     pub frames: u32,
     /// Width and height of the tour's frames in pixels.
     #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size, allow_negative_numbers = true)]
     pub size: (u32, u32),
-    /// Plays back recorded input (JSON) instead of the keyboard and mouse.
+    /// Replay recorded input (JSON) instead of reading keyboard and mouse.
     #[arg(long, value_name = "FILE")]
     pub input: Option<PathBuf>,
-    /// Records what is played to this file (JSON), for --input.
+    /// Record the input to this file (JSON), for --input.
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Writes the last frame with its overlay to a PNG.
+    /// Write the last frame with its overlay to a PNG file.
     #[arg(long, value_name = "FILE")]
     pub screenshot: Option<PathBuf>,
-    /// Ends after so many frames.
+    /// Quit after this many frames.
     #[arg(long, value_name = "FRAMES", allow_negative_numbers = true)]
     pub quit_after: Option<u32>,
 }
@@ -178,137 +182,141 @@ pub struct Play {
 pub struct Bake {
     /// The level: .glb or .gltf.
     pub input: PathBuf,
-    /// The baked level; its lightmaps go beside it.
+    /// The baked level; its lightmaps are written beside it.
     #[arg(short, long, value_name = "OUT.glb")]
     pub output: PathBuf,
     #[command(flatten)]
     pub reading: Reading,
-    /// Lets the output replace the input, which is then only in the baked file.
+    /// Let the output replace the input, which then remains only as part of the baked file.
     #[arg(long)]
     pub overwrite: bool,
-    /// Radiance of an even sky, W/(m² sr): one number, or red, green and blue; in place of the level's own.
+    /// Radiance of a uniform sky, W/(m² sr), instead of the level's own: one number, or red, green and blue.
     #[arg(long, value_name = "X|R,G,B", value_parser = sky, allow_negative_numbers = true)]
     pub sky: Option<glam::Vec3>,
-    /// Relative RMSE that the lightmap may have by its own estimate, like 0.01 or 1%.
+    /// Estimated relative RMSE at which the lightmaps are good enough, like 0.01 or 1%.
     #[arg(long, default_value = "0.01", value_parser = share, allow_negative_numbers = true)]
     pub error: f64,
-    /// Seconds after which no more samples are taken; the map is complete all the same.
+    /// Seconds after which no more samples are taken; the lightmaps are complete in any case.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub time: Option<Duration>,
-    /// Texels along a metre of surface; chosen from the scene's area without this.
+    /// Texels per metre of surface; without this, chosen from the scene's area.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, conflicts_with = "map_size")]
     pub texels_per_meter: Option<f64>,
-    /// Side of each mesh's own map in texels.
+    /// Side of each mesh's own lightmap in texels.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=8192), allow_negative_numbers = true)]
     pub map_size: Option<u32>,
-    /// Continues an interrupted bake from its checkpoint, if there is one.
+    /// Continue an interrupted bake from its checkpoint, if there is one.
     #[arg(long)]
     pub resume: bool,
-    /// Seconds between writes of the checkpoint: what a crash costs.
+    /// Seconds between writes of the checkpoint, which is what a crash may lose.
     #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = seconds, allow_negative_numbers = true)]
     pub checkpoint_every: Duration,
-    /// Memory that the bake may take beside the level, like 512MiB or 2GB; it makes do with fewer patches and rays.
+    /// Memory that the bake may use in addition to the level, like 512MiB or 2GB; it then uses fewer patches
+    /// and rays.
     #[arg(long, value_name = "BYTES", value_parser = bytes, allow_negative_numbers = true)]
     pub memory: Option<u64>,
-    /// How much work may go into it.
+    /// Quality preset.
     #[arg(long, value_enum, default_value_t = BakeQuality::Final)]
     pub quality: BakeQuality,
-    /// Worker threads; as many as there are cores without this.
+    /// Number of worker threads; without this, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     pub threads: Option<u16>,
     /// Free texels between charts: 2 for bilinear filtering, 4 for bicubic.
     #[arg(long, value_name = "TEXELS", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=64), allow_negative_numbers = true)]
     pub gap: u32,
-    /// Lets small meshes share atlases of at most N x N texels, or not, with 0; 2048 without this, and 0 with --map-size.
+    /// Let small meshes share atlases of at most N x N texels; 0 for none. Without this 2048, or 0 with
+    /// --map-size.
     #[arg(long, value_name = "N", value_parser = atlas_size, allow_negative_numbers = true)]
     pub atlas_size: Option<u32>,
-    /// Texels along a side of a patch, from 1 to 64: smaller ones exchange light in more detail [default: the quality's]
+    /// Texels along a side of a patch, from 1 to 64: smaller patches exchange light in more detail [default:
+    /// the quality's]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub patch_texels: Option<f32>,
-    /// Leaves the seams between charts as they are.
+    /// Leave the seams between charts visible.
     #[arg(long)]
     pub no_seams: bool,
-    /// Also writes every map's direct and bounced light, as MAP.direct.exr and MAP.bounced.exr beside it.
+    /// Also write every map's direct and bounced light, as MAP.direct.exr and MAP.bounced.exr beside it.
     #[arg(long)]
     pub separate_light: bool,
-    /// Leaves out the estimate of the error that the map's resolution leaves.
+    /// Do not estimate the error due to the maps' resolution.
     #[arg(long)]
     pub no_resolution_error: bool,
-    /// Bakes everything, also what has not changed since the output was baked, and keeps no samples for the next bake.
+    /// Bake everything again, including what has not changed since the output was baked, and keep no samples
+    /// for the next bake.
     #[arg(long)]
     pub no_reuse: bool,
-    /// How form factors are counted.
+    /// How form factors are computed.
     #[arg(long, value_enum, default_value_t = BakeFormFactors::Cosine)]
     pub form_factors: BakeFormFactors,
     /// How the radiosity system is solved.
     #[arg(long, value_enum, default_value_t = BakeSolver::ConjugateGradients)]
     pub solver: BakeSolver,
-    /// Format of the KTX2 images that are written beside OpenEXR's, as Bevy reads them.
+    /// Format of the KTX2 images that are written beside the OpenEXR images, as Bevy reads them.
     #[arg(long, value_name = "rgb9e5|b10g11r11|none", default_value = "rgb9e5", value_parser = ktx2)]
     pub ktx2: Ktx2,
-    /// Leaves KTX2 images without Zstandard compression.
+    /// Do not compress KTX2 images with Zstandard.
     #[arg(long)]
     pub ktx2_raw: bool,
-    /// How OpenEXR images hold their texels.
+    /// Format of the texels in OpenEXR images.
     #[arg(long, value_enum, default_value_t = ExrTexels::Float)]
     pub exr: ExrTexels,
-    /// Whether to bake light for what moves.
+    /// Whether light for moving objects is baked into probes.
     #[arg(long, value_enum, default_value_t = BakeProbes::Auto)]
     pub probes: BakeProbes,
-    /// Metres between probes at most; chosen from the scene's size without this.
+    /// Largest distance between probes in metres; without this, chosen from the scene's size.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub probe_spacing: Option<f64>,
-    /// Prints the report as JSON.
+    /// Print the report as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Says nothing of how far it is: no bar, and in a pipe no line every ten seconds.
+    /// Do not show progress, neither as a bar nor, in a pipe, as a line every ten seconds.
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// What KTX2 images hold, if they are written.
+/// The format of KTX2 images; `None` writes none.
 #[derive(Clone, Copy, Debug)]
 pub struct Ktx2(pub Option<PackedFormat>);
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BakeProbes {
-    /// If something in the scene moves.
+    /// If the scene has moving objects.
     Auto,
-    /// Also if nothing moves yet.
+    /// Even if nothing moves.
     Always,
-    /// Not at all.
+    /// Never.
     Never,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BakeFormFactors {
-    /// Rays by the cosine from every patch.
+    /// Cosine-distributed rays from every patch.
     Cosine,
-    /// Lines spread evenly through the whole scene.
+    /// Global lines distributed uniformly through the whole scene.
     Lines,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BakeSolver {
-    /// The fewest iterations.
+    /// Conjugate gradients, which need the fewest iterations.
     ConjugateGradients,
-    /// Each patch reads what was found before it in the same sweep.
+    /// Gauss-Seidel: each patch uses results from earlier in the same sweep.
     GaussSeidel,
-    /// One bounce more in each sweep.
+    /// Jacobi: each sweep adds one bounce.
     Jacobi,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum ExrTexels {
-    /// 32 bits a channel.
+    /// 32 bits per channel.
     Float,
-    /// 16 bits a channel: half the size, within 1/2048 of each channel.
+    /// 16 bits per channel: half the size, accurate to 1/2048 of each channel.
     Half,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BakeQuality {
-    /// For a look while the level is being built.
+    /// For previews while the level is being built.
     Draft,
     /// For shipping.
     Final,
@@ -320,7 +328,7 @@ pub struct Render {
     pub input: PathBuf,
     #[command(flatten)]
     pub reading: Reading,
-    /// The frame: .png (eight bits) or .exr (floats).
+    /// The frame: .png (8 bits) or .exr (floats).
     #[arg(short, long, value_name = "OUT.png|OUT.exr")]
     pub output: PathBuf,
     /// Width and height in pixels.
@@ -328,13 +336,15 @@ pub struct Render {
     pub size: (u32, u32),
     #[command(flatten)]
     pub frame: Frame,
-    /// Draws so many frames and writes the last one.
+    /// Draw this many frames and write the last one.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), allow_negative_numbers = true)]
     pub frames: u32,
-    /// Writes what each frame went into, by stages, passes and effects: as JSON, or for .txt as text of the last frame.
+    /// Write the measurements of each frame by stages, passes and effects: as JSON, or for .txt the last
+    /// frame's as text.
     #[arg(long, value_name = "OUT.json|OUT.txt")]
     pub timings: Option<PathBuf>,
-    /// Counts the lights that each pass tests, and those that contribute more than 1/255; draws one more frame for it.
+    /// Count the lights that each pass tests, and those that contribute more than 1/255; draws one more
+    /// frame.
     #[arg(long, requires = "timings")]
     pub count_lights: bool,
 }
@@ -345,7 +355,7 @@ pub struct Trace {
     pub input: PathBuf,
     #[command(flatten)]
     pub reading: Reading,
-    /// The picture: .png (eight bits) or .exr (floats).
+    /// The picture: .png (8 bits) or .exr (floats).
     #[arg(short, long, value_name = "OUT.png|OUT.exr", required_unless_present = "pixel")]
     pub output: Option<PathBuf>,
     /// Width and height in pixels.
@@ -353,107 +363,116 @@ pub struct Trace {
     pub size: (u32, u32),
     #[command(flatten)]
     pub frame: Frame,
-    /// How light is followed: the documents' ray tree, or paths, which find all light and state their noise.
+    /// The algorithm: Whitted's ray tree, or paths, which find all light and report their noise.
     #[arg(long, value_name = "whitted|path", default_value = "whitted", value_parser = integrator)]
     pub integrator: Integrator,
-    /// Mirrored and transmitted rays one after another; 5 without this. Of paths all reflections, and only chance ends them without this.
+    /// Largest number of mirrored and transmitted rays in succession; without this 5. For paths all
+    /// reflections count, and without this only Russian roulette ends them.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000), allow_negative_numbers = true)]
     pub depth: Option<u32>,
-    /// Rays of the tree that count for less than this are not traced.
+    /// Rays of the ray tree with a smaller weight in the pixel are not traced.
     #[arg(long, value_name = "X", default_value_t = DEFAULT_WEIGHT, value_parser = weight, allow_negative_numbers = true)]
     pub weight: f64,
-    /// Samples of a pixel: so many of the ray tree (1 without this), at most so many paths (64, or as many as --error or --time take).
+    /// Samples per pixel. The ray tree takes exactly this many (1 without this), paths at most this many (64,
+    /// or as many as --error or --time need).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576), allow_negative_numbers = true)]
     pub samples: Option<u32>,
     /// Relative standard error of the whole picture at which paths end, like 0.01 or 1%.
     #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
     pub error: Option<f64>,
-    /// Seconds after which no more samples are begun; what is there is written.
+    /// Seconds after which no more samples are started; the picture so far is written.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub time: Option<Duration>,
-    /// How samples make a pixel: box, mitchell, blackman-harris.
+    /// Reconstruction filter: box, mitchell, blackman-harris.
     #[arg(long, value_name = "FILTER", default_value = "box", value_parser = filter)]
     pub filter: Filter,
-    /// Takes a quarter of the samples where neighbouring pixels differ by less than this as shown, 0 to 1.
+    /// Take only a quarter of the samples where neighbouring pixels, as displayed, differ by less than this,
+    /// 0 to 1.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub adaptive: Option<f64>,
-    /// Gives pixels paths in proportion to their noise, and as many as --samples in the mean.
+    /// Distribute paths over the pixels in proportion to their noise, with --samples of them per pixel on
+    /// average.
     #[arg(long)]
     pub sample_by_noise: bool,
-    /// Auxiliary pictures, as layers of an .exr, or as files of their own beside a .png: albedo, normal, depth, rays, direct, indirect,
-    /// light:NAME, direct:NAME, indirect:NAME for what one source sends; * in place of NAME for every source.
+    /// Auxiliary pictures, as layers of an .exr, or as separate files beside a .png: albedo, normal, depth,
+    /// rays, direct, indirect, and light:NAME, direct:NAME, indirect:NAME for the light of one source; * as
+    /// NAME for every source.
     #[arg(long, value_name = "NAME[,NAME…]", value_delimiter = ',', value_parser = aov, conflicts_with = "pixel")]
     pub aov: Vec<Aov>,
-    /// Goes on with the paths that an earlier run has kept in OUT.samples, if it is there, and keeps them there at the end.
+    /// Continue with the paths that an earlier run has kept in OUT.samples, if it exists, and keep them there
+    /// at the end.
     #[arg(long, conflicts_with = "pixel")]
     pub resume: bool,
-    /// Worker threads; as many as there are cores without this.
+    /// Number of worker threads; without this, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     pub threads: Option<u16>,
-    /// Prints the ray tree of this pixel, counted from the upper left corner.
+    /// Print the ray tree of this pixel, counted from the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = pixel)]
     pub pixel: Option<(u32, u32)>,
-    /// How it is printed: text, json, dot for Graphviz, svg as a drawing of the rays.
+    /// Format of the ray tree: text, json, dot for Graphviz, svg for a drawing of the rays.
     #[arg(long, value_name = "FORMAT", default_value = "text", value_parser = tree_format, requires = "pixel")]
     pub tree: TreeFormat,
-    /// Prints the report as JSON.
+    /// Print the report as JSON.
     #[arg(long, conflicts_with = "pixel")]
     pub json: bool,
-    /// Says nothing of how far it is.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
 }
 
 #[derive(Args, Debug)]
 pub struct Compare {
-    /// What is right: .png, .jpg or .exr.
+    /// The reference: .png, .jpg or .exr.
     pub reference: PathBuf,
-    /// What is compared with it.
+    /// The picture that is compared with it.
     pub test: PathBuf,
-    /// Where a heat map of FLIP goes: black where nothing differs, white where most does.
+    /// File for a heat map of FLIP: black where there is no difference, white where it is largest.
     #[arg(short, long, value_name = "HEATMAP.png")]
     pub output: Option<PathBuf>,
-    /// Prints the figures as JSON.
+    /// Print the results as JSON.
     #[arg(long)]
     pub json: bool,
 }
 
 #[derive(Args, Debug)]
 pub struct Cost {
-    /// Scenes to measure: .glb or .gltf; without any the studies make their own.
+    /// Scenes to measure: .glb or .gltf; without any, the studies create their own.
     #[arg(value_name = "IN.glb", conflicts_with = "compare")]
     pub inputs: Vec<PathBuf>,
-    /// Where the report goes: index.html, cost.json, cost.csv, pictures, scenes.
+    /// Folder for the report: index.html, cost.json, cost.csv, pictures, scenes.
     #[arg(short, long, value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
     pub output: Option<PathBuf>,
     /// Fewer points and rounds: about two minutes on two cores, instead of six.
     #[arg(long)]
     pub quick: bool,
-    /// Counts alone: nothing is timed, compared or drawn for people, and the report is the same on every machine. What --compare is to watch over without noise.
+    /// Only count: nothing is timed or compared and no pictures are drawn, and the report is the same on
+    /// every machine. For --compare without noise.
     #[arg(long)]
     pub counts_only: bool,
-    /// Only this study; may be given several times.
+    /// Run only this study; can be given several times.
     #[arg(long = "study", value_name = "NAME")]
     pub studies: Vec<String>,
-    /// Keeps the studies that DIR holds already, if they are of this machine, these scenes and settings.
+    /// Keep the studies that DIR already contains, if they have the same machine, scenes and settings.
     #[arg(long)]
     pub resume: bool,
-    /// Width and height of the pictures in pixels; 480x270 without this, with --quick 320x180.
+    /// Width and height of the pictures in pixels; without this 480x270, or 320x180 with --quick.
     #[arg(long, value_name = "WxH", value_parser = picture_size, allow_negative_numbers = true)]
     pub size: Option<(u32, u32)>,
-    /// Of everything that draws random numbers.
+    /// Seed of everything that uses random numbers.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     pub seed: u32,
-    /// Says nothing of how far it is.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
-    /// Says what differs between two reports instead; exit status 1 if a count or an error of the second is larger, or a point is gone.
+    /// Compare two reports instead; exit status 1 if a count or an error of the second is larger, or a point
+    /// is missing.
     #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with_all = ["quick", "counts_only", "studies", "resume", "size", "seed", "quiet"])]
     pub compare: Option<Vec<PathBuf>>,
     /// Counts, errors and times that differ by less than this factor count as equal.
     #[arg(long, value_name = "X", default_value = "1.1", value_parser = factor, conflicts_with = "output", allow_negative_numbers = true)]
     pub factor: f64,
-    /// Exit status 1 also for times that grew, by more than the factor and with quartiles that lie apart.
+    /// Exit with status 1 also for times that increased, by more than the factor and with quartiles that do
+    /// not overlap.
     #[arg(long, conflicts_with = "output")]
     pub times: bool,
 }
@@ -464,25 +483,28 @@ pub struct Tune {
     /// The level: .glb or .gltf, baked or not.
     #[arg(value_name = "IN.glb")]
     pub input: PathBuf,
-    /// Milliseconds that a frame may take at any of its cameras: the least error within them is taken.
+    /// Milliseconds that a frame may take at any of the level's cameras; the settings with the least error
+    /// within them are chosen.
     #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     pub frame_ms: Option<f64>,
-    /// Relative RMSE that a frame may have against the most accurate settings (0.02 or 2%): without --frame-ms the least time within it is taken.
+    /// Relative RMSE that a frame may have compared with the most accurate settings (0.02 or 2%); without
+    /// --frame-ms the fastest settings within it are chosen.
     #[arg(long, value_name = "ERROR", value_parser = share, allow_negative_numbers = true)]
     pub error: Option<f64>,
-    /// Where the level goes with the settings that were taken: its shading, its shadows, where its lamps end, and samples a pixel.
+    /// File for the level with the chosen settings: its shading, its shadows, where its lamps end, and
+    /// samples per pixel.
     #[arg(short, long, value_name = "OUT.glb", requires = "goal")]
     pub output: Option<PathBuf>,
-    /// Where a report goes, as of `lumbre cost`: every setting with its picture, time and error.
+    /// Folder for a report, as of `lumbre cost`: all settings with picture, time and error.
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
-    /// Width and height of the frames in pixels; 1280x720 without this, with --quick 480x270.
+    /// Width and height of the frames in pixels; without this 1280x720, or 480x270 with --quick.
     #[arg(long, value_name = "WxH", value_parser = picture_size, allow_negative_numbers = true)]
     pub size: Option<(u32, u32)>,
-    /// Fewer rounds of smaller frames.
+    /// Fewer rounds with smaller frames.
     #[arg(long)]
     pub quick: bool,
-    /// Says nothing of how far it is.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -493,13 +515,15 @@ pub struct Explain {
     pub input: PathBuf,
     #[command(flatten)]
     pub reading: Reading,
-    /// For people, for programs, for Graphviz.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = ExplainFormat::Text)]
     pub format: ExplainFormat,
-    /// Says also what the scene does not call for, every pass and resource with the reason, and every shader variant.
+    /// Also show what the scene does not call for, every pass and resource with its reason, and every shader
+    /// variant.
     #[arg(long)]
     pub all: bool,
-    /// Draws frames with each effect and without it, for about so many seconds, and says what it costs and what the picture owes to it.
+    /// Draw frames with and without each effect for about this many seconds, and show what each costs and how
+    /// much it changes the picture.
     #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true, default_missing_value = "10", value_parser = seconds, allow_negative_numbers = true)]
     pub measure: Option<Duration>,
     /// Width and height of the frame in pixels.
@@ -511,80 +535,87 @@ pub struct Explain {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum ExplainFormat {
-    /// For people.
+    /// Text for people.
     Text,
-    /// For programs.
+    /// JSON for programs.
     Json,
-    /// For Graphviz.
+    /// A graph for Graphviz.
     Dot,
 }
 
-/// Choices about how a frame is drawn.
+/// Options of how a frame is drawn.
 #[derive(Args, Clone, Debug)]
 pub struct Frame {
-    /// Camera by name or index; the first without this, and one that sees the whole scene if it has none.
+    /// Camera by name or index; without this the active or first one, or one that sees the whole scene if
+    /// there is none.
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
-    /// Shades every object this way, whatever the file says. auto:ERROR takes for each object the cheapest that is known beforehand to be no farther from Phong
-    /// shading than ERROR in any pixel, in exposed linear radiance between 0 and 1, like auto:0.01.
+    /// Shading of every object, instead of the file's. auto:ERROR, like auto:0.01, chooses for each object
+    /// the cheapest shading that is known in advance to differ from Phong shading by at most ERROR in any
+    /// pixel, in exposed linear radiance between 0 and 1.
     #[arg(long, value_name = "flat|gouraud|phong|auto:ERROR", value_parser = shading)]
     pub shading: Option<Shading>,
-    /// Takes this specular model instead of the file's: phong, blinn, blinn-4n, blinn-matched, torrance-sparrow.
+    /// Specular model instead of the file's: phong, blinn, blinn-4n, blinn-matched, torrance-sparrow.
     #[arg(long, value_name = "MODEL", value_parser = reflection)]
     pub reflection: Option<ReflectionModel>,
-    /// Where flat shading evaluates a polygon, whatever the file says.
+    /// Point at which flat shading evaluates a polygon, instead of the file's.
     #[arg(long, value_name = "centroid|first-vertex|last-vertex", value_parser = flat_rule)]
     pub flat_rule: Option<FlatRule>,
-    /// Filters highlights within pixels under Phong shading, whatever the file says.
+    /// Filter highlights within pixels under Phong shading, or not, instead of as the file says.
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     pub specular_antialiasing: Option<bool>,
-    /// Lights opaque surfaces where they are drawn, or afterwards from a G-buffer; auto (the default) does the latter where no GPU draws and many lights meet small triangles. The picture is the same.
+    /// Light opaque surfaces as they are drawn (forward) or afterwards from a G-buffer (deferred). auto (the
+    /// default) chooses deferred where no GPU draws and many lights meet small triangles. The picture is the
+    /// same.
     #[arg(long, value_name = "auto|forward|deferred", value_parser = rendering_path)]
     pub rendering_path: Option<RenderingPath>,
-    /// From radiance to numbers: srgb for people (the default for PNG), linear as it is (for EXR), clamp as OpenGL.
+    /// Conversion from radiance to pixel values: srgb for viewing (the default for PNG), linear for unchanged
+    /// radiance (for EXR), clamp as OpenGL does.
     #[arg(long, value_name = "linear|clamp|srgb", value_parser = display)]
     pub display: Option<Display>,
-    /// Leaves the lightmaps out.
+    /// Ignore lightmaps.
     #[arg(long)]
     pub no_lightmaps: bool,
-    /// Leaves the irradiance volumes out: what moves takes the scene's ambient light.
+    /// Ignore irradiance volumes; moving objects then get the scene's ambient light.
     #[arg(long)]
     pub no_irradiance_volumes: bool,
-    /// Draws no shadows: every light reaches everything.
+    /// Draw no shadows: every light reaches everything.
     #[arg(long)]
     pub no_shadows: bool,
-    /// How often light is mirrored at most where it meets flat mirrors: 1 shows a mirror, 2 (the default) a mirror in a mirror; 0 leaves out what mirrors
-    /// show.
+    /// Largest number of reflections in flat mirrors: 1 shows a mirror, 2 (the default) a mirror in a mirror;
+    /// 0 shows no reflections.
     #[arg(long, value_name = "N")]
     pub mirror_depth: Option<u32>,
-    /// Draws surfaces that light passes through opaque.
+    /// Draw transmissive surfaces opaque.
     #[arg(long)]
     pub no_refraction: bool,
-    /// Four samples per pixel, whatever the file says.
+    /// Take four samples per pixel, whatever the file says.
     #[arg(long)]
     pub msaa: bool,
-    /// One sample per pixel, whatever the file says.
+    /// Take one sample per pixel, whatever the file says.
     #[arg(long, conflicts_with = "msaa")]
     pub no_msaa: bool,
-    /// Lamps end where they bring a white surface that faces them less than this radiance, whatever the file says; 0: where the file ends them.
+    /// End lamps where a white surface that faces them gets less than this radiance, whatever the file says;
+    /// 0 leaves the file's ranges.
     #[arg(long, value_name = "X", value_parser = threshold, allow_negative_numbers = true)]
     pub light_threshold: Option<f32>,
-    /// Texels of shadow maps beside the usual number, along a side, from 0.0625 to 4, whatever the file says.
+    /// Factor on the resolution of shadow maps along each side, from 0.0625 to 4, instead of the file's.
     #[arg(long, value_name = "X", value_parser = shadow_resolution, allow_negative_numbers = true)]
     pub shadow_resolution: Option<f32>,
-    /// How shadow maps are read, whatever the file says.
+    /// Filter of shadow maps, instead of the file's.
     #[arg(long, value_name = "hard|percentage-closer|soft", value_parser = shadow_filter)]
     pub shadow_filter: Option<ShadowFilter>,
-    /// Factor on radiance, an exposure value like 12EV, or auto, instead of the camera's; without this auto in a PNG of lights in candela or lux that
-    /// would be white.
+    /// Factor on radiance, an exposure value like 12EV, or auto, instead of the camera's; without this, auto
+    /// for a PNG with lights in candela or lux that would be overexposed.
     #[arg(long, value_name = "auto|EV|X", value_parser = exposure, allow_negative_numbers = true)]
     pub exposure: Option<Exposure>,
-    /// Leaves a scene without lights dark, instead of lighting it from the camera.
+    /// Leave a scene without lights dark, instead of lighting it from the camera.
     #[arg(long)]
     pub no_default_light: bool,
 }
 
-/// A file to look at: whatever is there, or is named like one. Else it is a misspelt command.
+/// Parses a file to open: one that exists or has the extension of glTF. Anything else is taken for a misspelt
+/// command.
 fn gltf_file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     let is_named_so = path
@@ -626,7 +657,7 @@ fn shadow_filter(text: &str) -> Result<ShadowFilter, String> {
     ShadowFilter::from_name(text).ok_or_else(|| format!("use one of {}", names.join(", ")))
 }
 
-/// A number, or so many hundredths.
+/// Parses a number, or a percentage.
 fn share(text: &str) -> Result<f64, String> {
     match text.trim_end().strip_suffix('%') {
         Some(percent) => Ok(positive(percent.trim_end())? / 100.0),
@@ -668,7 +699,7 @@ fn bytes(text: &str) -> Result<u64, String> {
         _ => return Err("bytes are wanted, or KB, MB, GB, TB, KiB, MiB, GiB, TiB of them, like 2GB".into()),
     };
     let bytes = positive(digits.trim_end())? * unit as f64;
-    // Beyond this f64 counts no single bytes, and no machine has them.
+    // Beyond this, f64 cannot represent every number of bytes, and no machine has as many.
     if (1.0..=9e15).contains(&bytes) {
         Ok(bytes as u64)
     } else {
@@ -676,7 +707,8 @@ fn bytes(text: &str) -> Result<u64, String> {
     }
 }
 
-/// `auto`, a factor like 0.5, or an exposure value at ISO 100 like 12EV, whose factor is 1 / (1.2 · 2^EV).
+/// Parses `auto`, a factor like 0.5, or an exposure value at ISO 100 like 12EV, whose factor is 1 / (1.2 ·
+/// 2^EV).
 fn exposure(text: &str) -> Result<Exposure, String> {
     let wanted =
         || "auto is wanted, a factor greater than 0 like 0.5, or an exposure value like 12EV".to_owned();
@@ -704,7 +736,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// Sizes that a page can show, and that FLIP is defined for.
+/// Parses a size that fits on a page and is large enough for FLIP.
 fn picture_size(text: &str) -> Result<(u32, u32), String> {
     match size(text) {
         Ok((width, height)) if (8..=4096).contains(&width) && (8..=4096).contains(&height) => {

@@ -1,4 +1,4 @@
-//! `lumbre bake`: a level in, the same level with lightmaps out.
+//! `lumbre bake`: bakes lightmaps for a level and writes it with them.
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -64,7 +64,7 @@ pub fn run(asked: &Bake) -> anyhow::Result<()> {
     }
     let lightmaps: Vec<FileLine> = saved.lightmaps.iter().map(FileLine::from).collect();
     BakeRecord::write(&asked.output, what, &saved.files, &lightmaps, &report)?;
-    // Last: a bake that is continued begins with the samples that it began with.
+    // The samples are written last: a bake that is continued has to start from the same previous samples.
     keep_samples(asked, samples.as_ref());
     checkpoint.remove().with_context(|| format!("{} cannot be removed", checkpoint.path.display()))?;
     print(&report, &lightmaps, asked.json)
@@ -130,7 +130,7 @@ fn samples_path(output: &Path) -> PathBuf {
     folder_of_bake(output).join("samples")
 }
 
-/// The samples of the output that is there, if they can be read.
+/// Reads the samples of the previous bake of this output, if they exist and are valid.
 fn former_samples(output: &Path) -> Option<Samples> {
     let path = samples_path(output);
     match Samples::read(&path) {
@@ -143,7 +143,8 @@ fn former_samples(output: &Path) -> Option<Samples> {
     }
 }
 
-/// Keeps the samples for the next bake. Where there are none, for want of time say, those of the bake before are still good.
+/// Writes the samples for the next bake. Without new samples, for example because the time ran out, those of
+/// the previous bake stay valid.
 fn keep_samples(asked: &Bake, samples: Option<&Samples>) {
     let path = samples_path(&asked.output);
     let done = match samples {
@@ -155,7 +156,7 @@ fn keep_samples(asked: &Bake, samples: Option<&Samples>) {
         None => Ok(()),
     };
     if let Err(error) = done {
-        // The lightmaps are there; only the next bake has to do everything.
+        // The lightmaps are complete; only the next bake has to start from the beginning.
         eprintln!(
             "lumbre: warning: {}: {error}; the next bake cannot keep what this one found",
             path.display()
@@ -163,7 +164,7 @@ fn keep_samples(asked: &Bake, samples: Option<&Samples>) {
     }
 }
 
-/// Bakes, until the end or the first interruption.
+/// Bakes until the end or the first interruption.
 fn interruptible(
     interruption: &Interruption,
     world: &mut World,
@@ -200,7 +201,8 @@ fn interruptible(
         }
         Err(error) => {
             if !matches!(error, BakeError::Checkpoint { .. }) {
-                // Nothing could be continued with it; that it cannot be removed is not the error to tell.
+                // The checkpoint could not be continued from. If it cannot be removed either, the first error
+                // is the one to report.
                 let _ = checkpoint.remove();
             }
             Err(error.into())
@@ -212,14 +214,14 @@ fn how_to_continue(checkpoint: &Path) -> String {
     format!("the same command with --resume continues from {}", checkpoint.display())
 }
 
-/// `room.baked.glb` has its checkpoint in `room.baked.glb.checkpoint`.
+/// Returns the checkpoint of an output: `room.baked.glb.checkpoint` for `room.baked.glb`.
 fn checkpoint_path(output: &Path) -> PathBuf {
     let mut name = OsString::from(output);
     name.push(".checkpoint");
     name.into()
 }
 
-/// The report as it was asked for.
+/// Prints the report as text or JSON.
 fn print(report: &BakeReport, files: &[FileLine], json: bool) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     if json {
@@ -233,7 +235,7 @@ fn print(report: &BakeReport, files: &[FileLine], json: bool) -> anyhow::Result<
     Ok(())
 }
 
-/// A level in which nothing shines would cost the time of a bake and be black.
+/// Refuses a level without any light: its bake would take its time and be black.
 fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
     if has_light_to_bake(world) {
         return Ok(());
@@ -245,16 +247,16 @@ fn check_light(world: &mut World, asked: &Bake) -> anyhow::Result<()> {
     )
 }
 
-/// Whether two paths lead to one file, through links or not.
+/// Returns true if two paths lead to the same existing file, through links or not.
 fn is_same_file(one: &Path, other: &Path) -> bool {
     match (std::fs::canonicalize(one), std::fs::canonicalize(other)) {
         (Ok(one), Ok(other)) => one == other,
-        // What is not there is nobody's.
+        // A file that does not exist is not the same as any other.
         _ => false,
     }
 }
 
-/// What would be wrong with the output is said before the work, not after it.
+/// Checks the output before the work starts rather than after it.
 fn check_output(asked: &Bake) -> anyhow::Result<()> {
     let path = &asked.output;
     if !asked.overwrite && is_same_file(&asked.input, path) {
@@ -284,7 +286,7 @@ fn check_output(asked: &Bake) -> anyhow::Result<()> {
         .with_context(|| format!("{}: the folder {} cannot be written to", path.display(), folder.display()))
 }
 
-/// The report for people.
+/// Returns the report as text.
 fn summary(report: &BakeReport) -> String {
     let mut text = format!(
         "{} maps, {} texels ({:.0} % covered), {} patches, {:.1} million rays at {:.2} Mrays/s\n\

@@ -1,5 +1,5 @@
-//! What lies beside a baked level: of which scene and options it is, which files belong to it, how good it is. By it an unchanged
-//! level is not baked again. Not the baking.
+//! The record beside a baked level: its scene and options, the files that belong to it, and its quality. By
+//! this record an unchanged level is not baked again.
 
 use std::ffi::OsString;
 use std::fs::OpenOptions;
@@ -12,26 +12,26 @@ use serde::{Deserialize, Serialize};
 
 use crate::lightmap_report::FileLine;
 
-/// The version of this file; another is not read.
+/// Version of the format; records of other versions are ignored.
 const VERSION: u32 = 1;
 
-/// A finished bake.
+/// The record of a finished bake.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct BakeRecord {
     version: u32,
-    /// The hash of everything that the light depends on.
+    /// Hash of everything that the light depends on.
     content: String,
-    /// BLAKE3 of the input, with what the light does not depend on.
+    /// BLAKE3 of the input, including what the light does not depend on.
     input: String,
-    /// Seconds that it was allowed to take.
+    /// Time limit in seconds.
     time: Option<f64>,
-    /// How the lightmaps were to be written.
+    /// The options by which the lightmaps were written.
     encodings: String,
-    /// What was written, beside this.
+    /// The files that were written, by their paths relative to the output's folder.
     files: Vec<FileRecord>,
-    /// What the lightmaps among them hold.
+    /// The lightmaps among them.
     pub lightmaps: Vec<FileLine>,
-    /// How it went.
+    /// The baker's report.
     pub report: BakeReport,
 }
 
@@ -43,19 +43,19 @@ struct FileRecord {
     blake3: String,
 }
 
-/// What is asked for, to be compared with what is there.
+/// A requested bake, to be compared with the record.
 pub struct Asked {
-    /// The hash of everything that the light depends on.
+    /// Hash of everything that the light depends on.
     pub content: String,
-    /// How the lightmaps are to be written.
+    /// The options by which the lightmaps are to be written.
     pub files: String,
     /// BLAKE3 of the input.
     pub input: String,
-    /// Seconds that the bake may take.
+    /// Time limit in seconds.
     pub time: Option<f64>,
 }
 
-/// BLAKE3 of the bytes of several files.
+/// Returns the BLAKE3 hash of the contents of several files, with their lengths.
 pub fn hash_of_files<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     for path in paths {
@@ -66,7 +66,8 @@ pub fn hash_of_files<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> io::Re
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// `room.baked.glb` has what the next bake of it starts from in the folder `room.baked.bake`, which may be deleted.
+/// Returns the folder with the data for the next bake of an output: `room.baked.bake` for `room.baked.glb`.
+/// It may be deleted.
 pub fn folder_of_bake(output: &Path) -> PathBuf {
     output.with_extension("bake")
 }
@@ -76,14 +77,15 @@ fn place(output: &Path) -> PathBuf {
 }
 
 impl BakeRecord {
-    /// The record of a level that is just what is asked for, with all its files whole.
+    /// Returns the record of an output that is exactly what is requested, with all its files complete.
     pub fn unchanged(output: &Path, asked: &Asked) -> Option<Self> {
         let record: Self = serde_json::from_slice(&std::fs::read(place(output)).ok()?).ok()?;
         let same = record.version == VERSION
             && record.content == asked.content
             && record.encodings == asked.files
             && record.input == asked.input;
-        // A bake for which the time ran out is only as good as one that has no more of it.
+        // A bake that ran out of time is good enough only for a request with the same time limit or a lower
+        // one.
         let enough = record.report.ended != Ended::Time
             || asked.time.is_some_and(|asked| record.time.is_some_and(|time| asked <= time));
         let named =
@@ -97,9 +99,9 @@ impl BakeRecord {
         (same && enough && named && record.files.iter().all(whole)).then_some(record)
     }
 
-    /// Writes the record of what was just written.
+    /// Writes the record of the files that were just written.
     ///
-    /// What the bake before wrote into the folder of the lightmaps and this one did not goes.
+    /// Removes lightmaps that the previous bake wrote into the lightmap folder and this one did not.
     pub fn write(
         output: &Path,
         asked: Asked,
@@ -109,7 +111,7 @@ impl BakeRecord {
     ) -> anyhow::Result<()> {
         let mut files = Vec::with_capacity(written.len());
         for path in written {
-            // Copies of textures lie in folders of their own.
+            // Copies of textures are in folders of their own.
             let own = output.parent().and_then(|folder| path.strip_prefix(folder).ok());
             let name = own.unwrap_or(path).to_string_lossy().into_owned();
             files.push(FileRecord {
@@ -131,8 +133,8 @@ impl BakeRecord {
     }
 }
 
-/// Removes the lightmaps of the bake whose record is there, if it is of this output, that are not among the new files. Those that are no more
-/// as they were written are somebody else's.
+/// Removes the lightmaps of the previous record, if it belongs to this output, that are not among the new
+/// files. Files that have changed since they were written are left alone, since they belong to somebody else.
 fn remove_former_lightmaps(record: &Path, output: &Path, files: &[FileRecord]) {
     let former = std::fs::read(record).ok().and_then(|text| serde_json::from_slice::<BakeRecord>(&text).ok());
     let folder = output.with_extension("lightmaps");
@@ -146,13 +148,14 @@ fn remove_former_lightmaps(record: &Path, output: &Path, files: &[FileRecord]) {
             && path.parent() == Some(&folder)
             && hash_of_files([&path]).is_ok_and(|hash| hash == file.blake3)
         {
-            // One picture too many does no harm.
+            // If this fails, a superfluous image is left, which does no harm.
             let _ = std::fs::remove_file(path);
         }
     }
 }
 
-/// Writes a file beside its name and renames it. The name beside is always the same: what a killed process left is used again.
+/// Writes a file under a temporary name beside it and renames it. The temporary name is always the same, so
+/// that what a killed process left is overwritten.
 fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
@@ -160,7 +163,8 @@ fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
     let beside = path.with_file_name(name);
     let written = (|| {
         let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&beside)?;
-        // Whoever else writes it is done in a moment; some network folders know no locks.
+        // Another writer holds the lock only briefly. Some network folders do not support locks, so a failure
+        // is ignored.
         let _ = file.lock();
         file.set_len(0)?;
         file.write_all(content)?;
@@ -168,7 +172,7 @@ fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
         std::fs::rename(&beside, path)
     })();
     if written.is_err() {
-        // Half-written; if it cannot be removed either, the first error is the one to tell.
+        // The file is partial. If it cannot be removed either, the first error is the one to report.
         let _ = std::fs::remove_file(&beside);
     }
     written

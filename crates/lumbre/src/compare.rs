@@ -1,4 +1,4 @@
-//! `lumbre compare`: how far one picture is from another, in light and to the eye.
+//! `lumbre compare`: measures the difference of two pictures, in radiance and as perceived (FLIP).
 
 use std::io::Write;
 use std::path::Path;
@@ -17,7 +17,7 @@ struct Read {
     width: u32,
     height: u32,
     pixels: Vec<DVec3>,
-    /// Floats of light; else bytes with sRGB's curve.
+    /// Whether the pixels are radiance in floats; otherwise they are sRGB-encoded.
     is_light: bool,
 }
 
@@ -42,7 +42,7 @@ pub fn run(asked: &Compare) -> anyhow::Result<()> {
     }
     let shown = [&reference, &test]
         .map(|picture| picture.pixels.iter().map(|p| picture.shown(*p)).collect::<Vec<_>>());
-    // Light is compared with light; where one has been through a tone curve, both are as they are shown.
+    // If both hold radiance, it is compared as it is; otherwise both are compared as displayed.
     let both_light = reference.is_light && test.is_light;
     let light = |picture: &Read, shown: &[DVec3]| match both_light {
         true => picture.pixels.clone(),
@@ -98,7 +98,7 @@ fn read(path: &Path) -> anyhow::Result<Read> {
     Ok(Read { width, height, pixels, is_light })
 }
 
-/// From sRGB's curve to light.
+/// Decodes sRGB.
 fn decoded(color: DVec3) -> DVec3 {
     color.map(decode_srgb)
 }

@@ -1,4 +1,4 @@
-//! `lumbre cost`: what accuracy costs in time, and what changed between two such reports.
+//! `lumbre cost`: measures what accuracy costs in time, and compares two such reports.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -16,7 +16,7 @@ use crate::arguments::Cost;
 use crate::interruption::Interruption;
 use crate::progress::Shown;
 
-/// Width and height of the pictures where none is asked for: whole, and quick.
+/// Default width and height of the pictures: normally, and with `--quick`.
 const SIZES: [(u32, u32); 2] = [(480, 270), (320, 180)];
 
 /// Runs the command.

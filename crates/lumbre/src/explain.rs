@@ -1,4 +1,4 @@
-//! `lumbre explain`: what a scene calls for, what it does not, and what each effect costs.
+//! `lumbre explain`: which effects a scene calls for and which it does not, and what each costs.
 
 use std::io::Write;
 
@@ -10,7 +10,7 @@ use lumbre::scene::{add_default_light, is_without_light};
 use crate::arguments::{Explain, ExplainFormat, Frame};
 use crate::loading::{frame_options, load, load_quietly};
 
-/// What else there is to ask.
+/// Shown below the short text: options for more.
 const HINT: &str =
     "\n--all gives the reasons, passes, resources and variants; --measure what each effect costs\n";
 
@@ -22,7 +22,7 @@ pub fn run(asked: &Explain) -> anyhow::Result<()> {
     let mut explanation = explain(&mut world, &options, width, height)?;
     if let Some(time) = asked.measure {
         let gpu = Gpu::headless()?;
-        // The frame of the device that it is measured on.
+        // Explains the frame of the device that is measured.
         explanation = Renderer::new(&gpu).explain(&mut world, &options, width, height)?;
         let effects = removable_effects(&explanation.census, &options);
         let mut again = || again(asked);
@@ -46,7 +46,7 @@ fn options(asked: &Explain, frame: &Frame, world: &mut World) -> anyhow::Result<
     frame_options(world, frame, display, f64::from(width) / f64::from(height), &asked.input)
 }
 
-/// The scene with the options of its frame once more, without the notes that have been given already.
+/// Loads the scene again, with the options of its frame, without repeating notes.
 fn again(asked: &Explain) -> anyhow::Result<(World, FrameOptions)> {
     let mut world = load_quietly(&asked.input, &asked.reading)?.world;
     let options = options(asked, &Frame { no_default_light: true, ..asked.frame.clone() }, &mut world)?;

@@ -1,28 +1,29 @@
-//! Ctrl-C, and what else asks a process to end: while something runs that keeps its work it is told, at any other time the process ends at once.
+//! Handles Ctrl-C and other termination signals: work that can save its state is asked to stop, and at any
+//! other time the process ends at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What was asked, and what to do about it.
+/// The state that the handler shares with the program.
 #[derive(Default)]
 struct State {
     asked: AtomicBool,
-    /// Something runs that looks at `asked`.
+    /// Whether work is running that checks `asked`.
     listening: AtomicBool,
-    /// What to say before the process ends.
+    /// Message to print before the process ends.
     words: Mutex<String>,
 }
 
-/// The handler of a process.
+/// The signal handler of this process.
 pub struct Interruption(Arc<State>);
 
 impl Interruption {
-    /// Takes over. Where that cannot be, an interruption ends the process at once, and a warning says so.
+    /// Installs the handler. If that fails, an interruption ends the process at once, and a warning says so.
     pub fn handle() -> Self {
         let state = Arc::new(State::default());
         let of_handler = Arc::clone(&state);
         let handled = ctrlc::set_handler(move || {
-            // Whoever asks twice does not want to wait.
+            // A second request ends the process at once.
             let twice = of_handler.asked.swap(true, Ordering::SeqCst);
             if twice || !of_handler.listening.load(Ordering::SeqCst) {
                 eprintln!("lumbre: {}", of_handler.words.lock().unwrap_or_else(PoisonError::into_inner));
@@ -35,12 +36,12 @@ impl Interruption {
         Self(state)
     }
 
-    /// Says so from now on, if the process ends by an interruption.
+    /// Sets the message to print if the process is ended by an interruption.
     pub fn say(&self, words: String) {
         *self.0.words.lock().unwrap_or_else(PoisonError::into_inner) = words;
     }
 
-    /// Does something that is told, by its argument, whether it was asked to end.
+    /// Runs work with a function that returns true once it is asked to stop.
     pub fn told<T>(&self, work: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T) -> T {
         self.0.listening.store(true, Ordering::SeqCst);
         let result = work(&|| self.0.asked.load(Ordering::SeqCst));

@@ -1,4 +1,5 @@
-//! The samples of a traced picture in a file beside it, for a run that goes on with them. Not what is in it.
+//! Stores the samples of a traced picture in a file beside it, so that a later run can go on with them. Their
+//! format is `lumbre_trace`'s.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use anyhow::Context;
 
 use crate::output::write_file;
 
-/// The file, and whether this run has written it.
+/// The file with the samples, and whether this run has written it.
 pub struct KeptSamples {
     pub path: PathBuf,
     written: AtomicBool,
@@ -16,14 +17,14 @@ pub struct KeptSamples {
 }
 
 impl KeptSamples {
-    /// `room.exr` has its samples in `room.exr.samples`.
+    /// Returns the samples file of a picture: `room.exr.samples` for `room.exr`.
     pub fn beside(output: &Path) -> Self {
         let mut name = OsString::from(output);
         name.push(".samples");
         Self { path: name.into(), written: AtomicBool::new(false), failed: AtomicBool::new(false) }
     }
 
-    /// What is there; nothing if there is no file.
+    /// Reads the samples; `None` if there is no file.
     pub fn read(&self) -> anyhow::Result<Option<Vec<u8>>> {
         match std::fs::read(&self.path) {
             Ok(bytes) => Ok(Some(bytes)),
@@ -34,7 +35,8 @@ impl KeptSamples {
         }
     }
 
-    /// Writes them, whole or not at all. Where that cannot be, the picture is worth going on with all the same, and a warning says so once.
+    /// Writes the samples, through a temporary file, so that no partial file is left. A failure does not stop
+    /// the picture; it is reported once as a warning.
     pub fn write(&self, bytes: &[u8]) {
         match write_file(&self.path, |path| Ok(std::fs::write(path, bytes)?)) {
             Ok(()) => self.written.store(true, Ordering::Relaxed),
@@ -45,12 +47,12 @@ impl KeptSamples {
         }
     }
 
-    /// Whether this run has kept any.
+    /// Returns true if this run has written samples.
     pub fn are_kept(&self) -> bool {
         self.written.load(Ordering::Relaxed)
     }
 
-    /// Removes them if this run has written them: nobody has asked for them.
+    /// Removes the samples if this run has written them, because they were not requested.
     pub fn remove(&self) -> anyhow::Result<()> {
         if !self.are_kept() {
             return Ok(());

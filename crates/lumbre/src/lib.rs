@@ -1,11 +1,12 @@
-//! Lumbre: lighting for games that tells you what it costs. The crates under one name; the program of the same name is in `main.rs`.
+//! Lumbre: lighting for games that tells you what it costs. This crate re-exports all crates under one name;
+//! the program of the same name is in `main.rs`.
 //!
 //! ```text
 //!    level.glb ─► scene ─► bake ─► level.baked.glb ─► scene ─► render ─► frame
 //!                   │  └─► trace ─► reference picture            │
 //!                 optics, mesh, rays                           graph
 //!
-//!    cost: studies of all of these, and their page
+//!    cost: studies of all of these, with a report page
 //! ```
 //!
 //! ```

@@ -1,16 +1,17 @@
-//! What the files of a bake hold and what their encodings cost, for people and for programs. Not their writing.
+//! The files of a bake and the errors of their encodings, as text and for JSON. They are written in
+//! `lumbre_scene`.
 
 use lumbre::scene::{EncodingError, LightmapFile};
 use serde::{Deserialize, Serialize};
 
-/// A file of the report in JSON.
+/// One file in the JSON report.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FileLine {
-    /// Its name, beside the baked level.
+    /// Its name, without the folder.
     file: String,
     encoding: String,
     bytes: u64,
-    /// Relative to the mean of the lit texels.
+    /// Encoding error, relative to the mean of the lit texels.
     error: EncodingError,
 }
 
@@ -21,7 +22,7 @@ impl From<&LightmapFile> for FileLine {
     }
 }
 
-/// One line per encoding, with the worst of its files.
+/// Returns one line per encoding, with the largest error of its files.
 pub fn summary_of_files(files: &[FileLine]) -> String {
     let mut encodings: Vec<&str> = Vec::new();
     for file in files {
@@ -45,7 +46,7 @@ pub fn summary_of_files(files: &[FileLine]) -> String {
     text
 }
 
-/// One line for each file that could not hold its light.
+/// Returns one line for each file whose encoding could not represent all of its light.
 pub fn warnings_of_files(files: &[LightmapFile]) -> impl Iterator<Item = String> + '_ {
     files.iter().filter(|file| file.error.saturated > 0 || file.error.negative > 0).map(|file| {
         let EncodingError { saturated, negative, .. } = file.error;

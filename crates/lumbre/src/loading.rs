@@ -1,4 +1,4 @@
-//! From a file to a World with a camera, and from the command line's words to a frame's options.
+//! Loads files into Worlds with a camera, and converts command-line options to frame options.
 
 use std::path::Path;
 
@@ -11,24 +11,24 @@ use lumbre::scene::{
 
 use crate::arguments::{Exposure, Frame, Reading};
 
-/// The nodes of the loaded file, in its order: `--camera INDEX` counts by it.
+/// The nodes of the loaded file in file order, by which `--camera INDEX` counts.
 #[derive(Resource)]
 struct FileOrder(Vec<Entity>);
 
-/// A World and what was found while it was loaded.
+/// A World, and the report of its loading.
 pub struct Loaded {
     pub world: World,
     pub report: LoadReport,
 }
 
-/// Loads a scene; what the importer has to remark goes to standard error.
+/// Loads a scene and prints the importer's notes to standard error.
 pub fn load(path: &Path, reading: &Reading) -> anyhow::Result<Loaded> {
     let mut world = World::new();
     let report = scene::load_with(&mut world, path, &load_options(reading))?;
     Ok(loaded(world, report, path))
 }
 
-/// [`load`] without a word: for a file that has been loaded before.
+/// Does what [`load`] does without printing notes, for a file that has been loaded before.
 pub fn load_quietly(path: &Path, reading: &Reading) -> anyhow::Result<Loaded> {
     let mut world = World::new();
     let report = scene::load_with(&mut world, path, &load_options(reading))?;
@@ -36,7 +36,7 @@ pub fn load_quietly(path: &Path, reading: &Reading) -> anyhow::Result<Loaded> {
     Ok(Loaded { world, report })
 }
 
-/// [`load`], and the file itself, to be written again with light.
+/// Does what [`load`] does, and also returns the file itself, to be written again with baked light.
 pub fn load_source(path: &Path, reading: &Reading) -> anyhow::Result<(SourceFile, Loaded)> {
     let mut world = World::new();
     let mut source = SourceFile::read(path, &load_options(reading))?;
@@ -44,7 +44,7 @@ pub fn load_source(path: &Path, reading: &Reading) -> anyhow::Result<(SourceFile
     Ok((source, loaded(world, report, path)))
 }
 
-/// How the command line wants files read.
+/// Returns the options that the command line sets for reading files.
 pub fn load_options(reading: &Reading) -> LoadOptions {
     LoadOptions { lenient: !reading.strict, root: reading.root.clone(), ..LoadOptions::default() }
 }
@@ -57,7 +57,7 @@ fn loaded(mut world: World, report: LoadReport, path: &Path) -> Loaded {
     Loaded { world, report }
 }
 
-/// Lights a World from a camera, with a note, if it would be black otherwise.
+/// Adds default lights at the camera, with a note, if the World has no light.
 fn light_by_default(world: &mut World, camera: Entity, path: &Path) {
     if scene::is_without_light(world) {
         eprintln!(
@@ -68,11 +68,12 @@ fn light_by_default(world: &mut World, camera: Entity, path: &Path) {
     }
 }
 
-/// Share of a frame that has to be white for want of an exposure before one is metered unasked.
+/// Fraction of a frame that has to be clipped to white before an exposure is metered without being asked for.
 const CLIPPED: f64 = 0.02;
 
-/// The exposure that is asked for, or that a file needs whose lights are in candela or lux (`photometric`) and whose cameras state none; a metered one is stated on standard error. `None`
-/// leaves that of the camera.
+/// Returns the requested exposure, or a metered one if the file's lights are in candela or lux
+/// (`photometric`, where no camera states an exposure) and too much would be white. A metered exposure is
+/// printed to standard error. `None` leaves the camera's exposure.
 pub fn exposure(
     asked: Option<Exposure>,
     photometric: bool,
@@ -102,8 +103,8 @@ pub fn exposure(
     Ok(Some(metering.exposure))
 }
 
-/// The options that the command line asks for; an exposure that has to be metered aside. A scene without a camera gets one, and one without
-/// light a default light.
+/// Returns the frame options that the command line asks for, except for an exposure that has to be metered.
+/// Adds a camera to a scene without one, and default lights to one without light.
 pub fn frame_options(
     world: &mut World,
     frame: &Frame,
@@ -146,7 +147,8 @@ pub fn frame_options(
     })
 }
 
-/// The camera by name or index, or the first one, or one made to see everything.
+/// Returns the camera with a name or index, or else the active or first one, or a new one that sees
+/// everything.
 fn camera(world: &mut World, asked: Option<&str>, aspect: f64) -> anyhow::Result<Entity> {
     let order = world.remove_resource::<FileOrder>().map_or(Vec::new(), |order| order.0);
     let place = |entity: Entity| order.iter().position(|node| *node == entity).unwrap_or(usize::MAX);
@@ -190,7 +192,7 @@ fn camera(world: &mut World, asked: Option<&str>, aspect: f64) -> anyhow::Result
     bail!("there is no camera `{asked}`; there are: {}", names.join(", "))
 }
 
-/// Lower-case extension of a path.
+/// Returns the lower-case extension of a path.
 pub fn extension(path: &Path) -> anyhow::Result<String> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some(extension) => Ok(extension.to_ascii_lowercase()),

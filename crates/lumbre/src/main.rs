@@ -1,4 +1,4 @@
-//! The `lumbre` program: reads the command line, runs one command, turns its outcome into an exit status.
+//! The `lumbre` program: reads the command line, runs one command, and turns its outcome into an exit status.
 
 mod arguments;
 mod bake;
@@ -31,7 +31,7 @@ use crate::arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
     silence_device_selection();
-    // Bad usage ends in here, with exit status 2.
+    // Bad usage exits here, with status 2.
     let arguments = Arguments::parse();
     let messages = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
@@ -51,7 +51,7 @@ fn main() -> ExitCode {
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads has read enough, as `head` does.
+        // The reader of the output has closed it early, as `head` does; that is no error.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("lumbre: {error:#}");
@@ -60,7 +60,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// What `LUMBRE_LOG` says (`debug`, or `lumbre_bake=debug,wgpu_core=info`), or warnings and the progress of a bake, unless it is one among many.
+/// Returns the filter of log messages: `LUMBRE_LOG` (`debug`, or `lumbre_bake=debug,wgpu_core=info`), or else
+/// warnings and the progress of bakes. `lumbre cost` runs many bakes and shows only their warnings.
 fn messages_shown(arguments: &Arguments) -> Targets {
     let of_bakes =
         if matches!(arguments.command, Some(Command::Cost(_))) { Level::WARN } else { Level::INFO };
@@ -78,8 +79,8 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
     causes.any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }
 
-/// Where there is no desktop's runtime folder, Mesa's layer that asks the desktop for the preferred device makes the Wayland library complain
-/// on standard error, once for every device that is opened.
+/// Without a desktop's runtime folder, Mesa's layer that asks the desktop for the preferred device makes the
+/// Wayland library print an error on standard error each time a device is opened. This disables that layer.
 #[allow(unsafe_code, reason = "changing the environment is unsafe where other threads may read it")]
 fn silence_device_selection() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os("NODEVICE_SELECT").is_none() {

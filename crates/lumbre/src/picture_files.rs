@@ -1,4 +1,4 @@
-//! Traced pictures as files: an OpenEXR file with auxiliary pictures as its layers, or PNG files beside each other. Not what is in them.
+//! Writes traced pictures: an OpenEXR file with auxiliary pictures as layers, or a PNG file for each.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,11 +15,11 @@ use lumbre::trace::{Aov, AovPicture, AovValues, Picture, heat_color, shown};
 
 use crate::output::write_file;
 
-/// How radiance becomes numbers in files.
+/// How radiance is converted to pixel values.
 #[derive(Clone, Copy, Debug)]
 pub struct Development {
     pub display: Display,
-    /// Factor on radiance.
+    /// The factor on radiance.
     pub exposure: f64,
 }
 
@@ -34,8 +34,9 @@ impl Development {
     }
 }
 
-/// A file for all: R, G, B are the picture, and every auxiliary picture is a layer, `NAME.R` and so on. Light is developed as the picture
-/// is, so that its sums still hold under linear display; albedo, normals, metres and counts are as they are.
+/// Writes one file in which R, G and B are the picture, and every auxiliary picture is a layer `NAME.R` and
+/// so on. Light is converted as the picture is, so that under linear display its sums still hold; albedo,
+/// normals, metres and counts are written as they are.
 pub fn write_open_exr(path: &Path, picture: &Picture, how: Development) -> anyhow::Result<()> {
     let mut channels = Vec::new();
     let mut taken = BTreeSet::new();
@@ -65,7 +66,7 @@ pub fn write_open_exr(path: &Path, picture: &Picture, how: Development) -> anyho
             }
         }
     }
-    // Names are UTF-8, as OpenEXR has them.
+    // Names are UTF-8, as OpenEXR requires.
     let named = |(name, samples): (String, FlatSamples)| {
         AnyChannel::new(Text::from_slice_unchecked(name.as_bytes()), samples)
     };
@@ -80,8 +81,9 @@ pub fn write_open_exr(path: &Path, picture: &Picture, how: Development) -> anyho
     write_file(path, |path| Ok(image.write().non_parallel().to_file(path)?))
 }
 
-/// The picture, and every auxiliary picture in a file of its own: `room.png`, `room.albedo.png`, `room.light-lamp.png`. Gives their paths, and
-/// what their grey or colour stands for where it is not light.
+/// Writes the picture, and every auxiliary picture to a file of its own: `room.png`, `room.albedo.png`,
+/// `room.light-lamp.png`. Returns the paths of the auxiliary pictures, each with the meaning of its colours
+/// unless it shows light or albedo.
 pub fn write_png(
     path: &Path,
     picture: &Picture,
@@ -123,7 +125,7 @@ fn write_auxiliary(
             let surfaces = || values.iter().copied().filter(|value| value.is_finite());
             let nearest = surfaces().fold(f64::INFINITY, f64::min);
             let farthest = surfaces().fold(0.0, f64::max);
-            // Black is left to the background.
+            // Black is reserved for the background.
             let grey = |depth: &f64| match depth.is_finite() {
                 true => 1.0 - 0.9 * (depth - nearest) / (farthest - nearest).max(f64::MIN_POSITIVE),
                 false => 0.0,
@@ -141,12 +143,13 @@ fn write_auxiliary(
     }
 }
 
-/// Whether it is radiance, which has to be developed.
+/// Returns true if the picture holds radiance, which has to be converted for display.
 fn is_light(aov: &Aov) -> bool {
     matches!(aov, Aov::Light(_) | Aov::Source { .. } | Aov::EverySource { .. })
 }
 
-/// Beside the picture, by what it is, without letters that file systems keep for themselves.
+/// Returns the path of an auxiliary picture beside the main one, without characters that file systems
+/// reserve.
 fn path_beside(path: &Path, aov: &Aov, taken: &mut BTreeSet<String>) -> anyhow::Result<PathBuf> {
     let stem = path.file_stem().and_then(|stem| stem.to_str());
     let stem = stem.with_context(|| format!("{}: this names no file", path.display()))?;
@@ -160,7 +163,7 @@ fn path_beside(path: &Path, aov: &Aov, taken: &mut BTreeSet<String>) -> anyhow::
     Ok(path.with_file_name(format!("{stem}.{}.png", free(plain, taken))))
 }
 
-/// What a channel may be called at most, less what is added to a layer's name.
+/// Longest name of a layer in bytes, which leaves room for the suffix of its channels.
 const LONGEST_LAYER: usize = 240;
 
 fn layer_name(aov: &Aov, taken: &mut BTreeSet<String>) -> String {
@@ -169,7 +172,7 @@ fn layer_name(aov: &Aov, taken: &mut BTreeSet<String>) -> String {
     free(name, taken)
 }
 
-/// A name that is not taken yet, by a number where it would be, without regard to capital letters.
+/// Returns a name that is not taken yet, ignoring case, by adding a number if necessary.
 fn free(plain: String, taken: &mut BTreeSet<String>) -> String {
     let mut name = plain.clone();
     let mut number = 2;

@@ -1,4 +1,5 @@
-//! `lumbre play`, and `lumbre FILE.glb`: the demo level, or any other file. Without a display, a tour of it in PNG frames.
+//! `lumbre play` and `lumbre FILE.glb`: opens the demo level or another file in a window, or without a
+//! display writes a tour of it to PNG files.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -19,7 +20,7 @@ pub fn run(asked: &Play) -> anyhow::Result<()> {
     let is_headless = asked.headless || !demo::has_display();
     let level = match &asked.level {
         Some(level) => Level { path: level.clone(), is_baked_beside_frames: false },
-        // Pictures that are kept, and walks that are compared, show the level's light as it is in the end.
+        // Pictures that are kept and walks that are compared need the final light from the start.
         None => demo_level(is_headless || asked.screenshot.is_some() || asked.input.is_some())?,
     };
     let Level { path: level, is_baked_beside_frames } = level;
@@ -59,7 +60,7 @@ fn open_options(asked: &Play) -> demo::OpenOptions {
     demo::OpenOptions { load, default_light: !asked.no_default_light, exposure, ..Default::default() }
 }
 
-/// One exposure for all pictures of a tour, as metered where it begins.
+/// Returns one exposure for all pictures of a tour, metered at its start if needed.
 fn exposure_of_tour(opened: &mut Opened, asked: &Play) -> anyhow::Result<Option<f32>> {
     let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
     let (options, photometric) = (FrameOptions::default(), opened.is_photometric);
@@ -78,12 +79,12 @@ fn exposure_of_tour(opened: &mut Opened, asked: &Play) -> anyhow::Result<Option<
 /// A file to play.
 struct Level {
     path: PathBuf,
-    /// Whether the window bakes it while it is played.
+    /// Whether the window bakes it in the background.
     is_baked_beside_frames: bool,
 }
 
-/// The demo level, baked. If it is not there, or older than the level, it is baked now, or in the window where light need not be there from
-/// the first frame on.
+/// Returns the demo level, baked. If the baked file is missing or older than the level, it is baked now if
+/// light is needed from the first frame on, and otherwise in the window.
 fn demo_level(needs_light: bool) -> anyhow::Result<Level> {
     let source = demo_source()?;
     let baked = source.with_file_name("demo.baked.glb");
@@ -114,7 +115,8 @@ fn bake_demo_level(source: &Path, baked: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// `assets/demo.glb` under the working folder, beside the program, or in the source tree it was built from.
+/// Finds `assets/demo.glb` in the working folder, beside the program, or in the source tree that it was built
+/// from.
 fn demo_source() -> anyhow::Result<PathBuf> {
     let mut places = vec![PathBuf::from("assets")];
     if let Some(folder) = std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned())) {

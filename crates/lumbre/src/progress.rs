@@ -1,4 +1,4 @@
-//! How far a bake or a traced picture has come, for whoever waits: a bar on a terminal, a line every ten seconds in a pipe. Not the bake.
+//! Shows the progress of long operations: a bar on a terminal, or a line every ten seconds in a pipe.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use lumbre::bake::Progress;
 
-/// Between two lines.
+/// Time between two lines.
 const EVERY: Duration = Duration::from_secs(10);
 
-/// What is shown on standard error.
+/// The form in which progress is shown on standard error.
 pub enum Shown {
     Nothing,
     Bar(ProgressBar),
@@ -17,12 +17,13 @@ pub enum Shown {
 }
 
 impl Shown {
-    /// Of a bake: a bar if standard error is a terminal, else lines; nothing if `quiet`.
+    /// Shows the progress of a bake: as a bar if standard error is a terminal, otherwise as lines; not at all
+    /// if `quiet`.
     pub fn new(quiet: bool) -> Self {
         Self::of("bake", quiet)
     }
 
-    /// The same of something else that takes its time, by its name.
+    /// Shows the progress of the operation named `what` in the same way.
     pub fn of(what: &'static str, quiet: bool) -> Self {
         match (quiet, std::io::stderr().is_terminal()) {
             (true, _) => Self::Nothing,
@@ -31,7 +32,7 @@ impl Shown {
         }
     }
 
-    /// Shows how far the bake is now.
+    /// Shows the current progress.
     pub fn update(&mut self, progress: Progress) {
         match self {
             Self::Nothing => {}
@@ -50,7 +51,7 @@ impl Shown {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Self::Bar(bar) = self {
             bar.finish_and_clear();
@@ -66,11 +67,11 @@ fn bar() -> ProgressBar {
     bar
 }
 
-/// The lines of one bake, or of whatever else.
+/// Progress lines of one operation.
 pub struct Lines {
     what: &'static str,
     begun: Instant,
-    /// When the next one is due.
+    /// Time at which the next line is due, since the start.
     due: Duration,
 }
 
@@ -79,7 +80,7 @@ impl Lines {
         Self { what, begun: Instant::now(), due: Duration::ZERO }
     }
 
-    /// The line that is due, so long after the beginning.
+    /// Returns the line that is due at a time after the start, if any.
     fn line(&mut self, after: Duration, progress: Progress) -> Option<String> {
         if after < self.due {
             return None;

@@ -1,4 +1,4 @@
-//! `lumbre render`: frames without a window, and what they cost.
+//! `lumbre render`: draws frames without a window, and measures them.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -13,49 +13,49 @@ use crate::arguments::Render;
 use crate::loading::{exposure, extension, frame_options, load};
 use crate::output::write_file;
 
-/// What `--timings` writes.
+/// The contents of the file of `--timings`.
 #[derive(Serialize)]
 struct Timings {
-    /// The device and its driver: figures mean little without them.
+    /// The device and its driver, on which all times depend.
     device: String,
     width: u32,
     height: u32,
-    /// What the scene calls for: what the frames' passes and shader variants were decided from.
+    /// The scene's census, by which passes and shader variants were chosen.
     census: Option<Census>,
     frames: Vec<FrameTimes>,
 }
 
-/// One frame.
+/// The measurements of one frame.
 #[derive(Serialize)]
 struct FrameTimes {
-    /// From the call to the finished frame, the GPU waited for.
+    /// From the call until the GPU has finished the frame.
     wall_ms: f64,
     cpu_ms: Option<f64>,
     gpu_ms: Option<f64>,
     statistics: Statistics,
     passes: Vec<PassTimes>,
-    /// What the frame went into, by stages, passes and effects, with what is left of its wall clock.
+    /// The account of the frame by stages, passes and effects.
     accounting: Option<Accounting>,
-    /// Milliseconds of the wall clock that neither stages nor passes answer for.
+    /// Milliseconds of the wall-clock time that neither stages nor passes account for.
     remainder_ms: Option<f64>,
 }
 
-/// One pass.
+/// The measurements of one pass.
 #[derive(Serialize)]
 struct PassTimes {
     name: String,
-    /// Passes of the same group were merged into one.
+    /// Index of the group of merged passes that it belongs to.
     group: usize,
     cpu_ms: Option<f64>,
     gpu_ms: Option<f64>,
     vertex_invocations: Option<u64>,
     fragment_invocations: Option<u64>,
-    /// Lights that were tested against each object of this pass.
+    /// Lights tested against each object of this pass.
     lights_tested: u32,
-    /// Lights in the list of an object in view, on average: its vertices or fragments evaluate those. What fragments find by clusters beside
-    /// them stands in the frame's `light_lists`.
+    /// Average number of lights in the list of a visible object, which its vertices or fragments evaluate.
+    /// Lights that fragments find by clusters are counted in the frame's `light_lists`.
     lights_shaded: f32,
-    /// Evaluations of lights, and of these the ones that contributed more than 1/255 (`--count-lights`).
+    /// Evaluations of lights, and how many of them contributed more than 1/255 (`--count-lights`).
     light_evaluations: Option<u64>,
     light_contributions: Option<u64>,
 }
@@ -121,7 +121,7 @@ pub fn run(asked: &Render) -> anyhow::Result<()> {
 }
 
 impl Timings {
-    /// The last frame, for people.
+    /// Formats the last frame's account as text.
     fn to_text(&self) -> String {
         let account = self.frames.last().and_then(|frame| frame.accounting.as_ref());
         let account = account.map_or_else(String::new, Accounting::to_text);
@@ -130,7 +130,7 @@ impl Timings {
 }
 
 impl FrameTimes {
-    /// Takes the lights that another frame of the same scene counted.
+    /// Takes over the light counts of another frame of the same scene.
     fn take_lights_of(&mut self, counted: &Accounting) {
         for pass in &mut self.passes {
             let same = counted.passes.iter().find(|other| other.pass == pass.name);
@@ -177,7 +177,7 @@ fn frame_times(
     }
 }
 
-/// Writes the frame; whether any of its pixels is not black.
+/// Writes the frame; returns true if any of its pixels is not black.
 fn write_frame(path: &Path, gpu: &Gpu, target: &Offscreen, floats: bool) -> anyhow::Result<bool> {
     let (width, height) = target.size();
     let shows_something;
@@ -188,7 +188,7 @@ fn write_frame(path: &Path, gpu: &Gpu, target: &Offscreen, floats: bool) -> anyh
         image::Rgb32FImage::from_raw(width, height, values).map(image::DynamicImage::ImageRgb32F)
     } else {
         let mut bytes = target.read_rgba8(gpu)?;
-        // A picture of a scene is opaque, whatever blending left in the alpha channel.
+        // The picture is opaque, whatever blending left in the alpha channel.
         bytes.chunks_exact_mut(4).for_each(|pixel| pixel[3] = 255);
         shows_something = bytes.chunks_exact(4).any(|pixel| pixel[..3] != [0; 3]);
         image::RgbaImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgba8)

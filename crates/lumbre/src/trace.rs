@@ -1,4 +1,4 @@
-//! `lumbre trace`: the reference picture of a scene, or the ray tree of one of its pixels.
+//! `lumbre trace`: traces a reference picture of a scene, or prints the ray tree of one of its pixels.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -23,11 +23,12 @@ use crate::loading::{extension, frame_options, load};
 use crate::picture_files::{Development, write_open_exr, write_png};
 use crate::progress::Shown;
 
-/// Share of a picture that has to be white for want of an exposure before one is metered unasked: as of a frame.
+/// Fraction of a picture that has to be clipped to white before an exposure is metered without being asked
+/// for; the same as for frames.
 const CLIPPED: f64 = 0.02;
-/// Samples of the ray tree with `--msaa`: as many as a frame then has.
+/// Samples per pixel of the ray tree with `--msaa`: as many as a frame has then.
 const MULTISAMPLES: u32 = 4;
-/// Time between two writes of the samples that a picture has: what a crash costs.
+/// Time between two writes of the samples, which is what a crash may lose.
 const KEPT_EVERY: Duration = Duration::from_secs(60);
 
 /// Runs the command.
@@ -46,7 +47,7 @@ pub fn run(asked: &Trace) -> anyhow::Result<()> {
     }
     let display = asked.frame.display.unwrap_or(if floats { Display::Linear } else { Display::Srgb });
     let aspect = f64::from(asked.size.0) / f64::from(asked.size.1);
-    // Paths find the light of what shines, and of the sky, themselves.
+    // Paths find the light of emissive objects and the sky without default lights.
     let lit = asked.integrator == Integrator::Path && has_light_to_bake(&mut loaded.world);
     let lighting = Frame { no_default_light: asked.frame.no_default_light || lit, ..asked.frame.clone() };
     let frame = frame_options(&mut loaded.world, &lighting, display, aspect, &asked.input)?;
@@ -109,7 +110,7 @@ fn options(asked: &Trace, frame: &lumbre::render::FrameOptions) -> TraceOptions 
     }
 }
 
-/// What a frame knows and rays do not, and options of one integrator for the other.
+/// Returns notes on options that have no effect on rays, or not on the chosen integrator.
 fn meaningless(asked: &Trace) -> Vec<&'static str> {
     let trees = asked.integrator == Integrator::Whitted;
     let told = [
@@ -172,7 +173,7 @@ fn print_tree(asked: &Trace, tracer: &Tracer, (x, y): (u32, u32)) -> anyhow::Res
     Ok(())
 }
 
-/// The picture, from the samples of an earlier run if that is asked for.
+/// Traces the picture, going on from the samples of an earlier run if that is requested.
 fn traced(asked: &Trace, tracer: &Tracer, samples: &KeptSamples) -> anyhow::Result<(Picture, TraceReport)> {
     let from = if asked.resume { samples.read()? } else { None };
     if !asked.resume && asked.integrator == Integrator::Path && samples.path.exists() {
@@ -216,7 +217,7 @@ fn traced(asked: &Trace, tracer: &Tracer, samples: &KeptSamples) -> anyhow::Resu
     })
 }
 
-/// The factor on radiance that is asked for, or metered as of a frame, or the camera's.
+/// Returns the requested exposure, a metered one, or the camera's.
 fn exposure(asked: &Trace, picture: &Picture, may_be_metered: bool) -> f64 {
     let metered = match asked.frame.exposure {
         Some(Exposure::Factor(factor)) => return f64::from(factor),

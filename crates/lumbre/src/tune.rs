@@ -1,4 +1,5 @@
-//! `lumbre tune`: which settings draw a level within a time or an error, and the level with them.
+//! `lumbre tune`: finds the settings that draw a level within a time or an error, and writes the level with
+//! them.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -15,7 +16,7 @@ use crate::arguments::Tune;
 use crate::interruption::Interruption;
 use crate::progress::Shown;
 
-/// Width and height of the frames where none is asked for: whole, and quick.
+/// Default width and height of the frames: normally, and with `--quick`.
 const SIZES: [(u32, u32); 2] = [(1280, 720), (480, 270)];
 
 /// Runs the command.
@@ -79,7 +80,7 @@ fn print(tuned: &Tuned, asked: &Tune) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the level again with the settings: the scene's shading and what its frames spend, and no light with a shadow where shadows are not worth it.
+/// Writes the level with the chosen settings: shading, frame settings, and whether its lights cast shadows.
 fn write(settings: &DrawSettings, asked: &Tune, output: &Path) -> anyhow::Result<()> {
     let DrawSettings { shading, shadows, .. } = *settings;
     save_settings(&asked.input, output, FileSettings { shading, shadows, frame: settings.frame() })?;

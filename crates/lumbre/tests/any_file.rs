@@ -1,4 +1,4 @@
-//! Files as they come: without light, in candela, with faults, and the answers that the program gives to them.
+//! Files as they come in practice: without light, in candela, or with faults, and how the program reacts.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -33,7 +33,8 @@ fn failed(folder: &Path, arguments: &[&str]) -> String {
     stderr(&output)
 }
 
-/// A folder with `room.gltf`: a grey box on a floor, seen by a camera, changed by `change`.
+/// Creates a folder with `room.gltf`, a grey box on a floor with a camera, whose JSON is modified by
+/// `change`.
 fn room(change: impl FnOnce(&mut Value)) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let mut world = World::new();
@@ -52,7 +53,7 @@ fn room(change: impl FnOnce(&mut Value)) -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// A lamp of 2000 candela above the box.
+/// Adds a lamp of 2000 candela above the box.
 fn lamp(root: &mut Value) {
     root["extensions"]["KHR_lights_punctual"] = json!({"lights": [{"type": "point", "intensity": 2000}]});
     let nodes = root["nodes"].as_array_mut().unwrap();
@@ -61,7 +62,7 @@ fn lamp(root: &mut Value) {
     root["scenes"][0]["nodes"].as_array_mut().unwrap().push(node.into());
 }
 
-/// The mean of a picture's channels, 0 to 255, and the share of pixels that are white.
+/// Returns the mean of a picture's channels, 0 to 255, and the fraction of white pixels.
 fn mean_and_white(path: &Path) -> (f64, f64) {
     let picture = image::open(path).unwrap().into_rgb8();
     let mean = picture.as_raw().iter().map(|&channel| f64::from(channel)).sum::<f64>()
@@ -84,7 +85,7 @@ fn what_has_no_light_is_seen_by_that_of_the_camera() {
     assert!(!said.contains("default") && said.contains("the frame is black"), "{said}");
     assert_eq!(mean_and_white(&folder.path().join("b.png")).0, 0.0);
 
-    // The same light in a tour.
+    // A tour gets the same default light.
     let said = done(folder.path(), &["play", "room.gltf", "--headless", "--frames", "1", "--size", "96x64"]);
     assert!(said.contains("no light"), "{said}");
     assert!(mean_and_white(&folder.path().join("frames/tour-001.png")).0 > 10.0);
@@ -113,7 +114,7 @@ fn lamps_in_candela_are_exposed_by_metering() {
     let (_, (dark, _)) = render("dark.png", &["--exposure", "20EV"]);
     assert!(dark < mean, "{dark}");
 
-    // Numbers stay numbers.
+    // An .exr keeps radiance as it is, without metering.
     let said = done(folder.path(), &["render", "room.gltf", "-o", "a.exr", "--size", "96x64"]);
     assert!(!said.contains("exposure"), "{said}");
 }

@@ -1,4 +1,5 @@
-//! `lumbre bake` as a tool to trust: killed, interrupted, out of disk, out of time, asked twice. Not the light.
+//! The robustness of `lumbre bake`: killed, interrupted, out of disk space, out of time, and run twice. The
+//! light itself is tested in `lumbre_bake`.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
@@ -17,7 +18,7 @@ use lumbre::scene::{Camera, Mesh, StaticObject, Transform};
 
 const LUMBRE: &str = env!("CARGO_BIN_EXE_lumbre");
 
-/// A floor, a box and a lamp panel.
+/// Writes a level with a floor, a box and a lamp panel.
 fn level(path: &Path, camera: f64) {
     level_with_box_at(path, camera, 0.0);
 }
@@ -37,7 +38,7 @@ fn level_with_box_at(path: &Path, camera: f64, x: f64) {
     lumbre::scene::save(&mut world, path).unwrap();
 }
 
-/// A folder of its own with the level in it.
+/// A temporary folder with the level in it.
 struct Place {
     folder: tempfile::TempDir,
     level: PathBuf,
@@ -53,13 +54,14 @@ fn place() -> Place {
 }
 
 impl Place {
-    /// The command, with two threads and a map of 48 texels.
+    /// Returns the command, with two threads and maps of 48 x 48 texels.
     fn bake(&self, more: &[&str]) -> Command {
         self.bake_by(Command::new(LUMBRE), more)
     }
 
-    /// The same, with signals as a terminal leaves them: what runs in the background of a script inherits an ignored SIGINT, and one that
-    /// comes before the program has begun would be lost.
+    /// Returns the same command with default signal handlers, as in a terminal. A process that a script runs
+    /// in the background inherits an ignored SIGINT, and an interrupt that arrives before the program
+    /// installs its handler would be lost.
     fn bake_with_signals(&self, more: &[&str]) -> Command {
         let mut command = Command::new("env");
         command.args(["--default-signal=INT,TERM", LUMBRE]);
@@ -77,7 +79,8 @@ impl Place {
         self.output.with_file_name("level.glb.checkpoint")
     }
 
-    /// Name and content of everything beside the output and in the folders there, the record aside: it holds times.
+    /// Returns name and content of all files beside the output and in the folders there, except for the
+    /// record, which contains times.
     fn files(&self) -> BTreeMap<String, Vec<u8>> {
         let output = self.output.parent().unwrap();
         let (mut files, mut folders) = (BTreeMap::new(), vec![output.to_owned()]);
@@ -87,7 +90,7 @@ impl Place {
                 if path.is_dir() {
                     folders.push(path);
                 } else if name != "level.bake/record.json" {
-                    // One that is being written may have got its name in between.
+                    // A file that is being written may be renamed in between.
                     files.extend(fs::read(&path).ok().map(|content| (name, content)));
                 }
             }
@@ -106,7 +109,7 @@ fn done(command: &mut Command) -> Output {
     output
 }
 
-/// What an undisturbed bake writes.
+/// Returns the files that an undisturbed bake writes.
 fn expected() -> BTreeMap<String, Vec<u8>> {
     static EXPECTED: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
     let bake = || {
@@ -132,12 +135,12 @@ fn killed_again_and_again_it_ends_with_the_same_bytes() {
     let last = loop {
         let before = length();
         let mut child = place.bake(&["--resume", "--checkpoint-every", "0.001"]).spawn().unwrap();
-        // As soon as it has kept something more.
+        // Kills the bake as soon as its checkpoint has grown.
         let ended = loop {
             if let Some(status) = child.try_wait().unwrap() {
                 break Some(status);
             }
-            // The first time at the very beginning.
+            // The first time right at the start.
             if (kills == 0 && place.checkpoint().exists()) || length() > before + 30_000 {
                 break None;
             }
@@ -146,7 +149,7 @@ fn killed_again_and_again_it_ends_with_the_same_bytes() {
         if ended.is_some() {
             break child.wait_with_output().unwrap();
         }
-        // SIGKILL: nothing is cleaned up.
+        // SIGKILL: the process cannot clean up.
         child.kill().unwrap();
         child.wait().unwrap();
         kills += 1;
@@ -182,7 +185,7 @@ fn an_interruption_keeps_the_work_and_says_how_to_go_on() {
 #[test]
 fn whenever_it_is_interrupted_it_ends_soon_and_goes_on_to_the_same_bytes() {
     let (expected, place) = (expected(), place());
-    // From loading to saving, and beyond the end.
+    // The delays range from loading to saving, and beyond the end.
     for (delay, signal) in
         [(0, "-INT"), (10, "-TERM"), (40, "-INT"), (120, "-TERM"), (350, "-INT"), (900, "-INT")]
     {
@@ -190,7 +193,7 @@ fn whenever_it_is_interrupted_it_ends_soon_and_goes_on_to_the_same_bytes() {
         std::thread::sleep(Duration::from_millis(delay));
         let told = Command::new("kill").args([signal.to_owned(), child.id().to_string()]).status().unwrap();
         let begun = std::time::Instant::now();
-        // A tenth of that on an idle machine.
+        // An idle machine takes a tenth of that time.
         while child.try_wait().unwrap().is_none() && begun.elapsed() < Duration::from_secs(5) {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -235,7 +238,7 @@ fn an_unchanged_level_is_left_as_it_is() {
     assert!(place.files() == files && written() == time);
     assert!(again(&["--resume"]).0 && again(&["--time", "1000"]).0);
 
-    // A map that is cut short, or gone, is baked again.
+    // A lightmap that is truncated or missing is baked again.
     let map = files.keys().find(|name| name.ends_with(".exr")).unwrap();
     let map = place.output.with_file_name(map);
     let whole = fs::read(&map).unwrap();
@@ -243,10 +246,10 @@ fn an_unchanged_level_is_left_as_it_is() {
     assert!(!again(&[]).0 && place.files() == files);
     fs::remove_file(&map).unwrap();
     assert!(!again(&[]).0 && place.files() == files);
-    // Rubbish for a record.
+    // An invalid record.
     fs::write(place.output.with_file_name("level.bake/record.json"), "{").unwrap();
     assert!(!again(&[]).0 && again(&[]).0);
-    // What the light does not depend on is in the baked file, too.
+    // The baked file also contains what the light does not depend on, such as cameras.
     level(&place.level, 7.0);
     assert!(!again(&[]).0 && place.files() != files);
     assert!(!again(&["--quality", "draft"]).0, "other options");
@@ -263,7 +266,7 @@ fn lightmaps_have_a_folder_of_their_own_and_no_picture_outlives_its_node() {
         names.filter_map(|name| Some(name.strip_prefix("level.lightmaps/")?.to_owned())).collect::<Vec<_>>()
     };
     assert_eq!(lightmaps(&["--atlas-size", "0", "--ktx2", "none"]), ["0.exr", "1.exr", "2.exr"]);
-    // What an artist has put there is the artist's.
+    // A file that somebody else has put there is kept.
     fs::write(place.output.with_file_name("level.lightmaps/1.exr"), "mine").unwrap();
     assert_eq!(lightmaps(&[]), ["1.exr", "atlas-1.exr", "atlas-1.ktx2"]);
     assert_eq!(fs::read(place.output.with_file_name("level.lightmaps/1.exr")).unwrap(), b"mine");
@@ -299,7 +302,7 @@ fn direct_and_bounced_light_lie_beside_the_maps_when_asked_for() {
             );
         }
     }
-    // Without the wish they go again.
+    // Without the option, they are removed.
     bake(&[]);
     assert_eq!(files().collect::<Vec<_>>(), ["0.exr", "1.exr", "2.exr"]);
 }
@@ -323,7 +326,7 @@ fn a_box_that_moves_leaves_what_it_cannot_affect() {
     assert!(rebake["changed"].as_array().is_some_and(|changed| changed.len() == 1), "{rebake}");
     assert!(count("gathered") < count("texels") && count("relit") < count("texels"), "{rebake}");
     assert!(rebake["neglected"].as_f64().unwrap() < 0.01, "{rebake}");
-    // The same in words.
+    // The text report says the same.
     level_with_box_at(&place.level, 6.0, 0.3);
     let said = String::from_utf8(done(&mut place.bake(&[])).stdout).unwrap();
     assert!(
@@ -331,7 +334,7 @@ fn a_box_that_moves_leaves_what_it_cannot_affect() {
         "{said}"
     );
 
-    // Samples that are damaged are of no use, and that is said.
+    // Damaged samples are not used, and a warning says so.
     let whole = fs::read(&samples).unwrap();
     fs::write(&samples, &whole[..whole.len() - 9]).unwrap();
     let (rebake, said) = bake(0.4, &[]);
@@ -345,7 +348,8 @@ fn a_box_that_moves_leaves_what_it_cannot_affect() {
 #[test]
 fn what_a_kill_in_the_midst_of_saving_leaves_goes_with_the_next_bake() {
     let (expected, place) = (expected(), place());
-    // As soon as there is a file that is being saved, again and again: some kills come too late, and then the bake is anew.
+    // Kills the bake as soon as a file is being saved, repeatedly: some kills come too late, and the next
+    // bake starts from the beginning.
     let saving = || place.files().into_keys().any(|name| name.ends_with(".partial") && name.starts_with('.'));
     let mut left = false;
     for _ in 0..20 {
@@ -362,7 +366,7 @@ fn what_a_kill_in_the_midst_of_saving_leaves_goes_with_the_next_bake() {
         }
     }
     if !left {
-        // Too quick for us: by hand.
+        // If the bake was always too quick, the leftover is created here.
         fs::write(place.output.with_file_name(".level.glb.77-0.partial"), "half").unwrap();
     }
     let _ = fs::remove_file(&place.output);
@@ -399,7 +403,8 @@ fn a_folder_that_takes_no_files_is_said_before_the_bake() {
     let folder = place.folder.path().join("locked");
     fs::create_dir(&folder).unwrap();
     fs::set_permissions(&folder, fs::Permissions::from_mode(0o555)).unwrap();
-    // Permissions bind everybody but the superuser; a file system of the kernel's own binds him too.
+    // Permissions do not apply to the superuser, but a file system of the kernel refuses files from
+    // everybody.
     let binds = tempfile::tempfile_in(&folder).is_err();
     let folder = if binds { folder } else { PathBuf::from("/sys/kernel") };
     if !folder.is_dir() {
@@ -419,7 +424,7 @@ fn a_folder_that_takes_no_files_is_said_before_the_bake() {
 fn a_full_disk_leaves_nothing_half_written() {
     let (expected, place) = (expected(), place());
     let mut limited = Command::new("sh");
-    // Writes beyond 4 or 8 KiB of a file fail as on a full disk.
+    // Writes beyond 4 or 8 KiB of a file fail, as on a full disk.
     limited.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\"", LUMBRE, "bake"]);
     limited.arg(&place.level).arg("-o").arg(&place.output);
     limited.args(["--map-size", "48", "--error", "0.01", "--checkpoint-every", "0.001"]);
@@ -442,7 +447,7 @@ fn when_the_time_is_up_there_is_a_map_and_the_reason() {
     let curve = report["curve"].as_array().unwrap();
     assert_eq!(curve.last().unwrap()["error"], report["estimated_error"]);
     assert_eq!(place.files().len(), 7, "without samples: {:?}", place.files().keys());
-    // With as little time it would not be better; with more it would.
+    // With the same time limit or less the result would not be better; without a limit it would.
     assert!(stderr(&done(&mut place.bake(&["--time", "0.0005"]))).contains("unchanged"));
     let more = done(&mut place.bake(&[]));
     assert!(!stderr(&more).contains("unchanged"));

@@ -1,4 +1,4 @@
-//! The command line as its users meet it: exit statuses, messages, files, pipes.
+//! The command line as its users see it: exit statuses, messages, files and pipes.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -23,7 +23,7 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A folder with a small level: a floor, a ball, a lamp panel, a light, a camera.
+/// Creates a folder with a small level: a floor, a ball, a lamp panel, a light and cameras.
 fn level() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("level.glb");
@@ -154,7 +154,7 @@ fn frames_and_timings_are_written_whole() {
     assert!(forward["fragment_invocations"].as_u64().unwrap() > 500);
     let wall = frames[2]["wall_ms"].as_f64().unwrap();
     assert!(wall > 0.0 && forward["light_evaluations"].is_null());
-    // What was measured from outside holds what the renderer measured, and that sums.
+    // The time measured outside includes the time that the renderer measured, whose parts add up.
     let account = &frames[2]["accounting"];
     let number = |value: &serde_json::Value| value.as_f64().unwrap();
     assert!(number(&account["wall_ms"]) <= wall, "{account}");
@@ -249,7 +249,7 @@ fn a_bake_is_loaded_explained_and_drawn() {
     assert!(variants.keys().all(|variant| !variant.contains("TEXTURE")), "{variants:?}");
     assert!(stdout(&lumbre(&["explain", text(&baked), "--format", "dot"])).starts_with("digraph"));
 
-    // The lamp panel lights nothing before the bake and the floor under it afterwards.
+    // Before the bake the lamp panel lights nothing, and afterwards it lights the floor.
     let red_sum = |path: &Path, name: &str| {
         let frame = folder.path().join(name);
         let output = lumbre(&[
@@ -306,7 +306,7 @@ fn playing_without_a_display_draws_a_tour() {
 fn what_moves_in_a_baked_level_is_lit_by_the_bake() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    // A red wall that is bright under a panel, and a white ball before it that moves.
+    // A red wall that is lit by a panel, and a moving white ball in front of it.
     let mut world = World::new();
     let block = |size: Vec3| Mesh(Arc::new(lumbre::mesh::shapes::cuboid(size, 1)));
     let wall = (block(Vec3::new(0.2, 3.0, 3.0)), Material::matt(Vec3::new(0.8, 0.05, 0.05)), StaticObject);
@@ -338,7 +338,7 @@ fn what_moves_in_a_baked_level_is_lit_by_the_bake() {
         image::open(&picture).unwrap().into_rgb8()
     };
     let lit = drawn(&[]);
-    // The ball's left side sees the wall, its right side the panel.
+    // The left side of the ball faces the wall, and its right side the panel.
     let [left, right] = [21, 42].map(|column| lit.get_pixel(column, 32).0.map(u32::from));
     assert!(left[0] > 30 && left[0] > 2 * left[1], "{left:?}");
     assert!(right[1] > 60 && right[0] < 2 * right[1], "{right:?}");

@@ -1,4 +1,4 @@
-//! `lumbre cost` as its users meet it.
+//! `lumbre cost` and `lumbre tune` as their users see them.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -44,7 +44,7 @@ fn a_small_report_and_what_changed_since() {
     for name in ["index.html", "cost.csv", "cost.json", "scenes/ball-exponent-8.glb"] {
         assert!(report.join(name).exists(), "{name} is missing");
     }
-    // A point's command makes its picture again.
+    // The command of a point reproduces its picture.
     let point = &found.studies[0].points[1];
     let mut words: Vec<&str> = point.command.split(' ').skip(1).collect();
     words.iter_mut().filter(|word| **word == "20").for_each(|word| *word = "2");
@@ -56,7 +56,7 @@ fn a_small_report_and_what_changed_since() {
     let compared: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
     assert_eq!(compared["largest"].as_f64(), Some(0.0), "{compared}");
 
-    // Resumed, nothing is measured again.
+    // A resumed report measures nothing again.
     let resumed = lumbre(&[&asked[..], &["--resume"]].concat());
     assert!(resumed.status.success(), "{}", stderr(&resumed));
     assert_eq!(read_report(&report).unwrap(), found);
@@ -82,7 +82,7 @@ fn a_small_report_and_what_changed_since() {
     assert!(better.status.success(), "{}", stdout(&better));
     let within = lumbre(&["cost", "--compare", text(&json), text(&counted), "--factor", "2"]);
     assert!(within.status.success(), "{}", stdout(&within));
-    // Times alone are told, and fail only where that is asked for.
+    // Increased times are listed, and are a failure only with `--times`.
     let slower = planted("slower.json", &|report| {
         let time = report.studies[0].points[0].milliseconds.as_mut().unwrap();
         (time.lower, time.median, time.upper) = (9.0 * time.upper, 10.0 * time.upper, 11.0 * time.upper);
@@ -143,13 +143,14 @@ fn a_level_with_the_settings_that_keep_a_time() {
         )
     };
 
-    // Nothing is this fast; nothing is written.
+    // No settings are this fast, so nothing is written.
     let output = tune(["--frame-ms", "0.000001"]);
     assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
     assert!(stdout(&output).contains("Nothing keeps within"), "{}", stdout(&output));
     assert!(!tuned.exists());
 
-    // Everything is this accurate: the cheapest is taken, whichever it is here, and the file has it.
+    // All settings are this accurate: the fastest is chosen, whichever it is on this machine, and the file
+    // has it.
     let output = tune(["--error", "1000"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let said = stdout(&output);
@@ -170,7 +171,7 @@ fn a_level_with_the_settings_that_keep_a_time() {
     let shadow = lights.iter(&read).next().unwrap().shadow;
     assert_eq!(shadow, !command.contains("--no-shadows"), "{command}");
 
-    // Everything else is as it was: the buffers, and what any program has put into the JSON.
+    // Everything else is unchanged: the buffers, and whatever other programs have put into the JSON.
     let parts = |path: &Path| {
         let bytes = std::fs::read(path).unwrap();
         let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;

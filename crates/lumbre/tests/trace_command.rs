@@ -1,4 +1,4 @@
-//! `lumbre trace` and `lumbre compare` as their users meet them.
+//! `lumbre trace` and `lumbre compare` as their users see them.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -28,7 +28,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// A ball of glass over a floor, lit by a lamp.
+/// Creates a folder with a scene: a glass ball above a floor, lit by a lamp.
 fn glass() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("glass.glb");
@@ -68,7 +68,7 @@ fn a_picture_its_report_and_a_comparison() {
     let image = image::open(at("one.exr")).unwrap();
     assert_eq!((image.width(), image.height()), (64, 48));
     draw(&at("one.png"), &["--depth", "8"]);
-    // The same again is the same; shallower is not.
+    // The same command gives the same picture on any number of threads; a smaller depth gives another one.
     draw(&at("two.png"), &["--depth", "8", "--threads", "1"]);
     assert_eq!(std::fs::read(at("one.png")).unwrap(), std::fs::read(at("two.png")).unwrap());
     draw(&at("flat.png"), &["--depth", "0"]);
@@ -81,7 +81,7 @@ fn a_picture_its_report_and_a_comparison() {
     assert!(found["flip"].as_f64().unwrap() > 0.01 && heat.exists(), "{found}");
 }
 
-/// The channels of an OpenEXR file by their names.
+/// Reads the channels of an OpenEXR file by name.
 fn channels(path: &Path) -> std::collections::BTreeMap<String, Vec<f32>> {
     let image = exr::prelude::read_first_flat_layer_from_file(path).unwrap();
     let list = image.layer_data.channel_data.list;
@@ -131,7 +131,7 @@ fn auxiliary_pictures_are_layers_of_open_exr_and_files_beside_png() {
         assert!(found["depth.Z"].iter().any(|depth| depth.is_infinite()));
         assert!(found["rays.Y"].iter().all(|rays| *rays >= 8.0));
     }
-    // What reads three channels reads the picture.
+    // A reader of three channels gets the picture.
     assert_eq!(image::open(at("out.exr")).unwrap().width(), 40);
     let png = at("out.png");
     let asked =
@@ -166,11 +166,11 @@ fn paths_go_on_where_they_were_left() {
     done(draw("parts.exr", &["--samples", "96", "--resume"]));
     let read = |name: &str| std::fs::read(at(name)).unwrap();
     assert!(read("whole.exr") == read("parts.exr"), "the same bits");
-    // Time ends a picture wherever it is; it goes on from there all the same.
+    // A picture that ran out of time is continued just the same.
     done(draw("timed.exr", &["--samples", "96", "--time", "0.01", "--resume"]));
     done(draw("timed.exr", &["--samples", "96", "--resume"]));
     assert!(read("whole.exr") == read("timed.exr"), "the same bits");
-    // Another picture, and a file that is none: refused, and left as they are.
+    // Samples of another picture and damaged samples are refused and left as they are.
     let other = draw("parts.exr", &["--samples", "96", "--resume", "--no-shadows"]);
     assert!(
         other.status.code() == Some(1) && stderr(&other).contains("another picture"),
@@ -207,7 +207,7 @@ fn an_interruption_keeps_the_picture_and_its_samples() {
     std::io::Read::read_to_string(program.stderr.as_mut().unwrap(), &mut words).unwrap();
     assert!(ended.code() == Some(1) && words.contains("--resume goes on"), "{words}");
     assert!(output.exists() && folder.path().join("out.png.samples").exists());
-    // With an error that is reached already it ends at once.
+    // If the requested error is already reached, the run ends at once.
     let told = lumbre(&[&asked[..], &["--error", "0.5", "--resume", "--json"]].concat());
     let report: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
     assert_eq!(report["ended"].as_str(), Some("error"), "{}", stderr(&told));

@@ -1,5 +1,5 @@
-//! Plays a level in a window, or shows it as pictures where there is no display:
-//! `cargo run -p lumbre_demo --example play_level [LEVEL.glb]`.
+//! Plays a level in a window, or draws its tour to pictures if there is no display: `cargo run -p lumbre_demo
+//! --example play_level [LEVEL.glb]`.
 
 use std::path::{Path, PathBuf};
 

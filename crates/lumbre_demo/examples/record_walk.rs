@@ -1,5 +1,5 @@
-//! Walks the level from place to place as a person would and writes what they pressed, for the tests that replay it:
-//! `cargo run -p lumbre_demo --example record_walk`. To be run again when the level changes.
+//! Walks through the level by simulated input and records it, for the tests that replay the walks: `cargo run
+//! -p lumbre_demo --example record_walk`. Run it again when the level changes.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -9,7 +9,7 @@ use bevy_ecs::world::World;
 use glam::{DVec2, DVec3};
 use lumbre_demo::{Action, Game, Input, level};
 
-/// Where to go, x and z: through all rooms and back to the corridor.
+/// Waypoints, x and z: through all rooms and back to the corridor.
 const WAY: [[f64; 2]; 16] = [
     [10.9, 5.0],
     [13.4, 5.0],
@@ -30,11 +30,11 @@ const WAY: [[f64; 2]; 16] = [
 ];
 /// Fastest turn, radians per step.
 const TURN: f64 = 0.03;
-/// Steps after which somebody must be stuck.
+/// Number of steps per waypoint after which the player counts as stuck.
 const PATIENCE: usize = 2000;
 
 fn main() -> Result<()> {
-    // The first two places are beyond the door to the corridor.
+    // The first two waypoints lead through the door to the corridor.
     record(&WAY[..2], "hall_to_corridor.json")?;
     record(&WAY, "all_rooms.json")
 }
@@ -57,7 +57,7 @@ fn record(way: &[[f64; 2]], file: &str) -> Result<()> {
             steps += 1;
             let turn = (player.yaw - (-way.x).atan2(-way.z) + PI).rem_euclid(TAU) - PI;
             let look = DVec2::new(turn.clamp(-TURN, TURN), 0.0);
-            // Small corrections are nobody's business.
+            // Corrections that are too small to matter are left out of the recording.
             let look = if turn.abs() < 0.02 { DVec2::ZERO } else { look };
             let fast = turn.abs() < 0.3 && way.length() > 1.5;
             game.step_once(&Input { forward: turn.abs() < 0.8, run: fast, look, ..Input::default() });

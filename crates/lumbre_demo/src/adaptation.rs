@@ -1,17 +1,19 @@
-//! The eye's adaptation: an exposure that follows what is metered, smoothly. Not the metering: that is `lumbre_render`'s.
+//! Eye adaptation: an exposure that follows the metered one smoothly. The metering is in `lumbre_render`.
 
-/// Seconds after which a change of light has lost all but 1/e of its effect.
+/// Time constant in seconds: the time in which the difference from the metered exposure falls to 1/e.
 const SECONDS: f64 = 0.5;
 
-/// An exposure that goes to where the meter points, evenly in exposure values: as many stops up as down in the same time.
+/// An exposure that approaches the metered one exponentially in stops (log2), so that brightening and
+/// darkening by the same factor take the same time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Adaptation {
-    /// Binary logarithms of the exposure, as it is and as it was metered.
+    /// Binary logarithms of the current and of the metered exposure.
     stops: Option<(f64, f64)>,
 }
 
 impl Adaptation {
-    /// Takes a metered exposure. The first one holds at once: nobody sees a picture brighten that was never dark.
+    /// Sets a metered exposure. The first one applies at once, since there is nothing to adapt from.
+    /// Exposures without a finite logarithm are ignored.
     pub fn metered(&mut self, exposure: f32) {
         let wanted = f64::from(exposure).log2();
         if wanted.is_finite() {
@@ -19,7 +21,7 @@ impl Adaptation {
         }
     }
 
-    /// Lets time pass.
+    /// Advances the adaptation by a time.
     pub fn step(&mut self, seconds: f64) {
         if let Some((now, wanted)) = &mut self.stops
             && seconds > 0.0
@@ -28,7 +30,7 @@ impl Adaptation {
         }
     }
 
-    /// The exposure now; nothing before anything was metered.
+    /// Returns the current exposure; `None` before anything was metered.
     pub fn exposure(&self) -> Option<f32> {
         self.stops.map(|(now, _)| now.exp2() as f32)
     }
@@ -44,7 +46,7 @@ mod tests {
         assert_eq!(eye.exposure(), None);
         eye.metered(1.0);
         assert_eq!(eye.exposure(), Some(1.0));
-        // Four stops darker; frames of different lengths come to the same place.
+        // Four stops darker. The same time in frames of different lengths gives the same exposure.
         eye.metered(1.0 / 16.0);
         let mut other = eye;
         for _ in 0..100 {

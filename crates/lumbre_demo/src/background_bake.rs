@@ -1,7 +1,9 @@
-//! A bake beside the frames: a thread of its own that hands out light as it refines. Not the baker, nor what is shown of it.
+//! A bake in a thread of its own, which hands out its light as it refines while frames are drawn. The baker
+//! is `lumbre_bake`; `window` shows the results.
 //!
-//! The thread reads the file again, so that the World of the frames stays free. It bakes three times: with few texels and rays for a first
-//! look, with more, and as it was asked for. Each time it hands out the meshes and lightmaps; they are found by the nodes of the file.
+//! The thread reads the file again, so that the World that frames are drawn from stays free. It bakes three
+//! times: twice with fewer texels and a larger error for a quick look, and then with the requested options.
+//! After each pass it hands out meshes and lightmaps, which are assigned by the nodes of the file.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -20,80 +22,82 @@ use lumbre_scene::{
     Transform, hidden_entities, save_baked,
 };
 
-/// One bake of several, each better than the one before.
+/// One of several bakes of increasing quality.
 struct Pass {
     name: &'static str,
-    /// Texels along a metre, as a part of what was asked for.
+    /// Texel density as a fraction of the requested one.
     density: f64,
-    /// The error that it may have at least.
+    /// The target error, if the requested one is not larger.
     error: f64,
     quality: Quality,
 }
 
-/// What comes before the bake that was asked for: something after a moment, then something to judge by.
+/// The passes before the requested one: a first result within moments, then one good enough to judge the
+/// lighting by.
 const FIRST: [Pass; 2] = [
     Pass { name: "first light", density: 0.2, error: 0.2, quality: Quality::Draft },
     Pass { name: "draft", density: 0.5, error: 0.05, quality: Quality::Draft },
 ];
-/// The name of the bake that was asked for.
+/// The name of the final pass, with the requested options.
 const FINAL: &str = "final";
-/// Texels that the baker chooses for a whole scene, about.
+/// The approximate number of texels that the baker chooses for a whole scene.
 const AUTOMATIC_TEXELS: f64 = 500_000.0;
-/// The smallest map that a bake may be asked for.
+/// The smallest map size that a pass may ask for.
 const SMALLEST_MAP: u32 = 4;
-/// Radiance of the sky that a file is baked under in which nothing shines, W/(m² sr).
+/// Radiance of the uniform sky that a file without any light is baked under, W/(m² sr).
 const SKY: f32 = 1.0;
 
-/// Why a bake ended without light.
+/// Reasons why a bake ended without a result.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BakeError {
-    /// The file cannot be read (again).
+    /// The file cannot be read again.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The baker refuses it.
+    /// The baker failed or refused the scene.
     #[error(transparent)]
     Bake(#[from] lumbre_bake::BakeError),
     /// The baked file cannot be written.
     #[error(transparent)]
     Save(#[from] SaveError),
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     #[error("no thread can be started for the bake: {0}; close other programs")]
     Thread(#[from] std::io::Error),
-    /// The thread ended without a word.
+    /// The thread ended by a panic.
     #[error(
         "the bake has ended unexpectedly: this is a fault of the program; please report it with the file"
     )]
     Lost,
 }
 
-/// How far a bake is.
+/// Progress of a bake.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeStatus {
-    /// Which of the bakes it is, in words.
+    /// The name of the pass.
     pub pass: &'static str,
-    /// What is being done, in words.
+    /// The stage of the baker, in words.
     pub stage: &'static str,
-    /// How much of this bake is done, in [0, 1].
+    /// Fraction of this pass that is done, in [0, 1].
     pub fraction: f32,
     /// Estimated relative error so far, once one is known.
     pub error: Option<f64>,
-    /// Since the bakes began.
+    /// Time since the first pass began.
     pub elapsed: Duration,
 }
 
-/// Meshes and lightmaps by node and primitive of the file, and the light for what moves.
+/// The result of a pass: meshes and lightmaps by node and primitive of the file, and irradiance volumes for
+/// moving objects.
 #[derive(Debug, Default)]
 pub struct BakedLight {
     parts: HashMap<(usize, usize), (Mesh, Option<MaterialTextures>, Lightmap)>,
     volumes: Vec<(IrradianceVolume, Transform)>,
-    /// Which of the bakes it is from, in words.
+    /// The name of the pass.
     pub pass: &'static str,
-    /// Its estimated relative error.
+    /// Estimated relative error.
     pub error: f64,
-    /// Whether an even sky was put over the file because nothing in it shines.
+    /// Whether a uniform sky was added because the file has no light to bake.
     pub under_a_sky: bool,
-    /// Whether no better light follows.
+    /// Whether this is the result of the last pass.
     pub is_final: bool,
 }
 
@@ -114,17 +118,18 @@ impl BakedLight {
         Self { parts, volumes, error: report.estimated_error, ..Self::default() }
     }
 
-    /// Surfaces that have a lightmap.
+    /// Returns the number of surfaces that have a lightmap.
     pub fn len(&self) -> usize {
         self.parts.len()
     }
 
-    /// Whether nothing was lit.
+    /// Returns true if no surface has a lightmap.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
 
-    /// Shows it in a World that the same file was loaded into; `nodes` are its nodes' entities.
+    /// Replaces the baked light of a World that the same file was loaded into; `nodes` are the entities of
+    /// its nodes.
     pub fn apply(&self, world: &mut World, nodes: &[Entity]) {
         let stale: Vec<Entity> = world.query_filtered::<Entity, With<Lightmap>>().iter(world).collect();
         for entity in stale {
@@ -133,7 +138,7 @@ impl BakedLight {
         let stale: Vec<Entity> =
             world.query_filtered::<Entity, With<IrradianceVolume>>().iter(world).collect();
         for entity in stale {
-            // Those of the file are its nodes, the others were put here by an earlier bake.
+            // Volumes of the file belong to its nodes; the others were spawned by an earlier pass.
             if nodes.contains(&entity) {
                 world.entity_mut(entity).remove::<IrradianceVolume>();
             } else {
@@ -163,23 +168,23 @@ impl BakedLight {
     }
 }
 
-/// What a bake tells.
+/// An event of a background bake.
 #[derive(Debug)]
 pub enum BakeNews {
-    /// There is (better) light.
+    /// The light of another pass is ready.
     Light(BakedLight),
     /// The baked file is written.
     Saved(PathBuf),
-    /// It was cancelled, as asked.
+    /// The bake was cancelled on request.
     Cancelled,
-    /// It cannot go on.
+    /// The bake or the writing of its file failed.
     Failed(BakeError),
 }
 
 enum Message {
     Status(BakeStatus),
     News(BakeNews),
-    /// All passes are done; here is what can be saved.
+    /// All passes are done, or the file was written; the result can be saved.
     Done(Box<Baked>),
 }
 
@@ -188,7 +193,7 @@ struct Baked {
     world: World,
 }
 
-/// What the threads are at.
+/// What the threads are doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Work {
     Baking,
@@ -196,7 +201,8 @@ enum Work {
     Nothing,
 }
 
-/// A bake that runs, or has run, beside the frames. Dropping it cancels it; a file that is being written is finished first.
+/// A bake that runs or has run in the background. Dropping it cancels the bake; a file that is being written
+/// is finished first.
 pub struct BackgroundBake {
     messages: Receiver<Message>,
     sender: Sender<Message>,
@@ -209,10 +215,10 @@ pub struct BackgroundBake {
 }
 
 impl BackgroundBake {
-    /// Begins to bake a file; `wanted` is what it comes to in the end.
+    /// Starts to bake a file; `wanted` are the options of the last pass.
     ///
     /// # Errors
-    /// [`BakeError::Thread`].
+    /// [`BakeError::Thread`] if no thread can be started.
     pub fn start(path: &Path, options: &LoadOptions, wanted: &BakeOptions) -> Result<Self, BakeError> {
         let (sender, messages) = channel();
         let cancel = CancelToken::default();
@@ -228,38 +234,38 @@ impl BackgroundBake {
         Ok(Self { messages, sender, cancel, status: None, work: Work::Baking, baked: None, saving: None })
     }
 
-    /// Whether it still works at something: a bake, or the writing of the file.
+    /// Returns true while it bakes or writes a file.
     pub fn is_running(&self) -> bool {
         self.work != Work::Nothing
     }
 
-    /// Whether it bakes.
+    /// Returns true while it bakes.
     pub fn is_baking(&self) -> bool {
         self.work == Work::Baking
     }
 
-    /// How far it is, while it bakes; nothing before that is known.
+    /// Returns the progress while it bakes; `None` before the first report.
     pub fn status(&self) -> Option<&BakeStatus> {
         self.status.as_ref().filter(|_| self.is_baking())
     }
 
-    /// Whether all passes are done, so that the file can be written.
+    /// Returns true once all passes are done, so that the file can be written.
     pub fn can_be_saved(&self) -> bool {
         self.baked.is_some()
     }
 
-    /// Asks it to end; it says when it has.
+    /// Asks it to end; [`BakeNews::Cancelled`] follows when it has.
     pub fn cancel(&self) {
         self.cancel.cancel();
     }
 
-    /// Writes the baked file, in a thread of its own. Does nothing before all is baked.
+    /// Writes the baked file in a thread of its own. Does nothing before all passes are done.
     pub fn save(&mut self, path: &Path) {
         let Some(mut baked) = self.baked.take() else { return };
         let (sender, path) = (self.sender.clone(), path.to_owned());
         let written = thread::Builder::new().name("save".to_owned()).spawn(move || {
             let saved = save_baked(&mut baked.world, &baked.source, &path, &written_as());
-            // Whoever waited for it may be gone.
+            // The receiver may be gone.
             let _ = sender.send(Message::News(match saved {
                 Ok(_) => BakeNews::Saved(path),
                 Err(error) => BakeNews::Failed(error.into()),
@@ -275,7 +281,7 @@ impl BackgroundBake {
         }
     }
 
-    /// What has happened since it was asked last.
+    /// Returns what has happened since the last call.
     pub fn news(&mut self) -> Vec<BakeNews> {
         let mut news = Vec::new();
         loop {
@@ -294,7 +300,7 @@ impl BackgroundBake {
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
         }
-        // A panic while saving is a fault of ours; the window outlives it and says so.
+        // A panic while saving is a bug of this program; it is reported instead of closing the window.
         if let Some(thread) = self.saving.take_if(|thread| thread.is_finished())
             && thread.join().is_err()
         {
@@ -305,12 +311,13 @@ impl BackgroundBake {
     }
 }
 
-/// As `lumbre bake` writes without being asked otherwise: KTX2 beside OpenEXR.
+/// Returns the options by which `lumbre bake` writes by default: KTX2 beside OpenEXR.
 fn written_as() -> SaveOptions {
     SaveOptions { ktx2: Some(PackedFormat::Rgb9E5), ..SaveOptions::default() }
 }
 
-/// Whether nothing follows this failure; after one of saving the bake is handed back.
+/// Returns true for a failure that ends the bake. After a failure to save, the bake is handed back and can be
+/// saved again.
 fn is_of_the_bake(news: &BakeNews) -> bool {
     matches!(news, BakeNews::Failed(error) if !matches!(error, BakeError::Save(_)))
 }
@@ -319,13 +326,13 @@ impl Drop for BackgroundBake {
     fn drop(&mut self) {
         self.cancel();
         if let Some(thread) = self.saving.take() {
-            // Nobody is left to be told.
+            // The panic, if there was one, has nobody left to report to.
             let _ = thread.join();
         }
     }
 }
 
-/// What the thread knows.
+/// The data of the baking thread.
 struct Job {
     path: PathBuf,
     options: LoadOptions,
@@ -337,7 +344,7 @@ struct Job {
 
 impl Job {
     fn run(self) {
-        // A panic of the baker's is a fault of ours; the window outlives it and says so.
+        // A panic in the baker is a bug of this program; it is reported instead of closing the window.
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.bake_all()));
         let message = match outcome {
             Ok(Ok(Some(baked))) => Message::Done(Box::new(baked)),
@@ -351,7 +358,7 @@ impl Job {
         let _ = self.sender.send(message);
     }
 
-    /// All passes; nothing if it was cancelled.
+    /// Runs all passes; returns `None` if cancelled between two of them.
     fn bake_all(&self) -> Result<Option<Baked>, BakeError> {
         let mut world = World::new();
         let mut file = SourceFile::read(&self.path, &self.options)?;
@@ -389,7 +396,7 @@ impl Job {
     }
 }
 
-/// What was asked for, more quickly.
+/// Returns the requested options, made faster for an early pass.
 fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
     let density = match wanted.density {
         Density::Automatic if area > 0.0 && area.is_finite() => {
@@ -405,13 +412,13 @@ fn rougher(wanted: &BakeOptions, pass: &Pass, area: f64) -> BakeOptions {
     BakeOptions { density, error, quality, resolution_error: false, ..*wanted }
 }
 
-/// One core is left to the frames, unless threads were asked for.
+/// Leaves one core to the frames, unless a number of threads was requested.
 fn leaving_a_core(options: BakeOptions) -> BakeOptions {
     let cores = thread::available_parallelism().map_or(1, |cores| (cores.get() - 1).max(1));
     BakeOptions { threads: options.threads.or(Some(cores)), ..options }
 }
 
-/// Whether anything gives light that a bake takes: lamps, emission, a sky.
+/// Returns true if anything emits light that the baker takes: lamps, emissive surfaces or a sky.
 pub fn has_light_to_bake(world: &mut World) -> bool {
     let bright = |color: Vec3| color.max_element() > 0.0;
     let is_baked = |light: &Light| {
@@ -431,7 +438,7 @@ pub fn has_light_to_bake(world: &mut World) -> bool {
             .any(|(entity, material)| emits(material) && !hidden.contains(&entity))
 }
 
-/// Square metres of everything that stands still.
+/// Returns the area of all static meshes in square metres.
 fn area(world: &mut World) -> f64 {
     let mut meshes = world.query_filtered::<(&Mesh, &GlobalTransform), With<StaticObject>>();
     let of_mesh = |(mesh, place): (&Mesh, &GlobalTransform)| {

@@ -1,15 +1,16 @@
-//! Fixed steps out of frames of any length. Not what happens in a step: that is `game`.
+//! Divides frames of any length into fixed time steps. What happens in a step is in `game`.
 
 use std::time::Duration;
 
 use crate::recording::STEPS_PER_SECOND;
 
-/// A frame counts for no more than this: after a pause the game goes on where it was.
+/// A longer frame counts as this long, so that after a pause the game goes on where it was.
 pub const LONGEST_FRAME: Duration = Duration::from_millis(250);
 /// Length of a step in seconds.
 pub const STEP_SECONDS: f64 = 1.0 / STEPS_PER_SECOND as f64;
 
-/// Game time. Whole nanoseconds, so that the same total makes the same steps however it is cut into frames.
+/// Game time in whole nanoseconds, so that the same total gives the same steps however it is divided into
+/// frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clock {
     elapsed: Duration,
@@ -17,41 +18,41 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Time since the start.
+    /// Returns the time since the start.
     pub fn elapsed(&self) -> Duration {
         self.elapsed
     }
 
-    /// Steps made so far.
+    /// Returns the number of steps made so far.
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// Lets a frame's time pass; the steps it is worth are then [due](Self::take_step).
+    /// Adds the time of a frame; the steps within it are then [due](Self::take_step).
     pub fn pass(&mut self, frame: Duration) {
         self.elapsed = self.elapsed.saturating_add(frame.min(LONGEST_FRAME));
     }
 
-    /// Lets exactly the time to the end of the next step pass.
+    /// Adds exactly the time up to the end of the next step.
     pub fn pass_one_step(&mut self) {
         self.elapsed = self.elapsed.max(end_of(self.steps));
     }
 
-    /// Makes the next step if it is due.
+    /// Makes the next step and returns true if it is due.
     pub fn take_step(&mut self) -> bool {
         let due = end_of(self.steps) <= self.elapsed;
         self.steps += u64::from(due);
         due
     }
 
-    /// How much of the next step has passed, [0, 1).
+    /// Returns the fraction of the next step that has passed, in [0, 1).
     pub fn part_of_step(&self) -> f64 {
         let start = Duration::from_nanos_u128(start_of(self.steps));
         ((self.elapsed.saturating_sub(start)).as_secs_f64() / STEP_SECONDS).clamp(0.0, 1.0)
     }
 }
 
-/// Nanoseconds at which a step begins.
+/// Returns the nanosecond at which a step begins.
 fn start_of(step: u64) -> u128 {
     u128::from(step) * 1_000_000_000 / u128::from(STEPS_PER_SECOND)
 }
@@ -77,7 +78,7 @@ mod tests {
         assert_eq!(steps_of(Duration::from_millis(1), 3000), 360);
         assert_eq!(steps_of(Duration::from_millis(250), 12), 360);
         assert_eq!(steps_of(Duration::from_micros(3), 1_000_000), 360);
-        // A pause of an hour is a quarter of a second.
+        // A pause of an hour counts as a quarter of a second.
         assert_eq!(steps_of(Duration::from_secs(3600), 1), 30);
     }
 

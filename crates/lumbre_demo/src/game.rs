@@ -1,4 +1,5 @@
-//! The game: a level, a player in it, and time. No window, no GPU: those look at [`Game::world`] and feed [`Game::step`].
+//! The game: a level, the player in it, and time. It needs no window and no GPU; those read [`Game::world`]
+//! and call [`Game::step`].
 
 use std::path::Path;
 use std::time::Duration;
@@ -25,32 +26,32 @@ use crate::walking::{TriangleTree, ground_below, overlaps};
 
 /// Name of the camera that the player starts from.
 pub const START_CAMERA: &str = "start";
-/// Who falls this far below the level starts again, metres.
+/// A player who falls this far below the level, in metres, starts again.
 const ABYSS: f64 = 10.0;
 
-/// Seconds in which flight crosses half of a scene, where that is slower or faster than a player flies.
+/// Time in seconds in which flight crosses half of a scene that is not of human size.
 const CROSSING_SECONDS: f64 = 4.0;
-/// Largest angle above or below the horizon, radians, from which everything is shown first.
+/// Largest angle above or below the horizon, radians, from which a whole scene is framed.
 const STEEPEST_START: f64 = 0.8;
-/// Radii of scenes, in metres, that a player flies through at their own speed.
+/// Radii of scenes, in metres, in which the player flies at the player's own speed.
 const OF_HUMAN_SIZE: std::ops::RangeInclusive<f64> = 2.0..=60.0;
 
 /// Where the picture is taken from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Viewpoint {
-    /// The player's eyes: walking, or flying.
+    /// The player's eyes, walking or flying.
     Player,
-    /// A place on a sphere around what is looked at.
+    /// An eye that orbits a target.
     Orbit(OrbitView),
-    /// A camera of the file, by its place in [`Game::cameras`].
+    /// A camera of the file, by its index in [`Game::cameras`].
     FileCamera(usize),
 }
 
 /// A level that is being played.
 pub struct Game {
-    /// Everything that can be seen. The camera to draw from has [`ActiveCamera`].
+    /// Everything that is visible. The camera to draw from has [`ActiveCamera`].
     pub world: World,
-    /// How the player wants it drawn.
+    /// The player's choices of how it is drawn.
     pub view: ViewSettings,
     schedule: Schedule,
     level: TriangleTree,
@@ -66,28 +67,28 @@ pub struct Game {
     cameras: Vec<(Entity, String)>,
     bounds: Bounds,
     aspect: f64,
-    /// What the mouse did that no step has seen yet.
+    /// Mouse gestures that no step has processed yet.
     gestures: Input,
     commands: Vec<Action>,
     recording: Option<Recording>,
     quit: bool,
 }
 
-/// Why a level cannot be played.
+/// Reasons why a level cannot be played.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GameError {
     /// The file cannot be loaded.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// What it says for this game is wrong.
+    /// The file's data for this game is malformed.
     #[error(transparent)]
     Extras(#[from] ExtrasError),
 }
 
 impl Game {
-    /// Loads a level (.glb, .gltf, baked or not) and puts the player where its camera `start` is, or its first camera, or
-    /// before the middle of it. Where there is no ground the player flies.
+    /// Loads a level (.glb or .gltf, baked or not) and puts the player at its camera `start`, or else at its
+    /// active or first camera, or else in front of the level. Where there is no ground the player flies.
     ///
     /// # Errors
     /// [`GameError`] with the file, the node and the remedy.
@@ -97,10 +98,10 @@ impl Game {
         Self::new(world)
     }
 
-    /// Plays what a World holds.
+    /// Starts a game in a World that already holds a level.
     ///
     /// # Errors
-    /// [`GameError::Extras`] where a node's motion is malformed.
+    /// [`GameError::Extras`] if a node's motion is malformed.
     pub fn new(mut world: World) -> Result<Self, GameError> {
         read_motions(&mut world)?;
         lumbre_scene::update_transforms(&mut world);
@@ -156,7 +157,8 @@ impl Game {
         Ok(game)
     }
 
-    /// Lets a frame's time pass with this input. The player moves in fixed steps; what is drawn lies between the last two.
+    /// Advances the game by a frame's time with this input. The player moves in fixed steps, and is drawn
+    /// interpolated between the last two.
     pub fn step(&mut self, frame: Duration, input: &Input) {
         self.gestures.add_gestures(input);
         self.clock.pass(frame);
@@ -199,24 +201,24 @@ impl Game {
             Action::OrbitEverything => self.orbit_everything(),
             Action::NextCamera => self.next_camera(),
             Action::Quit => self.quit = true,
-            // The window's, or of the view above.
+            // Handled by the view settings above, or by the window.
             _ => {}
         }
     }
 
-    /// Begins to record what the player does, from where they are.
+    /// Starts to record the player's input from the current state on.
     pub fn record(&mut self) {
         self.recording = Some(Recording::default());
         self.clock = Clock::default();
         self.commands.clear();
     }
 
-    /// Ends the recording and gives it back.
+    /// Ends the recording and returns it.
     pub fn take_recording(&mut self) -> Option<Recording> {
         self.recording.take()
     }
 
-    /// Puts the player's eyes at a place, flying.
+    /// Puts the player's eyes at a transform, flying.
     pub fn look_from(&mut self, view: &Transform) {
         let flight_speed = match OF_HUMAN_SIZE.contains(&self.bounds.radius()) {
             true => self.start.flight_speed,
@@ -228,18 +230,18 @@ impl Game {
         self.show(1.0);
     }
 
-    /// Shows the whole scene, and turns around its middle from there.
+    /// Frames the whole scene and orbits its centre from there.
     pub fn orbit_everything(&mut self) {
         let (view, lens) = default_camera(&mut self.world, self.aspect);
         self.lens.projection = lens.projection;
         let mut orbit = OrbitView::of_camera(&view, &self.bounds);
-        // A thing on a floor, which is seen best from above, has a height all the same.
+        // Limited, so that something on a floor, which is framed best from above, still shows its height.
         orbit.pitch = orbit.pitch.clamp(-STEEPEST_START, STEEPEST_START);
         self.viewpoint = Viewpoint::Orbit(orbit);
         self.show(1.0);
     }
 
-    /// Looks through the file's next camera; after the last one, around everything.
+    /// Looks through the file's next camera, or after the last one frames the whole scene.
     pub fn next_camera(&mut self) {
         let next = match self.viewpoint {
             Viewpoint::FileCamera(index) => index + 1,
@@ -253,60 +255,60 @@ impl Game {
         }
     }
 
-    /// Where the picture is taken from.
+    /// Returns where the picture is taken from.
     pub fn viewpoint(&self) -> &Viewpoint {
         &self.viewpoint
     }
 
-    /// The cameras of the file: entity and name.
+    /// Returns the cameras of the file, each as its entity and name.
     pub fn cameras(&self) -> &[(Entity, String)] {
         &self.cameras
     }
 
-    /// Puts the cameras into the order of the file's nodes.
+    /// Sorts the cameras by the order of the file's nodes.
     pub fn order_cameras(&mut self, nodes: &[Entity]) {
         let place = |entity: Entity| nodes.iter().position(|node| *node == entity).unwrap_or(usize::MAX);
         self.cameras.sort_by_key(|(entity, _)| place(*entity));
     }
 
-    /// Whether the level has a camera from which a player starts: a level to walk through, and not a file to look at.
+    /// Returns true if the file has a start camera, which makes it a level to walk through.
     pub fn has_a_start(&self) -> bool {
         self.cameras.iter().any(|(_, name)| name == START_CAMERA)
     }
 
-    /// Says how wide the picture is for its height, so that everything can be framed.
+    /// Sets the ratio of the picture's width to its height, by which the scene is framed.
     pub fn set_aspect(&mut self, aspect: f64) {
         if aspect.is_finite() && aspect > 0.0 {
             self.aspect = aspect;
         }
     }
 
-    /// The player after the last step.
+    /// Returns the player after the last step.
     pub fn player(&self) -> &Player {
         &self.now
     }
 
-    /// The entity whose camera is the player's eyes.
+    /// Returns the entity whose camera is the player's eyes.
     pub fn camera(&self) -> Entity {
         self.camera
     }
 
-    /// The entity whose light is the torch.
+    /// Returns the entity whose light is the torch.
     pub fn torch(&self) -> Entity {
         self.torch
     }
 
-    /// The triangles that stop the player.
+    /// Returns the triangles that stop the player.
     pub fn level(&self) -> &TriangleTree {
         &self.level
     }
 
-    /// Time since the start.
+    /// Returns the time since the start.
     pub fn elapsed(&self) -> Duration {
         self.clock.elapsed()
     }
 
-    /// Whether the player wants to leave.
+    /// Returns true if the player wants to leave.
     pub fn wants_to_quit(&self) -> bool {
         self.quit
     }
@@ -334,7 +336,8 @@ impl Game {
         self.show(self.clock.part_of_step());
     }
 
-    /// What an input does to where the picture is taken from: who drags turns around something, who walks sets out from there.
+    /// Updates the viewpoint by an input: gestures orbit, and walking makes the player fly off from the
+    /// current view.
     fn follow_viewpoint(&mut self, input: &Input) {
         if self.viewpoint == Viewpoint::Player {
             return;
@@ -349,7 +352,7 @@ impl Game {
             && let Some(Camera { projection: seen @ Projection::Perspective { .. }, .. }) =
                 self.world.get(*entity)
         {
-            // The picture keeps its angle; how far one may go is no matter of the camera's.
+            // The field of view stays; the orbit is not limited by the file camera's far plane.
             self.lens.projection = *seen;
             if let Projection::Perspective { far, .. } = &mut self.lens.projection {
                 *far = None;
@@ -358,7 +361,8 @@ impl Game {
         self.viewpoint = Viewpoint::Orbit(moved);
     }
 
-    /// The orbit that gestures lead to, if there is one or they ask for one.
+    /// Returns the orbit after gestures, or `None` if the viewpoint is no orbit and the gestures do not start
+    /// one.
     fn orbit_after(&self, gestures: &Input) -> Option<OrbitView> {
         let drags = *gestures != Input { orbit: DVec2::ZERO, pan: DVec2::ZERO, zoom: 0.0, ..*gestures };
         let mut orbit = match self.viewpoint {
@@ -372,7 +376,7 @@ impl Game {
         Some(orbit)
     }
 
-    /// Metres that the picture is high, one metre before the eye.
+    /// Returns the height of the picture in metres at a distance of one metre from the eye.
     fn height_of_view(&self) -> f64 {
         match self.lens.projection {
             Projection::Perspective { vertical_fov, .. } => 2.0 * (0.5 * vertical_fov).tan(),
@@ -380,7 +384,7 @@ impl Game {
         }
     }
 
-    /// The eye of the picture as it was shown last.
+    /// Returns the eye of the picture as it was last shown.
     fn view(&self) -> Transform {
         let entity = match self.viewpoint {
             Viewpoint::FileCamera(index) => self.cameras.get(index).map(|(entity, _)| *entity),
@@ -390,10 +394,12 @@ impl Game {
         place.map_or(Transform::IDENTITY, |place| Transform::from_affine(place.0).0)
     }
 
-    /// Where the player's body and eyes are in the picture, and the lens: the player between the last two steps.
+    /// Returns the transforms of the player's body and head, and the lens; the player is interpolated between
+    /// the last two steps by `part`.
     fn eyes(&self, part: f64) -> (Transform, Transform, Camera) {
         let (before, now) = (&self.before, &self.now);
-        // The view turns at once: what the mouse did since the last step is shown before it counts.
+        // Rotation is shown at once: gestures since the last step are applied here before a step processes
+        // them.
         if let Some(orbit) = self.orbit_after(&self.gestures) {
             return (orbit.place(), Transform::IDENTITY, self.lens_from(orbit.near()));
         }
@@ -412,7 +418,7 @@ impl Game {
         (body, head, self.lens)
     }
 
-    /// The lens, with a near plane of at most so many metres.
+    /// Returns the lens with its near plane limited to `most` metres.
     fn lens_from(&self, most: f64) -> Camera {
         let mut lens = self.lens;
         if let Projection::Perspective { near, .. } = &mut lens.projection {
@@ -421,7 +427,7 @@ impl Game {
         lens
     }
 
-    /// Writes what is seen into the World: the eyes, and everything else at this moment.
+    /// Updates the World: the player's eyes, the lens, and everything that moves with the time.
     fn show(&mut self, part: f64) {
         let (body, head, lens) = self.eyes(part);
         for (entity, transform) in [(self.player, body), (self.camera, head)] {
@@ -441,14 +447,14 @@ impl Game {
     }
 }
 
-/// The cameras of a World, in the order in which they were spawned.
+/// Returns the cameras of a World in the order in which they were spawned, with a name for each.
 fn cameras_of(world: &mut World) -> Vec<(Entity, String)> {
     let mut query = world.query_filtered::<(Entity, Option<&Name>), With<Camera>>();
     let mut cameras: Vec<(Entity, String)> = query
         .iter(world)
         .map(|(entity, name)| (entity, name.map_or_else(String::new, ToString::to_string)))
         .collect();
-    // As they were spawned; entities themselves are ordered otherwise.
+    // In the order of spawning, which the order of entities is not.
     cameras.sort_by_key(|(entity, _)| entity.index_u32());
     for (index, (_, name)) in cameras.iter_mut().enumerate().filter(|(_, (_, name))| name.is_empty()) {
         *name = format!("camera {index}");
@@ -456,7 +462,7 @@ fn cameras_of(world: &mut World) -> Vec<(Entity, String)> {
     cameras
 }
 
-/// Where the player starts, and the lens of that camera.
+/// Returns where the player starts, and the lens of the camera there.
 fn first_view(world: &mut World, level: &TriangleTree) -> (Transform, Camera) {
     let mut cameras = world.query::<(&Camera, &GlobalTransform, Option<&Name>, Has<ActiveCamera>)>();
     let rank = |name: Option<&Name>, active: bool| match name {
@@ -482,7 +488,7 @@ mod tests {
 
     use super::*;
 
-    /// A box before the origin, and two cameras: the first looks at it from the right, the second lies above it.
+    /// A box at the origin and two cameras: the first looks at it from the right, the second from above.
     fn looked_at() -> Game {
         let mut world = World::new();
         let cuboid = Arc::new(lumbre_mesh::shapes::cuboid(glam::Vec3::new(2.0, 1.0, 1.0), 1));
@@ -512,7 +518,7 @@ mod tests {
         assert!(after.translation.y > before.translation.y, "dragged downwards it is seen from above");
         game.step_once(&Input { zoom: 3.0, ..Input::default() });
         assert!(eye(&game).translation.length() < 0.7 * before.translation.length());
-        // The mouse at rest changes nothing.
+        // Without gestures nothing changes.
         let rest = eye(&game);
         game.step_once(&Input::default());
         assert_eq!(eye(&game), rest);
@@ -544,7 +550,7 @@ mod tests {
         assert!((eye(&game).translation.y - 7.0).abs() < 1e-9);
         game.apply(Action::NextCamera);
         assert!(matches!(game.viewpoint(), Viewpoint::Orbit(_)));
-        // Who drags in a camera's view turns around what it looks at, from there.
+        // Dragging in a camera's view orbits the camera's target, starting from that view.
         game.apply(Action::NextCamera);
         game.step_once(&Input { orbit: DVec2::new(1e-6, 0.0), ..Input::default() });
         assert!(matches!(game.viewpoint(), Viewpoint::Orbit(_)));
@@ -558,7 +564,7 @@ mod tests {
         game.step_once(&Input { forward: true, ..Input::default() });
         assert_eq!(game.viewpoint(), &Viewpoint::Player);
         assert!(game.player().flying);
-        // What is seen lies between the last two steps.
+        // What is drawn is interpolated between the last two steps.
         game.step_once(&Input { forward: true, ..Input::default() });
         let after = eye(&game);
         let ahead = after.translation - before.translation;

@@ -1,44 +1,44 @@
-//! What a player or viewer wants, free of any window: held keys, gestures of the mouse, and one-off commands. Which key means what is the
-//! window's.
+//! Player input, independent of any window: held keys, mouse gestures and commands. The keys themselves are
+//! assigned in `window`.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// What is held down, and how far the view turns, during one frame.
+/// The keys held during a frame, and the mouse gestures made in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
-    /// Walk where the view points.
+    /// Walk in the direction of the view.
     #[serde(skip_serializing_if = "is_false")]
     pub forward: bool,
     /// Walk backwards.
     #[serde(skip_serializing_if = "is_false")]
     pub back: bool,
-    /// Step to the left.
+    /// Walk sideways to the left.
     #[serde(skip_serializing_if = "is_false")]
     pub left: bool,
-    /// Step to the right.
+    /// Walk sideways to the right.
     #[serde(skip_serializing_if = "is_false")]
     pub right: bool,
-    /// Faster.
+    /// Run instead of walking.
     #[serde(skip_serializing_if = "is_false")]
     pub run: bool,
-    /// Jump, or rise when flying.
+    /// Jump, or rise while flying.
     #[serde(skip_serializing_if = "is_false")]
     pub jump: bool,
-    /// Sink when flying.
+    /// Sink while flying.
     #[serde(skip_serializing_if = "is_false")]
     pub sink: bool,
-    /// Turn of the view in radians: x to the right, y downwards, as a mouse moves.
+    /// Rotation of the view in radians, as the mouse moves: x to the right, y downwards.
     #[serde(skip_serializing_if = "is_zero")]
     pub look: DVec2,
-    /// Turn around what is looked at in radians: x to the right, y downwards, as a mouse moves.
+    /// Rotation around the target of the view in radians, as the mouse moves: x to the right, y downwards.
     #[serde(skip_serializing_if = "is_zero")]
     pub orbit: DVec2,
-    /// Shift of the picture in parts of its height: x to the right, y downwards, as a mouse moves.
+    /// Shift of the picture as a fraction of its height, as the mouse moves: x to the right, y downwards.
     #[serde(skip_serializing_if = "is_zero")]
     pub pan: DVec2,
-    /// Notches of the wheel towards what is looked at.
+    /// Notches of the mouse wheel; positive zooms in.
     #[serde(skip_serializing_if = "is_still")]
     pub zoom: f64,
 }
@@ -58,12 +58,12 @@ fn is_zero(value: &DVec2) -> bool {
 }
 
 impl Input {
-    /// The same keys with the mouse at rest: what the following steps of the same frame see.
+    /// Returns the same keys without mouse gestures: the input of the further steps of a frame.
     pub fn held(self) -> Self {
         Self { look: DVec2::ZERO, orbit: DVec2::ZERO, pan: DVec2::ZERO, zoom: 0.0, ..self }
     }
 
-    /// Adds what the mouse did in another input; gestures that are no numbers are left out.
+    /// Adds the gestures of another input, unless any of them is not finite.
     pub fn add_gestures(&mut self, other: &Self) {
         if other.has_finite_gestures() {
             self.look += other.look;
@@ -73,73 +73,73 @@ impl Input {
         }
     }
 
-    /// Whether everything that the mouse did is a number.
+    /// Returns true if all gestures are finite.
     pub fn has_finite_gestures(&self) -> bool {
         self.look.is_finite() && self.orbit.is_finite() && self.pan.is_finite() && self.zoom.is_finite()
     }
 
-    /// Whether somebody wants to go somewhere on foot or in flight.
+    /// Returns true if the player wants to move, on foot or in flight.
     pub fn wants_to_go(&self) -> bool {
         self.walk() != DVec2::ZERO || self.climb() != 0.0
     }
 
-    /// Walking direction in the player's frame, x to the right and y forward, of length 0 or 1.
+    /// Returns the walking direction in the player's frame, x to the right and y forward, with length 0 or 1.
     pub fn walk(&self) -> DVec2 {
         let axis = |plus: bool, minus: bool| f64::from(i8::from(plus) - i8::from(minus));
         DVec2::new(axis(self.right, self.left), axis(self.forward, self.back)).normalize_or_zero()
     }
 
-    /// Up (1) or down (-1) when flying.
+    /// Returns 1 for up, -1 for down and 0 for neither, while flying.
     pub fn climb(&self) -> f64 {
         f64::from(i8::from(self.jump) - i8::from(self.sink))
     }
 }
 
-/// A command that happens once, when its key goes down.
+/// A command that is carried out once, when its key is pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
-    /// Shade every object flat.
+    /// Flat shading for every object.
     ShadeFlat,
-    /// Shade every object at its vertices.
+    /// Gouraud shading for every object: lit per vertex.
     ShadeGouraud,
-    /// Shade every object at every fragment.
+    /// Phong shading for every object: lit per fragment.
     ShadePhong,
-    /// Flat, Gouraud, Phong, and what the level itself asks for.
+    /// Cycles through flat, Gouraud, Phong and what the level itself asks for.
     CycleShading,
-    /// The next reflection model.
+    /// Switches to the next reflection model.
     CycleReflection,
-    /// Lightmaps on or off.
+    /// Switches lightmaps on or off.
     ToggleLightmaps,
-    /// Multisampling on or off.
+    /// Switches multisampling on or off.
     ToggleMultisample,
-    /// The overlay on or off.
+    /// Shows or hides the overlay.
     ToggleOverlay,
-    /// Counts of lights in the overlay on or off.
+    /// Shows or hides the counts of lights in the overlay.
     ToggleLightCounts,
-    /// The most accurate picture of the view beside the frame, or not.
+    /// Shows or hides the reference picture beside the frame.
     ToggleReference,
-    /// Measure what lights and other settings would cost in this view.
+    /// Measures what lights and other settings would cost in this view.
     MeasureSettings,
-    /// The settings that are the next cheaper ones, once they are measured.
+    /// Chooses the next cheaper settings, once they are measured.
     CheaperSettings,
-    /// The settings that are the next better ones, once they are measured.
+    /// Chooses the next better settings, once they are measured.
     BetterSettings,
-    /// The torch on or off.
+    /// Switches the torch on or off.
     ToggleTorch,
-    /// Walk, or fly through walls.
+    /// Switches between walking and flying through walls.
     ToggleFlight,
-    /// Turn around the whole scene.
+    /// Frames the whole scene and turns around it.
     OrbitEverything,
-    /// Look through the next camera of the file.
+    /// Looks through the file's next camera.
     NextCamera,
-    /// Meter the exposure, or take the camera's.
+    /// Switches between a metered exposure and the camera's.
     ToggleAutoExposure,
-    /// Bake the file, or cancel the bake that runs.
+    /// Bakes the file, or cancels the bake that runs.
     ToggleBake,
-    /// Write the baked file.
+    /// Writes the baked file.
     SaveBake,
-    /// Leave the game.
+    /// Quits the game.
     Quit,
 }
 

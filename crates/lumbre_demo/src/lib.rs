@@ -1,4 +1,4 @@
-//! The playable level, and any other glTF file in a window: rules, input, window, overlay.
+//! The playable demo level, and a viewer for any other glTF file: game rules, input, window and overlay.
 //!
 //! ```text
 //!   level::build ──► lumbre_scene::save ──► assets/demo.glb ──► bake ──► Game::load
@@ -8,9 +8,10 @@
 //!   Recording ◄──────────┘             │  motion: lights and props move with the time
 //! ```
 //!
-//! A file that is no level is [`Opened`], framed, and turned by [`OrbitView`]; a [`BackgroundBake`] lights it beside the frames.
+//! A file that is not a level is an [`Opened`], which is framed and viewed through an [`OrbitView`]; a
+//! [`BackgroundBake`] can bake its light while frames are drawn.
 //!
-//! The rules know no window: a recorded walk runs in a test as it runs on a screen.
+//! The game rules are independent of the window, so that a recorded walk runs in a test as it does on screen.
 //!
 //! ```
 //! use std::time::Duration;

@@ -1,5 +1,5 @@
-//! How lights and props move: the data (`extras.lumbre_demo.motion` of a glTF node). Not the system that moves them: that is
-//! `moving`.
+//! Motions of lights and props, as stored in `extras.lumbre_demo.motion` of a glTF node, and their
+//! evaluation. The system that applies them is in `moving`.
 
 use std::f64::consts::TAU;
 
@@ -7,61 +7,61 @@ use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Motions about the place that the file gives; all that are present add up. Each is a function of the time alone, so the same
-/// time always shows the same picture, whatever the frame rate.
+/// Motions relative to the transform that the file gives; all that are present add up. Each is a function of
+/// the time alone, so that the same time always shows the same picture, whatever the frame rate.
 #[derive(Component, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Motion {
-    /// Round and round.
+    /// A circular orbit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub orbit: Option<Orbit>,
-    /// To and fro along a line.
+    /// An oscillation along a line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bob: Option<Bob>,
     /// A pendulum.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub swing: Option<Swing>,
-    /// Turning about itself.
+    /// A rotation about itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin: Option<Spin>,
     /// Along a closed curve through points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<Path>,
-    /// A light that is not steady.
+    /// A flickering light.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flicker: Option<Flicker>,
 }
 
-/// A circle about the resting place.
+/// A circle about the resting position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Orbit {
     /// Metres.
     pub radius: f64,
-    /// Seconds per round; negative goes the other way.
+    /// Seconds per revolution; negative reverses the direction.
     pub period: f64,
-    /// Part of a round that it is ahead, [0, 1].
+    /// Fraction of a revolution that it is ahead.
     #[serde(default)]
     pub phase: f64,
-    /// What it goes round.
+    /// The axis of the circle.
     #[serde(default = "up")]
     pub axis: DVec3,
 }
 
-/// A sine along a line.
+/// A sinusoidal oscillation along a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bob {
-    /// From the middle to the end, metres.
+    /// From the centre to one end, metres.
     pub reach: DVec3,
     /// Seconds per oscillation.
     pub period: f64,
-    /// Part of an oscillation that it is ahead.
+    /// Fraction of an oscillation that it is ahead.
     #[serde(default)]
     pub phase: f64,
 }
 
-/// A rotation to and fro about a point.
+/// A pendulum's oscillating rotation about a pivot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Swing {
@@ -69,49 +69,49 @@ pub struct Swing {
     pub angle: f64,
     /// Seconds per oscillation.
     pub period: f64,
-    /// Part of an oscillation that it is ahead.
+    /// Fraction of an oscillation that it is ahead.
     #[serde(default)]
     pub phase: f64,
-    /// Where it hangs, metres from the resting place.
+    /// The pivot, metres from the resting position.
     #[serde(default)]
     pub pivot: DVec3,
-    /// What it turns about.
+    /// The axis of rotation.
     pub axis: DVec3,
 }
 
-/// A steady rotation.
+/// A rotation at constant speed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spin {
-    /// Seconds per turn.
+    /// Seconds per revolution; negative reverses the direction.
     pub period: f64,
-    /// What it turns about.
+    /// The axis of rotation.
     #[serde(default = "up")]
     pub axis: DVec3,
 }
 
-/// A closed Catmull-Rom curve, the same time from each point to the next.
+/// A closed Catmull-Rom curve, with the same time from each point to the next.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Path {
-    /// Metres in the parent's space, at least two; the resting place does not count.
+    /// Two points or more, metres in the parent's space; the resting position has no effect.
     pub points: Vec<DVec3>,
     /// Seconds per round.
     pub period: f64,
-    /// Part of a round that it is ahead.
+    /// Fraction of a round that it is ahead.
     #[serde(default)]
     pub phase: f64,
 }
 
-/// A factor on the light's colours that wavers between `1 - depth` and 1.
+/// A factor on the light's colours that varies between `1 - depth` and 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flicker {
-    /// [0, 1].
+    /// Depth of the variation, in [0, 1].
     pub depth: f64,
-    /// Seconds of its slowest wave.
+    /// Period of the slowest wave, seconds.
     pub period: f64,
-    /// Part of a wave that it is ahead.
+    /// Fraction of a wave that it is ahead.
     #[serde(default)]
     pub phase: f64,
 }
@@ -120,36 +120,37 @@ fn up() -> DVec3 {
     DVec3::Y
 }
 
-/// Where something is relative to its resting place, and how bright.
+/// Displacement from the resting transform, and brightness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Added to the resting translation, metres.
     pub offset: DVec3,
-    /// Replaces the resting translation before the offset is added.
+    /// Replaces the resting translation, if given, before the offset is added.
     pub place: Option<DVec3>,
     /// Applied after the resting rotation, in the parent's space.
     pub rotation: DQuat,
-    /// Factor of its light, [0, 1].
+    /// Factor on the light's colours, [0, 1].
     pub brightness: f64,
 }
 
-/// Why a motion cannot be.
+/// A motion with a number out of range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("motion.{field} of node \"{node}\" must be {expected}")]
 pub struct MotionError {
-    /// Name of the node.
+    /// The name of the node.
     pub node: String,
-    /// Which value.
+    /// The field.
     pub field: &'static str,
-    /// What it may be.
+    /// What its value must be.
     pub expected: &'static str,
 }
 
 impl Motion {
-    /// Checks the numbers: finite everywhere, periods other than zero, axes with a direction, paths with two points or more.
+    /// Checks that all numbers are finite, periods are a millisecond or more, axes have a direction, and
+    /// paths have two points or more.
     ///
     /// # Errors
-    /// The first [`MotionError`], which names the node.
+    /// [`MotionError`] for the first number that fails; it names the node.
     pub fn validate(&self, node: &str) -> Result<(), MotionError> {
         let check = |ok: bool, field, expected| {
             if ok { Ok(()) } else { Err(MotionError { node: node.to_owned(), field, expected }) }
@@ -186,7 +187,7 @@ impl Motion {
         Ok(())
     }
 
-    /// The pose at a time in seconds.
+    /// Returns the pose at a time in seconds.
     pub fn pose(&self, seconds: f64) -> Pose {
         let turn = |period: f64, phase: f64| TAU * (seconds / period + phase).rem_euclid(1.0);
         let mut pose = Pose { offset: DVec3::ZERO, place: None, rotation: DQuat::IDENTITY, brightness: 1.0 };
@@ -220,7 +221,8 @@ impl Motion {
 }
 
 impl Flicker {
-    /// Three waves whose periods have no common multiple in sight, so that nobody sees it repeat.
+    /// Sums three waves whose periods have no small common multiple, so that the pattern never seems to
+    /// repeat.
     fn brightness(&self, seconds: f64) -> f64 {
         let wave =
             |speed: f64| 0.5 + 0.5 * (TAU * (seconds / self.period * speed + self.phase * speed)).sin();
@@ -228,7 +230,7 @@ impl Flicker {
     }
 }
 
-/// The place on a closed uniform Catmull-Rom curve at a part of its round, [0, 1).
+/// Returns the point on a closed uniform Catmull-Rom curve at a fraction of its round, [0, 1).
 pub fn closed_curve(points: &[DVec3], part: f64) -> DVec3 {
     if points.is_empty() {
         return DVec3::ZERO;
@@ -239,7 +241,7 @@ pub fn closed_curve(points: &[DVec3], part: f64) -> DVec3 {
     catmull_rom([at(0), at(1), at(2), at(3)], position - first as f64)
 }
 
-/// Between the second and the third of four points (Catmull and Rom 1974, tension 1/2).
+/// Interpolates between the second and the third of four points (Catmull and Rom 1974, tension 1/2).
 pub fn catmull_rom([a, b, c, d]: [DVec3; 4], t: f64) -> DVec3 {
     let linear = c - a;
     let quadratic = 2.0 * a - 5.0 * b + 4.0 * c - d;
@@ -271,7 +273,7 @@ mod tests {
         for step in 0..20 {
             assert!((motion.pose(f64::from(step) * 0.13).offset.distance(pivot) - 1.5).abs() < 1e-12);
         }
-        // At a quarter of the period it is at its largest angle.
+        // At a quarter of the period the angle is largest.
         let height = motion.pose(0.5).offset.y;
         assert!((height - 1.5 * (1.0 - 0.6f64.cos())).abs() < 1e-12);
     }

@@ -1,4 +1,4 @@
-//! The system that moves what has a motion, and reading motions from nodes. Not the curves: those are `motion`.
+//! Reads motions from a file's nodes, and the system that applies them. The curves are in `motion`.
 
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -7,43 +7,43 @@ use lumbre_scene::{Extras, Name, Transform};
 
 use crate::motion::{Motion, MotionError};
 
-/// The time that motions are shown at.
+/// The time at which motions are evaluated.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct GameTime {
     /// Seconds since the start.
     pub seconds: f64,
 }
 
-/// What the file gave: motions are relative to it.
+/// The state that the file gave; motions are relative to it.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
-    /// Where it rests.
+    /// The resting transform.
     pub transform: Transform,
-    /// Ambient, diffuse and specular colour of its light.
+    /// Ambient, diffuse and specular colour of the light, if the node is one.
     pub light: Option<[Vec3; 3]>,
 }
 
-/// Why a node's motion cannot be read.
+/// Reasons why a node's motion cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExtrasError {
-    /// It is not written as a motion is.
+    /// The motion is not written in the expected form.
     #[error("extras.lumbre_demo.motion of node \"{node}\" cannot be read: {source}")]
     Unreadable {
-        /// Name of the node.
+        /// The name of the node.
         node: String,
-        /// What is wrong with it.
+        /// The error of the parser.
         source: serde_json::Error,
     },
-    /// Its numbers are out of range.
+    /// A number is out of range.
     #[error("extras.lumbre_demo: {0}")]
     OutOfRange(#[from] MotionError),
 }
 
-/// Gives a [`Motion`] to every node whose extras hold one; returns how many there are.
+/// Adds a [`Motion`] to every node whose extras contain one; returns the number of such nodes.
 ///
 /// # Errors
-/// [`ExtrasError`] with the node's name where a motion is malformed.
+/// [`ExtrasError`] with the node's name if a motion is malformed.
 pub fn read_motions(world: &mut World) -> Result<usize, ExtrasError> {
     let mut query = world.query::<(Entity, &Extras, Option<&Name>, &Transform, Option<&Light>)>();
     let mut found = Vec::new();
@@ -63,7 +63,7 @@ pub fn read_motions(world: &mut World) -> Result<usize, ExtrasError> {
     Ok(count)
 }
 
-/// Puts everything that has a motion where it is at [`GameTime`].
+/// System that moves everything with a motion to its pose at [`GameTime`].
 pub fn move_things(
     time: Res<GameTime>,
     mut moving: Query<(&Motion, &Rest, &mut Transform, Option<&mut Light>)>,

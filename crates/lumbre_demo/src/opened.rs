@@ -1,4 +1,5 @@
-//! A file that was opened to be looked at: a game in it, what was noted, and how it is exposed. Not the window that shows it.
+//! A file opened for viewing: a game that holds it, the notes of its reader, and its exposure. The window
+//! that shows it is in `window`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,34 +9,37 @@ use lumbre_scene::{LoadOptions, add_default_light, is_without_light, load_with};
 
 use crate::{Game, GameError};
 
-/// Share of a picture that has to be white for want of an exposure before one is metered unasked.
+/// Fraction of a picture that has to be clipped to white before an exposure is metered without being asked
+/// for.
 pub(crate) const CLIPPED: f64 = 0.02;
 
-/// Side of the atlases that small meshes share, in texels: what every device can bind, and most levels fit into a few of them.
+/// Side of the atlases that small meshes share, in texels. Every device supports it, and most levels fit into
+/// a few of them.
 pub const ATLAS_SIDE: u32 = 2048;
 
-/// How bright pictures are.
+/// How the brightness of pictures is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Exposure {
-    /// The camera's; metered if the file's lights are in candela or lux, no camera states an exposure, and too much would be white.
+    /// The camera's exposure. It is metered instead if the file's lights are in candela or lux, no camera
+    /// states an exposure, and too much of the picture would be white.
     #[default]
     AsNeeded,
-    /// Metered.
+    /// A metered exposure.
     Auto,
-    /// A factor on radiance.
+    /// A fixed factor on radiance.
     Factor(f32),
 }
 
-/// How files are opened.
+/// Options for opening files.
 #[derive(Clone, Debug)]
 pub struct OpenOptions {
-    /// How they are read.
+    /// Options of the reader.
     pub load: LoadOptions,
-    /// Lights files without light from the camera.
+    /// Whether files without light are lit from the camera.
     pub default_light: bool,
-    /// How bright their pictures are.
+    /// How the brightness of their pictures is chosen.
     pub exposure: Exposure,
-    /// What a bake in the background comes to in the end.
+    /// Options of the final pass of a background bake.
     pub bake: BakeOptions,
 }
 
@@ -47,26 +51,28 @@ impl Default for OpenOptions {
     }
 }
 
-/// A file in a game.
+/// A file opened in a game.
 pub struct Opened {
-    /// The game in it: from the camera `start` if the file has one, else around all of it.
+    /// The game that holds it. It starts at the camera `start` if the file has one, and otherwise frames the
+    /// whole file.
     pub game: Game,
-    /// The file.
+    /// The path of the file.
     pub path: PathBuf,
     /// What was repaired, left out or added.
     pub notes: Vec<String>,
-    /// How it is exposed.
+    /// How the brightness of its pictures is chosen.
     pub exposure: Exposure,
-    /// Whether an exposure is metered if none is asked for and too much would be white.
+    /// Whether its lights are photometric and no camera states an exposure, so that an exposure may be
+    /// metered.
     pub is_photometric: bool,
-    /// The entity of each node of the file.
+    /// The entities of the file's nodes, in order.
     pub nodes: Vec<Entity>,
-    /// The lights that were added because there was none.
+    /// The lights that were added because the file has none.
     pub default_lights: Vec<Entity>,
 }
 
 impl Opened {
-    /// Opens a .glb or .gltf, baked or not.
+    /// Opens a .glb or .gltf file, baked or not.
     ///
     /// # Errors
     /// [`GameError`] with the file, the node and the remedy.
@@ -103,12 +109,13 @@ impl Opened {
         })
     }
 
-    /// Where a bake of this file is saved: beside it, and never over it.
+    /// Returns the path for the baked file: beside the original, and never the same.
     pub fn place_of_bake(&self) -> PathBuf {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let stem = stem.strip_suffix(".baked").unwrap_or(&stem);
         let beside = self.path.with_file_name(format!("{stem}.baked.glb"));
-        // By the stem, whatever its letters' case: a `.baked.gltf` would share its folder of lightmaps with the new file.
+        // Compared by stem, ignoring case: a `.baked.gltf` would share its folder of lightmaps with the new
+        // file.
         let stem_of = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
         if stem_of(&beside) == stem_of(&self.path) {
             self.path.with_file_name(format!("{stem}.baked-again.glb"))
@@ -136,7 +143,7 @@ mod tests {
             lumbre_scene::save(&mut world, &path).unwrap();
             let opened = Opened::open(&path, &OpenOptions::default()).unwrap();
             assert_eq!(*opened.game.viewpoint() == Viewpoint::Player, walks);
-            // Nothing shines in it.
+            // The file has no light.
             assert_eq!(opened.default_lights.len(), 2);
             assert!(
                 opened.notes.iter().any(|note| note.contains("--no-default-light")),

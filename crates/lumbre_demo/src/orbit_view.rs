@@ -1,43 +1,44 @@
-//! A view that turns around a point, as viewers of glTF files have it. Not the camera that it moves: that is `game`.
+//! A view that orbits a target, as in viewers of glTF files. `game` applies it to a camera.
 
 use glam::{DQuat, DVec2, DVec3};
 use lumbre_scene::{Bounds, Transform};
 
-/// Largest angle of the view above or below the horizon, radians: a little under a right angle.
+/// Largest angle of the view above or below the horizon, radians; slightly less than a right angle.
 const STEEPEST_VIEW: f64 = 1.55;
-/// How much nearer the eye comes by one notch of the wheel.
+/// Factor on the distance for one notch of the mouse wheel.
 const NOTCH: f64 = 0.85;
-/// Nearest and farthest distance of the eye, as parts of the scene's radius.
+/// Smallest and largest distance of the eye, in radii of the scene.
 const NEAREST: f64 = 1e-3;
 const FARTHEST: f64 = 100.0;
 
-/// An eye on a sphere around the point that it looks at.
+/// An eye on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbitView {
-    /// What it looks at, metres.
+    /// The point that it looks at, metres.
     pub target: DVec3,
-    /// How far the eye is from there, metres.
+    /// Distance of the eye from the target, metres.
     pub distance: f64,
-    /// Direction of the view about +Y in radians; 0 looks along -Z, rising to the left.
+    /// Direction of the view about +Y in radians; 0 looks along -Z, and larger angles turn to the left.
     pub yaw: f64,
     /// Direction of the view above the horizon, radians.
     pub pitch: f64,
-    /// Half the diagonal of the scene in metres: what distances are bounded by.
+    /// Half the diagonal of the scene in metres, which limits the distance.
     pub radius: f64,
 }
 
 impl OrbitView {
-    /// Around what a camera at `view` looks at: the point on its line of sight that is nearest to the middle of the scene.
+    /// Creates an orbit from a camera's view. The target is the point on its line of sight that is nearest to
+    /// the scene's centre.
     pub fn of_camera(view: &Transform, bounds: &Bounds) -> Self {
         let radius = bounds.radius().max(1e-6);
         let forward = view.rotation * DVec3::NEG_Z;
         let along = (bounds.center() - view.translation).dot(forward);
-        // Inside a room, or looking away from everything, it still turns around something before the eye.
+        // Inside a room, or facing away from the scene, the target is still a point in front of the eye.
         let distance = along.clamp(0.05 * radius, FARTHEST * radius);
         let flat = DVec2::new(-forward.x, -forward.z);
         let yaw = match flat.length() > 1e-6 {
             true => flat.x.atan2(flat.y),
-            // Straight up or down: the head's own up says where forward is.
+            // Looking straight up or down, the camera's own up vector gives the heading.
             false => {
                 let up = (view.rotation * DVec3::Y) * -forward.y.signum();
                 (-up.x).atan2(-up.z)
@@ -47,7 +48,8 @@ impl OrbitView {
         Self { target: view.translation + forward * distance, distance, yaw, pitch, radius }
     }
 
-    /// Turns around the target: the picture follows the mouse, `turn` to the right and downwards in radians.
+    /// Turns around the target by `turn`, to the right and downwards in radians, so that the picture follows
+    /// the mouse.
     pub fn turn(&mut self, turn: DVec2) {
         if turn.is_finite() {
             self.yaw = (self.yaw - turn.x).rem_euclid(std::f64::consts::TAU);
@@ -55,8 +57,9 @@ impl OrbitView {
         }
     }
 
-    /// Moves the target across the view: the picture follows the mouse, `motion` to the right and downwards in parts of the picture's height,
-    /// which shows `height` metres for each metre of distance.
+    /// Moves the target across the view by `motion`, to the right and downwards as fractions of the picture's
+    /// height, so that the picture follows the mouse. The picture shows `height` metres per metre of
+    /// distance.
     pub fn pan(&mut self, motion: DVec2, height: f64) {
         if motion.is_finite() {
             let across = DVec3::new(-motion.x, motion.y, 0.0) * height * self.distance;
@@ -64,7 +67,7 @@ impl OrbitView {
         }
     }
 
-    /// Comes nearer by so many notches of the wheel, or goes away.
+    /// Moves the eye closer by a number of wheel notches, or away for a negative number.
     pub fn zoom(&mut self, notches: f64) {
         if notches.is_finite() {
             let distance = self.distance * NOTCH.powf(notches.clamp(-50.0, 50.0));
@@ -72,14 +75,14 @@ impl OrbitView {
         }
     }
 
-    /// Where the eye is, and what it looks at.
+    /// Returns the transform of the eye.
     pub fn place(&self) -> Transform {
         let rotation = self.rotation();
         let eye = self.target + rotation * DVec3::Z * self.distance;
         Transform::from_translation(eye).with_rotation(rotation)
     }
 
-    /// A near plane that cuts nothing off at this distance.
+    /// Returns a distance of the near plane that clips nothing at this distance.
     pub fn near(&self) -> f64 {
         (0.01 * self.distance).min(1e-3 * self.radius).max(1e-9)
     }
@@ -107,7 +110,7 @@ mod tests {
         assert!(forward(&view).distance(camera.rotation * DVec3::NEG_Z) < 1e-9);
         assert!(view.target.length() < 1e-9);
         let distance = view.distance;
-        // A quarter to the right: what was to the left of the middle comes before it.
+        // A quarter turn to the right: the side that was on the left is now in front.
         let right = camera.rotation * DVec3::X;
         view.turn(DVec2::new(std::f64::consts::FRAC_PI_2, 0.0));
         let eye = view.place().translation;
@@ -124,7 +127,8 @@ mod tests {
         let camera = Transform::from_xyz(0.0, 0.0, 5.0);
         let mut view = OrbitView::of_camera(&camera, &UNIT);
         let height = 2.0 * (0.5f64 * 0.7).tan();
-        // The point of the target plane in the picture, in parts of its height from the middle, y downwards.
+        // The position of the world's origin in the picture, as fractions of its height from the centre, y
+        // downwards.
         let seen = |view: &OrbitView| {
             let from = view.place().affine().inverse().transform_point3(DVec3::ZERO);
             DVec2::new(from.x, -from.y) / (-from.z * height)
@@ -152,7 +156,7 @@ mod tests {
     fn looking_straight_down_keeps_the_heading() {
         let camera = Transform::from_xyz(0.0, 5.0, 0.0).looking_at(DVec3::ZERO, DVec3::NEG_Z);
         let view = OrbitView::of_camera(&camera, &UNIT);
-        // Up in the picture stays up.
+        // What was up in the picture stays up.
         assert!((view.place().rotation * DVec3::Y).dot(DVec3::NEG_Z) > 0.99);
         let nothing = OrbitView::of_camera(&Transform::IDENTITY, &Bounds::EMPTY);
         assert!(nothing.place().translation.is_finite() && nothing.distance > 0.0);

@@ -1,10 +1,10 @@
-//! Pictures on disk. Not their making.
+//! Writes pictures to files.
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 
-/// Writes RGBA bytes as a PNG, whole or not at all.
+/// Writes RGBA bytes as a PNG, through a temporary file, so that no partial file is left under its name.
 ///
 /// # Errors
 /// The file cannot be written.

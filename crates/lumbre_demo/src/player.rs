@@ -1,4 +1,5 @@
-//! The player: a body with a head that turns, walking or flying. Not the level that stops them: that is `walking`.
+//! The player: a body and the direction of its view, walking or flying. Collisions with the level are in
+//! `walking`.
 
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec2, DVec3};
@@ -7,34 +8,35 @@ use lumbre_scene::Transform;
 use crate::input::Input;
 use crate::walking::{Body, Stature, TriangleTree, Wish, move_body};
 
-/// Largest angle of the view above or below the horizon, radians: a little under a right angle.
+/// Largest angle of the view above or below the horizon, radians; slightly less than a right angle.
 const STEEPEST_VIEW: f64 = 1.55;
-/// How quickly the eyes follow the feet up a step, 1/s.
+/// Rate at which the eyes follow the feet up a step, 1/s.
 const EYE_FOLLOW: f64 = 12.0;
-/// Speed of flying as a multiple of walking, where nothing says how large the scene is.
+/// Speed of flying as a multiple of walking, in scenes of human size.
 const FLIGHT: f64 = 1.5;
 
 /// The player.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct Player {
-    /// Where the player stands and how they move.
+    /// Position and velocity of the body.
     pub body: Body,
-    /// Direction of the view about +Y in radians; 0 looks along -Z, rising to the left.
+    /// Direction of the view about +Y in radians; 0 looks along -Z, and larger angles turn to the left.
     pub yaw: f64,
     /// Direction of the view above the horizon, radians.
     pub pitch: f64,
-    /// How far the eyes are from where they belong, metres: steps are climbed by the feet at once and by the eyes smoothly.
+    /// How far the eyes are above their proper height, metres: the feet climb a step at once, and the eyes
+    /// follow smoothly.
     pub eye_lag: f64,
-    /// Through walls, without weight.
+    /// Whether the player flies: through walls and without gravity.
     pub flying: bool,
-    /// Speed of flying, m/s; running is as much faster as on foot.
+    /// Speed of flying, m/s. Running flies faster by the same factor as on foot.
     pub flight_speed: f64,
     /// Size and speed.
     pub stature: Stature,
 }
 
 impl Player {
-    /// A player whose eyes are at a place, looking where a camera there looks.
+    /// Creates a player whose eyes are where a camera is, looking in its direction.
     pub fn with_eyes_at(view: &Transform) -> Self {
         let stature = Stature::default();
         let body = Body { feet: view.translation - DVec3::Y * stature.eyes, ..Body::default() };
@@ -46,7 +48,7 @@ impl Player {
         Self { body, yaw, pitch, eye_lag: 0.0, flying: false, flight_speed, stature }
     }
 
-    /// Turns the view.
+    /// Turns the view by `look`, to the right and downwards in radians.
     pub fn turn(&mut self, look: DVec2) {
         if look.is_finite() {
             self.yaw = (self.yaw - look.x).rem_euclid(std::f64::consts::TAU);
@@ -54,7 +56,7 @@ impl Player {
         }
     }
 
-    /// One step of the game, `seconds` long.
+    /// Advances the player by one step of `seconds`.
     pub fn step(&mut self, input: &Input, level: &TriangleTree, seconds: f64) {
         self.turn(input.look);
         let speed = if input.run { self.stature.run } else { self.stature.walk };
@@ -78,12 +80,12 @@ impl Player {
         self.eye_lag = self.eye_lag.clamp(-2.0 * self.stature.step, 2.0 * self.stature.step);
     }
 
-    /// Height of the eyes above the feet at this moment, metres.
+    /// Returns the current height of the eyes above the feet, metres.
     pub fn eye_height(&self) -> f64 {
         self.stature.eyes + self.eye_lag
     }
 
-    /// From the camera's space to the world's.
+    /// Returns the rotation from the camera's space to the world's.
     pub fn view_rotation(&self) -> DQuat {
         DQuat::from_rotation_y(self.yaw) * DQuat::from_rotation_x(self.pitch)
     }

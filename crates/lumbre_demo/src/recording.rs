@@ -1,4 +1,4 @@
-//! Recorded input: what a player did, step by step, so that it can be done again exactly. Not the playing: that is `game`.
+//! Recordings: a player's input step by step, so that it can be replayed exactly. `game` replays it.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::{Action, Input};
 
-/// Fixed steps per second of game time: the clock of recordings.
+/// Fixed steps per second of game time; recordings count in them.
 pub const STEPS_PER_SECOND: u32 = 120;
 
-/// Input over time. A walk written by hand looks the same as a recorded one:
+/// The input of a player over time. Recordings can also be written by hand, in the same form:
 ///
 /// ```json
 /// {"events": [{"step": 0, "input": {"forward": true}},
@@ -19,9 +19,9 @@ pub const STEPS_PER_SECOND: u32 = 120;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recording {
-    /// Changes, by rising step.
+    /// Changes of input, in ascending order of steps.
     pub events: Vec<Event>,
-    /// The step after the last one.
+    /// The number of steps.
     pub end: u64,
 }
 
@@ -29,40 +29,40 @@ pub struct Recording {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Event {
-    /// The step before which it happens; there are [`STEPS_PER_SECOND`].
+    /// The step before which it applies; there are [`STEPS_PER_SECOND`].
     pub step: u64,
-    /// Held until the next event; its `look`, `orbit`, `pan` and `zoom` move the view once.
+    /// The input, held until the next event; its `look`, `orbit`, `pan` and `zoom` are applied once.
     #[serde(default)]
     pub input: Input,
-    /// Commands.
+    /// Commands that are carried out before the step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub actions: Vec<Action>,
 }
 
-/// Why a recording cannot be used.
+/// Reasons why a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
     /// The file cannot be read or written.
     #[error("{file}: {source}; check the path and its permissions")]
     File {
-        /// Path.
+        /// The path.
         file: String,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// It is not a recording.
+    /// The file is not a recording.
     #[error("{file} is no recording: {source}")]
     Unreadable {
-        /// Path.
+        /// The path.
         file: String,
-        /// Where and why.
+        /// The error of the parser, with its place.
         source: serde_json::Error,
     },
-    /// Steps must rise and numbers be finite.
+    /// An event is out of order or has a number that is not finite.
     #[error("event {index} of the recording {problem}")]
     Event {
-        /// Place in the list.
+        /// Its index in the list.
         index: usize,
         /// What is wrong with it.
         problem: &'static str,
@@ -70,10 +70,10 @@ pub enum RecordingError {
 }
 
 impl Recording {
-    /// Reads a recording from text; `file` is for messages.
+    /// Parses a recording; `file` names it in error messages.
     ///
     /// # Errors
-    /// [`RecordingError`] where it is not one.
+    /// [`RecordingError`] if the text is not a valid recording.
     pub fn parse(text: &str, file: &str) -> Result<Self, RecordingError> {
         let recording: Self = serde_json::from_str(text)
             .map_err(|source| RecordingError::Unreadable { file: file.to_owned(), source })?;
@@ -81,7 +81,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Reads a file.
+    /// Reads a recording from a file.
     ///
     /// # Errors
     /// [`RecordingError`] with the file's name.
@@ -92,7 +92,8 @@ impl Recording {
         Self::parse(&text, &file)
     }
 
-    /// Writes a file, whole or not at all.
+    /// Writes the recording to a file, through a temporary one, so that no partial file is left under its
+    /// name.
     ///
     /// # Errors
     /// [`RecordingError`] with the file's name.
@@ -117,7 +118,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Notes what a player does before a step, if it differs from what is held.
+    /// Records the input before a step, if it differs from what is held.
     pub fn note(&mut self, step: u64, input: Input, actions: &[Action]) {
         let held = self.events.last().map_or_else(Input::default, |event| event.input.held());
         if input != held || !actions.is_empty() {
@@ -126,13 +127,13 @@ impl Recording {
         self.end = self.end.max(step + 1);
     }
 
-    /// Plays it back, step by step.
+    /// Returns an iterator over the input of each step.
     pub fn player(&self) -> Playback<'_> {
         Playback { recording: self, step: 0, next: 0, held: Input::default() }
     }
 }
 
-/// A recording that is being played.
+/// Iterates over the steps of a recording.
 #[derive(Clone, Debug)]
 pub struct Playback<'r> {
     recording: &'r Recording,
@@ -144,7 +145,7 @@ pub struct Playback<'r> {
 impl Iterator for Playback<'_> {
     type Item = (Input, Vec<Action>);
 
-    /// The input of the next step, and the commands before it.
+    /// Returns the input of the next step, and the commands before it.
     fn next(&mut self) -> Option<Self::Item> {
         if self.step >= self.recording.end {
             return None;
@@ -179,7 +180,7 @@ mod tests {
             let actions: &[Action] = if step == 2 { &[Action::ToggleTorch] } else { &[] };
             recording.note(step as u64, input, actions);
         }
-        // Nothing is written while nothing changes: steps 1, 2 (a command), 3, 4, 6.
+        // Steps without a change add no event; those that do are 1, 2 (a command), 3, 4 and 6.
         assert_eq!(recording.events.len(), 5);
         let text = serde_json::to_string(&recording).unwrap();
         let again = Recording::parse(&text, "test").unwrap();

@@ -1,10 +1,10 @@
-//! Which triangles of a level stop somebody. Not how: that is `walking`.
+//! Selects the triangles of a level that stop the player. How they stop a body is in `walking`.
 
 use bevy_ecs::prelude::*;
 use glam::DVec3;
 use lumbre_scene::{Extras, GlobalTransform, Mesh, StaticObject, hidden_entities};
 
-/// The triangles of all static meshes in the world's space, metres, except those whose node says
+/// Returns the triangles of all visible static meshes in world space, metres, except those whose node has
 /// `extras.lumbre_demo.solid = false`. Global transforms must be up to date.
 pub fn level_triangles(world: &mut World) -> Vec<[DVec3; 3]> {
     let hidden = hidden_entities(world);

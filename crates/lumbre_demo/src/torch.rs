@@ -1,10 +1,10 @@
-//! The torch in the player's hand: a spotlight that follows the view. Not where it hangs: that is `game`.
+//! The torch in the player's hand: a spotlight that follows the view. `game` attaches it to the camera.
 
 use glam::Vec3;
 use lumbre_optics::{Attenuation, BakeMode, Light, SpotCone};
 use lumbre_scene::Transform;
 
-/// The light of the torch: a warm cone of 26 degrees to each side that reaches 18 m.
+/// Returns the light of the torch: a warm cone with a half angle of 26 degrees and a range of 18 m.
 pub fn torch_light(lit: bool) -> Light {
     let cone = SpotCone::Smooth { inner: 0.14, outer: 0.46 };
     let attenuation = Attenuation { constant: 1.0, linear: 0.0, quadratic: 0.14, clamp: false, range: 18.0 };
@@ -16,7 +16,8 @@ pub fn torch_light(lit: bool) -> Light {
     }
 }
 
-/// Where the hand holds it, in the camera's space: low on the right, so that what it lights shows its relief.
+/// Returns where the hand holds the torch in the camera's space: low on the right, so that its light shows
+/// the relief of surfaces.
 pub fn torch_place() -> Transform {
     Transform::from_xyz(0.22, -0.28, -0.05)
 }

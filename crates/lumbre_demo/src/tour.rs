@@ -1,4 +1,4 @@
-//! A flight through a level for machines without a display. Not the drawing of its frames.
+//! A camera flight through a level, for machines without a display. Its frames are drawn in `tour_frames`.
 
 use bevy_ecs::prelude::*;
 use glam::{DQuat, DVec3};
@@ -6,17 +6,17 @@ use lumbre_scene::{Camera, GlobalTransform, Name, Transform};
 
 use crate::motion::catmull_rom;
 
-/// What the names of the cameras along the way begin with.
+/// The prefix of the names of the cameras along the tour.
 pub const TOUR_CAMERA: &str = "tour";
 
-/// Where a camera flies.
+/// The path of a camera flight.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Tour {
-    /// Past the cameras named `tour...` of the level, in the order of their names.
+    /// Past the level's cameras named `tour...`, in the order of their names.
     Past(Vec<Transform>),
-    /// Around something, looking at its middle.
+    /// Around a point that the camera looks at.
     Around {
-        /// Metres.
+        /// The point, metres.
         middle: DVec3,
         /// Distance from it, metres.
         distance: f64,
@@ -24,7 +24,8 @@ pub enum Tour {
 }
 
 impl Tour {
-    /// The tour of a level: past its tour cameras; from its only view if it has other cameras; else around `bounds`.
+    /// Chooses the tour of a level: past its tour cameras; or from its first other camera, if it has one; or
+    /// around `bounds`.
     pub fn of(world: &mut World, bounds: Option<(DVec3, DVec3)>) -> Self {
         let mut cameras = world.query_filtered::<(&GlobalTransform, Option<&Name>), With<Camera>>();
         let (mut stops, mut first) = (Vec::new(), None);
@@ -49,7 +50,7 @@ impl Tour {
         Self::Around { middle: 0.5 * (min + max), distance: 1.2 * (max - min).length() }
     }
 
-    /// The view at a part of the way, [0, 1].
+    /// Returns the view at a fraction of the tour, in [0, 1].
     pub fn view(&self, part: f64) -> Transform {
         let part = part.clamp(0.0, 1.0);
         match self {

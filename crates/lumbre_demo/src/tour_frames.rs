@@ -1,4 +1,4 @@
-//! The tour as pictures, for machines without a display.
+//! Draws the tour of a level into PNG files, for machines without a display.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -9,19 +9,22 @@ use lumbre_render::{FrameOptions, Gpu, Offscreen, OffscreenFormat, Renderer};
 use crate::picture::write_png;
 use crate::{Game, Input, Tour};
 
-/// Game time between two pictures.
+/// Game time between two frames.
 const BETWEEN: Duration = Duration::from_millis(200);
 
-/// Flies through a level and writes `frames` pictures of `size` pixels (width, height) into `out_dir`, which is made if it is not
-/// there. Lights and props move as they do in the game. Returns the pictures' paths, in order.
+/// Flies through a level and writes `frames` pictures of `size` pixels (width, height) into `out_dir`, which
+/// is created if needed. Lights and props move as they do in the game. Returns the paths of the pictures, in
+/// order.
 ///
 /// # Errors
+/// The level cannot be loaded, there is no device, or a picture cannot be drawn or written.
 /// The level cannot be loaded, there is no device, or a picture cannot be drawn or written.
 pub fn tour(level: &Path, out_dir: &Path, frames: u32, size: (u32, u32)) -> Result<Vec<PathBuf>> {
     tour_of(Game::load(level)?, out_dir, frames, size, None)
 }
 
-/// [`tour`] of a level that is loaded already, with an exposure instead of the camera's.
+/// Does what [`tour`] does for a level that is already loaded, with an exposure that replaces the camera's if
+/// it is given.
 ///
 /// # Errors
 /// There is no device, or a picture cannot be drawn or written.

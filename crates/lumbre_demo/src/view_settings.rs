@@ -1,4 +1,4 @@
-//! How the player wants the level drawn. Not the drawing: that is the renderer's.
+//! The player's choices of how the level is drawn. The renderer reads them through its frame options.
 
 use bevy_ecs::world::World;
 use lumbre_optics::{ReflectionModel, Shading};
@@ -6,22 +6,22 @@ use lumbre_scene::SceneSettings;
 
 use crate::input::Action;
 
-/// Choices that the keys change.
+/// The choices that keys change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ViewSettings {
-    /// Of every object; what the level itself asks for if there is none.
+    /// Shading of every object; `None` is what the level itself asks for.
     pub shading: Option<Shading>,
-    /// The specular model; the level's own if there is none.
+    /// The reflection model of every object; `None` is the level's own.
     pub reflection: Option<ReflectionModel>,
-    /// Whether baked light is shown.
+    /// Whether lightmaps and irradiance volumes are shown.
     pub lightmaps: bool,
-    /// Whether lights cast the shadows that they ask for.
+    /// Whether lights that ask for shadows cast them.
     pub shadows: bool,
-    /// Four samples per pixel.
+    /// Whether four samples per pixel are taken.
     pub multisample: bool,
     /// Whether the overlay is shown.
     pub overlay: bool,
-    /// Whether the overlay says how many lights are tested and contribute.
+    /// Whether the overlay counts the lights that are tested and that contribute.
     pub count_lights: bool,
 }
 
@@ -40,14 +40,14 @@ impl Default for ViewSettings {
 }
 
 impl ViewSettings {
-    /// As a level asks for it, where it does.
+    /// Returns the defaults, with the choices that the level itself makes.
     pub fn of(world: &World) -> Self {
         let asked = world.get_resource::<SceneSettings>().and_then(|settings| settings.frame.multisample);
         let usual = Self::default();
         Self { multisample: asked.unwrap_or(usual.multisample), ..usual }
     }
 
-    /// Carries out an action; false if it is none of the view's.
+    /// Carries out an action; returns false if it does not concern these settings.
     pub fn apply(&mut self, action: Action) -> bool {
         match action {
             Action::ShadeFlat => self.shading = Some(Shading::Flat),
@@ -76,7 +76,7 @@ impl ViewSettings {
     }
 }
 
-/// The choice after this one; the level's own comes before the first and after the last.
+/// Returns the choice after this one. The level's own (`None`) comes after the last and before the first.
 fn next<T: Copy + PartialEq>(choice: Option<T>, all: &[T]) -> Option<T> {
     match choice {
         None => all.first().copied(),

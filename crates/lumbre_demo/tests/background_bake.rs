@@ -1,4 +1,5 @@
-//! A bake beside the frames: light comes in steps, lands on the surfaces it was made for, can be cancelled and saved.
+//! The background bake: its light arrives in passes, is assigned to the right surfaces, and can be cancelled
+//! and saved.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -16,7 +17,8 @@ use lumbre_scene::{
     load, save,
 };
 
-/// A red and a blue block far apart under a panel each, a block that moves, and a node without a mesh before them.
+/// A red and a blue block far apart, each under a panel, a block that moves, and in front of them a node
+/// without a mesh.
 fn scene(folder: &Path) -> PathBuf {
     let mut world = World::new();
     world.spawn((Name::new("empty"), Transform::IDENTITY));
@@ -35,12 +37,12 @@ fn scene(folder: &Path) -> PathBuf {
     path
 }
 
-/// Small maps: the steps are looked at, and not the light.
+/// Small maps: the passes are tested, and not the quality of the light.
 fn wanted() -> BakeOptions {
     BakeOptions { density: Density::MapSize(32), error: 0.02, ..BakeOptions::default() }
 }
 
-/// Everything that a bake tells, until it is done.
+/// Collects all events until nothing is running any more.
 fn all_news(bake: &mut BackgroundBake) -> Vec<BakeNews> {
     let begun = Instant::now();
     let mut news = Vec::new();
@@ -55,7 +57,7 @@ fn all_news(bake: &mut BackgroundBake) -> Vec<BakeNews> {
     }
 }
 
-/// The mean of the lightmap of a node's first primitive.
+/// Returns the mean of the lightmap of a node's first primitive, if it has one.
 fn mean_light(world: &mut World, name: &str) -> Option<Vec3> {
     let mut meshes = world.query_filtered::<(&ChildOf, Option<&Lightmap>), With<Mesh>>();
     let found: Vec<_> =
@@ -94,7 +96,7 @@ fn light_comes_in_steps_and_lands_where_it_belongs() {
         let (red, blue) = (mean_light(world, "red").unwrap(), mean_light(world, "blue").unwrap());
         assert!(red.x > 0.01 && red.x > 50.0 * red.z, "{}: {red}", light.pass);
         assert!(blue.z > 0.01 && blue.z > 50.0 * blue.x, "{}: {blue}", light.pass);
-        // What moves has its own, and no more of it than the last.
+        // A moving object has no lightmap but an irradiance volume, which replaces that of the previous pass.
         assert_eq!(mean_light(world, "moves"), None);
         let mut volumes = world.query::<(&IrradianceVolume, &Name)>();
         let (volume, name) = volumes.single(world).unwrap();
@@ -109,7 +111,7 @@ fn light_comes_in_steps_and_lands_where_it_belongs() {
     }
     assert!(sides[0] < sides[1] && sides[1] < sides[2], "each step has finer maps: {sides:?}");
 
-    // What is saved has the last light.
+    // The saved file has the light of the last pass.
     assert!(bake.can_be_saved());
     bake.save(&place);
     let news = all_news(&mut bake);
@@ -120,7 +122,7 @@ fn light_comes_in_steps_and_lands_where_it_belongs() {
     assert!((shown - kept).length() < 1e-6 * shown.length(), "{shown} was shown, {kept} is in the file");
     assert!(bake.can_be_saved(), "it can be saved again");
 
-    // A folder that is gone is named, and the bake is not lost.
+    // An error for a missing folder names the file, and the bake can still be saved.
     bake.save(&folder.path().join("no/such/folder/out.glb"));
     let news = all_news(&mut bake);
     let said = match &news[..] {
@@ -169,7 +171,8 @@ fn what_does_not_shine_is_baked_under_a_sky() {
     let Some(BakeNews::Light(light)) = news.last() else { panic!("{news:?}") };
     assert!(light.under_a_sky);
     light.apply(&mut opened.game.world, &opened.nodes);
-    // A convex body under an even sky of radiance 1 gets E/π = 1 everywhere; texels outside of its charts are 0.
+    // A convex body under a uniform sky of radiance 1 receives E/π = 1 everywhere; texels outside its charts
+    // are 0.
     let mut maps = opened.game.world.query::<&Lightmap>();
     let brightest = maps.iter(&opened.game.world).flat_map(|map| map.image.texels.iter().copied());
     let brightest = brightest.fold(Vec3::ZERO, Vec3::max);

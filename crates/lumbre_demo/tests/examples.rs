@@ -1,4 +1,4 @@
-//! The generator's program writes the level that is shipped.
+//! The example `generate_level` writes the level in `assets`.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use std::process::Command;
 fn generate_level_writes_the_shipped_level() {
     let folder = tempfile::tempdir().unwrap();
     let written = folder.path().join("demo.glb");
-    // Cargo builds examples beside the tests.
+    // Cargo puts the examples in a folder beside that of the tests.
     let mut example = std::env::current_exe().unwrap();
     example.pop();
     example.set_file_name("examples");

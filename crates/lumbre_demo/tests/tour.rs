@@ -1,4 +1,4 @@
-//! The tour renders headless, and its pictures show something.
+//! The tour renders without a display, and its pictures show lit rooms.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ fn the_tour_shows_different_lit_rooms() {
             image.pixels().map(|p| p.0.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let spread = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
-        // Even unbaked nothing is all black or burnt out, and no picture is of one colour.
+        // Even unbaked, no picture is black, overexposed or of a single colour.
         assert!((5.0..235.0).contains(&mean), "{path:?}: mean {mean}");
         assert!(spread > 4.0, "{path:?}: spread {spread}");
         means.push(mean);

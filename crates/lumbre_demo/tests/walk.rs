@@ -1,4 +1,4 @@
-//! Recorded input walks through the level: into the next room, not into a wall.
+//! Recorded input walks through the level: into the next room, and not into a wall.
 
 use std::path::Path;
 use std::time::Duration;
@@ -23,7 +23,7 @@ fn walk(name: &str) -> Recording {
 fn is_in(room: &str, point: DVec3) -> bool {
     let Room { bounds, .. } =
         level::rooms().into_iter().find(|one| one.name == room).expect("a room of the level");
-    // The waist: feet are on the border of the room, to within a rounding.
+    // At the height of the waist: the feet are on the border of the room, to within rounding.
     let point = point + DVec3::Y;
     bounds.min.cmple(point).all() && point.cmple(bounds.max).all()
 }
@@ -54,7 +54,7 @@ fn a_recorded_walk_takes_the_round_through_all_rooms() {
             rooms.push(room);
         }
     }
-    // Down the back stairs to the vault, up the others, and out by the corridor.
+    // Down the stairs from the gallery to the vault, up the other stairs, and out into the corridor.
     assert_eq!(rooms, ["hall", "corridor", "gallery", "vault", "corridor"]);
     assert!(game.player().body.on_ground);
 }
@@ -64,11 +64,11 @@ fn walking_straight_at_a_wall_stops_at_the_radius() {
     let mut game = game();
     let turn =
         |game: &Game, yaw: f64| Input { look: DVec2::new(game.player().yaw - yaw, 0.0), ..Input::default() };
-    // South, away from everything: the teal wall is at z = 10.
+    // Towards +z, where nothing is in the way: the teal wall is at z = 10.
     let south = turn(&game, std::f64::consts::PI);
     game.step_once(&Input { forward: true, ..south });
     let forward = Input { forward: true, run: true, ..Input::default() };
-    // Beside the door's niche, which is 0.3 m deeper.
+    // To the side of the door's niche, which is 0.3 m deeper.
     game.step_once(&Input { left: false, right: true, ..Input::default() });
     for _ in 0..100 {
         game.step_once(&Input { right: true, ..Input::default() });
@@ -84,7 +84,8 @@ fn walking_straight_at_a_wall_stops_at_the_radius() {
 
 #[test]
 fn the_same_walk_without_its_turns_ends_in_the_hall() {
-    // The negative control of the first test: who does not turn into the doorway stops at a wall of the hall.
+    // Negative control of the first test: without the turn into the doorway, a wall of the hall stops the
+    // walk.
     let mut recording = walk("hall_to_corridor.json");
     for event in &mut recording.events {
         event.input.look = DVec2::ZERO;
@@ -100,7 +101,7 @@ fn what_is_recorded_at_any_frame_rate_is_replayed_exactly() {
     live.record();
     let forward = Input { forward: true, ..Input::default() };
     for frame in 0..300u32 {
-        // Frames of 1 to 40 ms, turning all the while.
+        // Frames of 1 to 40 ms, with a turn in each.
         let length = Duration::from_micros(u64::from(1000 + frame * 7919 % 39_000));
         let look = DVec2::new(0.01 * f64::from(frame % 7), -0.002 * f64::from(frame % 3));
         if frame == 100 {

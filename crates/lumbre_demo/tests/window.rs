@@ -1,7 +1,9 @@
-//! A level and other files in a window of a virtual X server: pictures with the overlay, a change of size, a lost device, recorded input,
-//! turning, files that are dropped (by the event loop, and by another program over X11), a bake beside the frames, an exposure that adapts.
+//! A level and other files in a window of a virtual X server: pictures with the overlay, resizing, a lost
+//! device, recorded input, orbiting, dropped files (simulated in the event loop, and by another program over
+//! X11), background bakes, and an adapting exposure.
 //!
-//! A window needs the main thread and an event loop of its own, so every scenario is a process: this program starts itself.
+//! A window needs the main thread and an event loop of its own, so every scenario is a process: this program
+//! starts itself.
 
 mod drag_and_drop;
 
@@ -20,24 +22,24 @@ use lumbre_scene::{
     Camera, DynamicObject, Mesh, Name, SceneSettings, StaticObject, Transform, save, update_transforms,
 };
 
-/// Says to a child process which scenario it is.
+/// Environment variable that tells a child process its scenario.
 const SCENARIO: &str = "LUMBRE_WINDOW_SCENARIO";
-/// Says to a child process where its picture goes.
+/// Environment variable that tells a child process where to write its picture.
 const PICTURE: &str = "LUMBRE_WINDOW_PICTURE";
-/// A folder to keep the pictures in, for looking at.
+/// Environment variable with a folder in which the pictures are kept.
 const KEEP: &str = "LUMBRE_WINDOW_KEEP";
 const SIZE: (u32, u32) = (640, 400);
-/// Of a window with two pictures side by side, and a panel over a part of the right one.
+/// Size of a window with two pictures side by side, and a panel over a part of the right one.
 const SIZE_OF_TWO: (u32, u32) = (1000, 600);
 
-/// The scenario in which this program drops the file itself, on the window of the other process.
+/// The scenario in which this process drops the file on the child's window.
 const DROPPED_OVER_X11: &str = "dropped over X11";
-/// Frames that a window waits for that file.
+/// Number of frames that the child waits for that file.
 const FRAMES_FOR_A_DROP: u32 = 200;
 
-/// Looks at a scenario's picture.
+/// Checks the picture of a scenario.
 type Judge = fn(&Path);
-/// Every scenario by name, and how its picture is judged.
+/// Every scenario by name, with the check of its picture.
 const SCENARIOS: [(&str, Judge); 20] = [
     ("overlay", picture_with_overlay),
     ("no overlay", picture_without_overlay),
@@ -80,14 +82,14 @@ fn main() {
             .env(SCENARIO, scenario)
             .env(PICTURE, &picture)
             .env("DISPLAY", &server.display)
-            // Mesa complains without one.
+            // Mesa warns without it.
             .env("XDG_RUNTIME_DIR", folder.path())
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("WAYLAND_SOCKET")
             .spawn()
             .expect("this program starts");
         if scenario == DROPPED_OVER_X11 {
-            // Addresses write blanks and letters beyond ASCII in another way than paths.
+            // URIs encode blanks and non-ASCII letters differently from paths.
             let dropped = folder.path().join("a box, größer.glb");
             write_box(&dropped);
             drag_and_drop::drop_file(&server.display, &dropped).expect("the window takes the file");
@@ -210,7 +212,7 @@ fn play(scenario: &str, picture: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A box whose front is red and whose right side is green, without a light, and a camera that sees it from far above.
+/// A box with a red front and a green right side, without a light, and a camera that sees it from far above.
 fn write_box(path: &Path) {
     let mut world = World::new();
     let matt = |color| Material { double_sided: false, ..Material::matt(color) };
@@ -224,7 +226,7 @@ fn write_box(path: &Path) {
     save(&mut world, path).expect("the folder takes it");
 }
 
-/// A room with an open front, lit by a panel that shines in a bake only, and one thing in it that moves.
+/// A room with an open front, lit only by an emissive panel that needs a bake, and with one moving object.
 fn write_room(path: &Path) {
     let mut world = World::new();
     let grey = || Material { double_sided: true, ..Material::matt(Vec3::splat(0.6)) };
@@ -244,13 +246,13 @@ fn write_room(path: &Path) {
     world.spawn((Name::new("panel"), panel));
     let ball = (Mesh(cuboid(Vec3::splat(0.4), 1).into()), grey(), DynamicObject);
     world.spawn((Name::new("moves"), ball, Transform::from_xyz(1.2, 0.4, 0.5)));
-    // So weak that a frame is all but black, and no light from the camera stands in.
+    // So weak that the frame is nearly black, but enough that no default light is added.
     let weak = Light { bake: lumbre_optics::BakeMode::Dynamic, ..Light::point(Vec3::splat(1e-3)) };
     world.spawn((Name::new("weak"), weak, Transform::from_xyz(0.0, 1.5, 1.0)));
     save(&mut world, path).expect("the folder takes it");
 }
 
-/// A white floor under a sun in lux: as it stands, all white.
+/// A white wall under a sun in lux, which is overexposed without metering.
 fn write_bright(path: &Path) {
     let mut world = World::new();
     let floor = (Mesh(cuboid(Vec3::new(4.0, 4.0, 0.1), 1).into()), Material::matt(Vec3::splat(0.5)));
@@ -259,13 +261,14 @@ fn write_bright(path: &Path) {
     save(&mut world, path).expect("the folder takes it");
     let text = std::fs::read_to_string(path).expect("a .gltf is text");
     let mut json: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
-    // As other programs write it: lux, and nothing of ours.
+    // As other programs write it: in lux, and without extensions of this project.
     json["extensions"]["KHR_lights_punctual"]["lights"][0] =
         serde_json::json!({"type": "directional", "intensity": 50_000.0});
     std::fs::write(path, json.to_string()).expect("the folder takes it");
 }
 
-/// A wall of two triangles under a lamp before its middle, shaded at its vertices: dark, where every fragment would have it bright.
+/// A wall of two triangles with a lamp in front of its centre, under Gouraud shading: dark, where Phong
+/// shading would make it bright.
 fn write_coarse_wall(path: &Path) {
     let mut world = World::new();
     world.insert_resource(SceneSettings { shading: Shading::Gouraud, ..SceneSettings::default() });
@@ -283,13 +286,13 @@ fn open(path: &Path) -> image::RgbImage {
     image::open(path).expect("a picture").to_rgb8()
 }
 
-/// Light texels on the dark panel in the upper left, where the overlay writes.
+/// Counts bright pixels on the dark panel in the upper left, where the overlay has its text.
 fn letters(picture: &image::RgbImage) -> usize {
     let corner = picture.enumerate_pixels().filter(|(x, y, _)| *x < 330 && *y < 250);
     corner.filter(|(_, _, p)| p.0.iter().all(|&c| c > 120) && p.0.iter().max() == p.0.iter().min()).count()
 }
 
-/// The part of a picture that no overlay covers is neither black nor of one colour.
+/// Checks that the part of a picture that no overlay covers is neither black nor of one colour.
 fn shows_the_level(picture: &image::RgbImage) {
     let right: Vec<u8> = picture
         .enumerate_pixels()
@@ -304,7 +307,7 @@ fn picture_with_overlay(path: &Path) {
     let picture = open(path);
     assert_eq!(picture.dimensions(), SIZE);
     shows_the_level(&picture);
-    // A few hundred letters of some twenty grey texels each.
+    // A few hundred letters of some twenty grey pixels each.
     assert!(letters(&picture) > 1000, "{} texels of letters", letters(&picture));
 }
 
@@ -319,7 +322,7 @@ fn picture_of_other_size(path: &Path) {
     assert_eq!(picture.dimensions(), (420, 300));
 }
 
-/// Mean colour of the middle of a picture, 0 to 255.
+/// Returns the mean colour of the centre of a picture, 0 to 255.
 fn middle(path: &Path) -> [f64; 3] {
     let picture = open(path);
     assert_eq!(picture.dimensions(), SIZE);
@@ -331,14 +334,15 @@ fn middle(path: &Path) -> [f64; 3] {
     [0, 1, 2].map(|c| pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / pixels.len() as f64)
 }
 
-/// The share of pixels that show something.
+/// Returns the fraction of pixels that are not black.
 fn shown(path: &Path) -> f64 {
     let picture = open(path);
     let lit = picture.pixels().filter(|p| p.0.iter().any(|&c| c > 12)).count();
     lit as f64 / f64::from(SIZE.0 * SIZE.1)
 }
 
-/// It has no light, so that one from the camera shows it; it fills the window's height.
+/// The file has no light, so the default light from the camera shows the box, which fills the window's
+/// height.
 fn picture_of_the_red_box(path: &Path) {
     let [red, green, _] = middle(path);
     assert!(red > 100.0 && green < 0.4 * red, "{red} {green}");
@@ -358,13 +362,13 @@ fn picture_from_its_camera(path: &Path) {
     assert!(part > 1e-3 && part < 0.05, "{part} of the window shows it");
 }
 
-/// The old file stands, and the reason is written over the foot of the window.
+/// The previous file stays, and the error is shown at the foot of the window.
 fn picture_of_the_red_box_and_an_error(path: &Path) {
     let [red, green, _] = middle(path);
     assert!(red > 100.0 && green < 0.4 * red, "{red} {green}");
     let picture = open(path);
     let foot = picture.enumerate_pixels().filter(|(_, y, _)| *y > SIZE.1 - 80);
-    // The colour of errors, where letters are covered by it in full.
+    // Pixels in the colour of errors that a letter covers fully.
     let letters =
         foot.filter(|(_, _, p)| p.0[0] > 200 && p.0[1].abs_diff(p.0[2]) < 40 && p.0[1] > 80).count();
     assert!(letters > 100, "{letters} texels of letters");
@@ -381,7 +385,7 @@ fn picture_with_baked_light(path: &Path) {
     assert!(picture[0] > picture[2] + 5.0, "the panel is warm: {picture:?}");
 }
 
-/// Red under white, by its own lightmap and no longer by lights at the camera: evenly.
+/// Red under a white sky, evenly lit by its lightmap and no longer by lights at the camera.
 fn picture_under_a_sky(path: &Path) {
     let [red, green, blue] = middle(path);
     assert!(red > 100.0 && green < 0.4 * red && blue < 0.4 * red, "{red} {green} {blue}");
@@ -391,13 +395,14 @@ fn picture_under_a_sky(path: &Path) {
     assert!((left - right).abs() < 4.0, "{left} and {right}: no light comes from the left any more");
 }
 
-/// A middle grey, tone curve and all.
+/// Middle grey, after the tone curve.
 fn picture_with_an_exposure(path: &Path) {
     let picture = middle(path);
     assert!(picture.iter().all(|&channel| (90.0..150.0).contains(&channel)), "{picture:?}");
 }
 
-/// Mean brightness left and right of the middle of a window with two pictures, 0 to 255, where no panel lies.
+/// Returns the mean brightness left and right of the centre of a window with two pictures, 0 to 255, where no
+/// panel is.
 fn left_and_right(path: &Path) -> [f64; 2] {
     let picture = open(path);
     assert_eq!(picture.dimensions(), SIZE_OF_TWO);
@@ -413,19 +418,19 @@ fn left_and_right(path: &Path) -> [f64; 2] {
     })
 }
 
-/// The frame on the left, and what it should be on the right.
+/// The frame on the left is dark, and the reference on the right is bright.
 fn picture_of_the_dark_and_the_bright_wall(path: &Path) {
     let [frame, reference] = left_and_right(path);
     assert!(frame < 90.0 && reference > 140.0, "{frame} and {reference}");
 }
 
-/// The better settings, as they were measured, are those of the reference.
+/// The better settings, as measured, look like the reference.
 fn picture_of_two_bright_walls(path: &Path) {
     let [frame, reference] = left_and_right(path);
     assert!(frame > 140.0 && (frame - reference).abs() < 4.0, "{frame} and {reference}");
 }
 
-/// A virtual X server that ends with this value.
+/// A virtual X server, which ends when this value is dropped.
 struct Server {
     process: Child,
     display: String,
@@ -433,7 +438,7 @@ struct Server {
 
 impl Server {
     fn start() -> Option<Self> {
-        // It chooses a free display itself and writes its number.
+        // Xvfb chooses a free display itself and writes its number.
         let mut process = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"])
             .stdout(Stdio::piped())
@@ -452,7 +457,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may already have ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

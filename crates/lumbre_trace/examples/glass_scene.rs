@@ -1,4 +1,5 @@
-//! Writes a small scene of mirrors, glass and exact surfaces, to be traced: `cargo run -p lumbre_trace --example glass_scene -- glass.glb`.
+//! Writes a small scene of mirrors, glass and exact surfaces to be traced: `cargo run -p lumbre_trace
+//! --example glass_scene -- glass.glb`.
 
 use std::sync::Arc;
 
@@ -17,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         sky: Vec3::new(0.25, 0.4, 0.65),
         ..SceneSettings::default()
     });
-    // A floor of two colours, square by square.
+    // A chequered floor: one mesh for the squares of each colour.
     for (parity, color) in [(0, Vec3::splat(0.75)), (1, Vec3::new(0.2, 0.25, 0.3))] {
         let name = Name::new(format!("floor {parity}"));
         world.spawn((name, Mesh(Arc::new(chequers(parity))), Material::matt(color)));
@@ -54,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let place = Transform::from_xyz(-0.4, 0.6, -1.2);
     let mesh = Mesh(Arc::new(shapes::cylinder(0.35, 1.2, 48)));
     world.spawn((Name::new("cylinder"), mesh, cylinder, shiny(Vec3::new(0.9, 0.7, 0.2), 60.0), place));
-    // A mirror on the wall behind, and a sheet of tinted glass at the side.
+    // A mirror at the back, and a sheet of tinted glass at the side.
     let mirror = Material { mirror: Vec3::splat(0.9), ..Material::matt(Vec3::ZERO) };
     let place = Transform::from_xyz(0.0, 1.6, -3.0).with_rotation(DQuat::from_rotation_x(1.5));
     world.spawn((Name::new("mirror"), Mesh(Arc::new(shapes::plane(5.0, 3.0, 1, 1))), mirror, place));
@@ -77,7 +78,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Every other square of a floor of 16 metres.
+/// Returns every other square of a floor 16 metres wide.
 fn chequers(parity: i32) -> lumbre_mesh::TriangleMesh {
     let mut mesh = lumbre_mesh::TriangleMesh::default();
     for row in -8..8 {

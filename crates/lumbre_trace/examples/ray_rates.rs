@@ -1,5 +1,5 @@
-//! How fast the tracer finds the rays of a picture, beside the bare hierarchy: `cargo run --release -p lumbre_trace --example ray_rates -- FILE
-//! [CAMERA]`.
+//! Measures how fast the tracer finds the rays of a picture, compared with the bare triangle hierarchy:
+//! `cargo run --release -p lumbre_trace --example ray_rates -- FILE [CAMERA]`.
 
 #![allow(clippy::print_stdout, reason = "the rates are what it is for")]
 
@@ -10,7 +10,7 @@ use bevy_ecs::world::World;
 use lumbre_scene::{Camera, Name, load};
 use lumbre_trace::{RayRate, TraceOptions, Tracer};
 
-/// Both take turns so often.
+/// Number of rounds; each times both.
 const ROUNDS: usize = 9;
 
 fn main() -> ExitCode {

@@ -1,45 +1,50 @@
-//! Auxiliary pictures ("arbitrary output variables", AOVs) beside the picture itself: what is seen first, light by how it came and by whose it
-//! is, what a pixel cost. Which there are and what they are called. Not how light falls to them, nor the files that they are written to.
+//! Auxiliary pictures beside the main one ("arbitrary output variables", AOVs): the first visible surface,
+//! light by its path and by its source, and cost per pixel. This module defines them and their names; which
+//! light belongs to each is in `light_aovs`, and no files are written here.
 
 use std::fmt;
 
 use glam::DVec3;
 
-/// An auxiliary picture that can be asked for.
+/// An auxiliary picture that can be requested.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Aov {
-    /// Diffuse colour k_d O_d of the first surface, linear RGB; 0 where the background is.
+    /// Diffuse colour k_d O_d of the first surface, linear RGB, averaged over a pixel's samples; 0 where the
+    /// background is visible.
     Albedo,
-    /// Unit normal in the world of the first surface, as it is lit: towards the eye unless the scene says otherwise; averaged over a pixel's
-    /// samples. 0 where the background is.
+    /// Unit shading normal of the first surface in world space, towards the eye unless the scene's two-sided
+    /// rule says otherwise, averaged over a pixel's samples; 0 where the background is visible.
     Normal,
-    /// Metres along the line of sight to the first surface through the pixel's middle; infinite where the background is.
+    /// Distance in metres along the camera's viewing axis to the first surface through the pixel's centre;
+    /// infinite where the background is visible.
     Depth,
-    /// How many rays the pixel took, shadow rays too.
+    /// Number of rays that the pixel took, shadow rays included.
     Rays,
-    /// Light that one surface at most has turned on its way to the eye, or all other light.
+    /// Direct light, or all other light.
     Light(LightPart),
-    /// The light of one source in the whole picture, or its direct or indirect part: of all lights and shining objects of that name
-    /// together, or of `background`, `ambient` or `baked` light. Over all sources each part sums up to the picture's.
+    /// The light of one source, or its direct or indirect part. A source is all lights and emissive objects
+    /// of one name together, or one of `background`, `ambient` and `baked`. Summed over all sources, each
+    /// part gives that part of the picture.
     Source {
-        /// What the source is called.
+        /// The name of the source.
         name: String,
-        /// Which part; without it both.
+        /// Which part; `None` means both.
         part: Option<LightPart>,
     },
-    /// One such picture for each source that there is.
+    /// One picture of [`Source`](Self::Source) for each source of the scene.
     EverySource {
-        /// Which part; without it both.
+        /// Which part; `None` means both.
         part: Option<LightPart>,
     },
 }
 
-/// Light by how it came.
+/// Light classified by its path to the eye.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LightPart {
-    /// What shines itself, and what one surface reflects or refracts of it.
+    /// Emission that is seen directly, and light that one surface has reflected or refracted.
     Direct,
-    /// What more than one surface has turned, and what stands for that: ambient light, lightmaps, irradiance volumes.
+    /// Light that more than one surface has reflected or refracted, and what stands for it: ambient light,
+    /// lightmaps and irradiance volumes.
     Indirect,
 }
 
@@ -56,12 +61,13 @@ impl LightPart {
     }
 }
 
-/// In place of a name: each.
+/// Stands for the names of all sources.
 const EACH: &str = "*";
 
 impl Aov {
-    /// The picture with that name, if there is one: `albedo`, `normal`, `depth`, `rays`, `direct`, `indirect` (or `bounced`), `light:NAME`,
-    /// `direct:NAME`, `indirect:NAME`, and `*` as NAME for each.
+    /// Returns the picture with that name, or `None` if there is none: `albedo`, `normal`, `depth`, `rays`,
+    /// `direct`, `indirect` (or `bounced`), `light:NAME`, `direct:NAME`, `indirect:NAME`, where `*` as NAME
+    /// means every source.
     pub fn from_name(name: &str) -> Option<Self> {
         let (kind, source) = name.split_once(':').map_or((name, None), |(kind, source)| (kind, Some(source)));
         let part = match kind {
@@ -84,7 +90,7 @@ impl Aov {
         }
     }
 
-    /// Whether it is what is seen first.
+    /// Returns true for a property of the first visible surface.
     pub(crate) fn is_first_hit(&self) -> bool {
         matches!(self, Self::Albedo | Self::Normal | Self::Depth)
     }
@@ -108,7 +114,7 @@ impl fmt::Display for Aov {
 /// An auxiliary picture, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AovPicture {
-    /// Which.
+    /// What it shows.
     pub aov: Aov,
     /// Its pixels.
     pub values: AovValues,
@@ -117,9 +123,9 @@ pub struct AovPicture {
 /// Pixels of an auxiliary picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AovValues {
-    /// Linear RGB: radiance in W/(m² sr), or a share of what falls in.
+    /// Linear RGB: radiance in W/(m² sr), or an albedo.
     Colors(Vec<DVec3>),
-    /// Directions in the world.
+    /// Directions in world space.
     Directions(Vec<DVec3>),
     /// Metres, or counts.
     Numbers(Vec<f64>),

@@ -1,4 +1,5 @@
-//! A ray tree as data: each branch with its point, its medium, its weight and the terms of its sum. Not how it grows, nor how it is shown.
+//! A recorded ray tree: every ray with the point where it ends, its medium, its weight and the terms of its
+//! light. Built by `ray_tree`, drawn by `branch_drawing`.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -15,16 +16,16 @@ use crate::surface_point::SurfacePoint;
 pub enum Kind {
     /// It comes from the eye.
     Camera,
-    /// A surface mirrors it.
+    /// It was reflected by a mirror.
     Mirrored,
-    /// It goes through a surface.
+    /// It was transmitted through a surface.
     Transmitted,
-    /// It sees what a surface covers in part only.
+    /// It goes on behind a surface that covers its background only in part.
     Behind,
 }
 
 impl Kind {
-    /// The word for it.
+    /// The name used in drawings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -35,85 +36,85 @@ impl Kind {
     }
 }
 
-/// One ray of a tree, with what it met.
+/// One ray of a tree, and what it hit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Branch {
     /// Why it was traced.
     pub kind: Kind,
-    /// Where it starts, in the world, metres.
+    /// Starting point in the world, metres.
     pub origin: DVec3,
-    /// Unit.
+    /// Unit vector.
     pub direction: DVec3,
-    /// What its radiance counts for in the pixel, linear RGB.
+    /// Weight of its radiance in the pixel, linear RGB.
     pub weight: DVec3,
-    /// What its radiance counts for at the point where it starts: k_r, k_t, or what coverage leaves.
+    /// Factor on its radiance at the point where it starts: k_r, k_t, or 1 - coverage.
     pub factor: DVec3,
-    /// The limits of depth, weight or number of rays ended it before it was traced.
+    /// Whether the limits of depth, weight or number of rays ended it before it was traced.
     pub cut: bool,
-    /// What it met; nothing for the background.
+    /// Where it ends; `None` for the background and for rays that were cut off.
     pub point: Option<BranchPoint>,
-    /// The light of the lamps there, term by term.
+    /// The light at that point, term by term; `None` for the background and for unlit surfaces.
     pub light: Option<BranchLight>,
-    /// What it brought, linear RGB, W/(m² sr).
+    /// The radiance that it returned, linear RGB, W/(m² sr).
     pub radiance: DVec3,
     /// The rays that start where it ends.
     pub branches: Vec<Branch>,
 }
 
-/// Where a ray ends.
+/// The point where a ray ends.
 #[derive(Clone, Debug, Serialize)]
 pub struct BranchPoint {
-    /// What people call the object.
+    /// The name of the object.
     pub object: String,
-    /// In the world, metres.
+    /// Position in the world, metres.
     pub position: DVec3,
-    /// Unit normal that is lit.
+    /// Unit shading normal.
     pub normal: DVec3,
     /// Metres along the ray.
     pub distance: f64,
-    /// The ray meets the front.
+    /// Whether the ray hits the front of the surface.
     pub front: bool,
-    /// What the ray runs through: the innermost solid, or air.
+    /// The medium that the ray runs through: the name of the innermost solid, or `air`.
     pub medium: String,
-    /// Its index of refraction.
+    /// Index of refraction of the medium.
     pub index: f64,
-    /// What it leaves of the light.
+    /// Transmittance of the medium along the ray.
     pub transmittance: DVec3,
 }
 
-/// The terms of the sum at a point, linear RGB.
+/// The terms of the lighting equation at a point, linear RGB.
 #[derive(Clone, Debug, Serialize)]
 pub struct BranchLight {
     /// k_a (I_a + Σ L_a).
     pub ambient: DVec3,
     /// Σ S_i f_att k_d L_d (n·l).
     pub diffuse: DVec3,
-    /// Σ S_i f_att k_s L_s and the model's factor.
+    /// Σ S_i f_att k_s L_s times the reflection model's factor.
     pub specular: DVec3,
     /// Σ S_i f_att k_t L_s (t·v)ⁿ.
     pub transmitted: DVec3,
     /// k_d E/π of the lightmap.
     pub baked: DVec3,
-    /// What the surface sends by itself.
+    /// Emission of the surface.
     pub emission: DVec3,
-    /// Of every light that adds something.
+    /// The contribution of every light that adds something.
     pub lights: Vec<BranchLamp>,
 }
 
-/// What one light adds.
+/// The contribution of one light.
 #[derive(Clone, Debug, Serialize)]
 pub struct BranchLamp {
-    /// What people call it.
+    /// The name of the light.
     pub light: String,
-    /// S_i: what the shadow ray found, per channel.
+    /// S_i: the visibility that the shadow rays found, per channel.
     pub visibility: DVec3,
-    /// Its part of the ambient term.
+    /// Its ambient term.
     pub ambient: DVec3,
-    /// Its part of the diffuse term.
+    /// Its diffuse term.
     pub diffuse: DVec3,
-    /// Its part of the specular term.
+    /// Its specular term.
     pub specular: DVec3,
-    /// Its part of the transmitted highlight.
+    /// Its transmitted highlight.
     pub transmitted: DVec3,
 }
 
@@ -185,7 +186,8 @@ impl Branch {
     }
 
     pub(crate) fn cuts(&mut self, kind: Kind, ray: &SpaceRay, weight: DVec3, factor: DVec3) {
-        // The world's origin does not matter to a ray that was not traced, but to whoever draws it.
+        // The ray was never traced, and was not moved to the world's origin; for drawings it starts at the
+        // point.
         let origin = self.point.as_ref().map_or(ray.origin, |point| point.position);
         let cut = Self { cut: true, ..Self::new(kind, ray, DVec3::ZERO, weight, factor) };
         self.branches.push(Self { origin, ..cut });

@@ -1,5 +1,5 @@
-//! A ray tree for people and programs: as indented text, as JSON, for Graphviz, and as a drawing of its rays from above and from the side.
-//! Not the tree itself.
+//! Output of a recorded ray tree: as indented text, as JSON, as a Graphviz graph, and as an SVG drawing of
+//! the rays from above and from the side. The tree itself is in `branch`.
 
 use std::fmt::Write;
 
@@ -7,24 +7,24 @@ use glam::{DVec2, DVec3};
 
 use crate::branch::{Branch, Kind};
 
-/// How a tree is written.
+/// An output format of a ray tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TreeFormat {
-    /// A line for each ray, and one for each term.
+    /// One line for each ray and for each of its terms.
     Text,
-    /// All of it.
+    /// All data of the tree as JSON.
     Json,
-    /// A graph for Graphviz.
+    /// A graph in Graphviz's language.
     Dot,
-    /// The rays where they run, from above and from the side.
+    /// An SVG drawing of the rays in space, from above and from the side.
     Svg,
 }
 
 impl TreeFormat {
-    /// All.
+    /// All formats.
     pub const ALL: &'static [Self] = &[Self::Text, Self::Json, Self::Dot, Self::Svg];
 
-    /// The name used on the command line.
+    /// Returns the name used on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Text => "text",
@@ -34,26 +34,26 @@ impl TreeFormat {
         }
     }
 
-    /// The choice with that name, if there is one.
+    /// Returns the format with that name on the command line, or `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|choice| choice.name() == name)
     }
 }
 
-/// The tree in a format, with a line's end at its end.
+/// Returns the tree in a format, with a newline at its end.
 pub fn draw_tree(tree: &Branch, format: TreeFormat) -> String {
     let mut out = String::new();
     let written = match format {
         TreeFormat::Text => text(&mut out, tree, 0),
         TreeFormat::Json => {
-            // Numbers, names and lists: nothing that JSON could not hold.
+            // The tree holds only numbers, names and lists, which JSON can always represent.
             out = serde_json::to_string_pretty(tree).unwrap_or_default() + "\n";
             Ok(())
         }
         TreeFormat::Dot => dot(&mut out, tree),
         TreeFormat::Svg => svg(&mut out, tree),
     };
-    // A String takes whatever is written to it.
+    // Writing to a String cannot fail.
     debug_assert!(written.is_ok());
     out
 }
@@ -165,11 +165,11 @@ fn escaped(name: &str) -> String {
     name.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', " ")
 }
 
-/// Side of a view in pixels.
+/// Width and height of a view in pixels.
 const SIDE: f64 = 480.0;
-/// Around a view.
+/// Margin around a view in pixels.
 const MARGIN: f64 = 24.0;
-/// Length of a ray that meets nothing, as a part of the drawing.
+/// Drawn length of a ray that hits nothing, as a fraction of the drawing.
 const OPEN_RAY: f64 = 0.15;
 
 fn svg(out: &mut String, tree: &Branch) -> std::fmt::Result {

@@ -1,4 +1,5 @@
-//! From a place on the picture to a ray, as the frame's camera projects. Not which places: that is `film`.
+//! Camera rays through points of the picture, with the same projection as a frame. Which points are sampled
+//! is decided in `film` and `view`.
 
 use bevy_ecs::prelude::*;
 use glam::{DMat3, DVec2, DVec3};
@@ -7,31 +8,32 @@ use lumbre_scene::{ActiveCamera, Camera, GlobalTransform, Projection};
 use crate::TraceError;
 use crate::geometry::SpaceRay;
 
-/// A camera in the world, for a picture of a size.
+/// A camera in the world, for a picture of a given size.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraRays {
-    /// In the world, metres.
+    /// Position in the world, metres.
     pub eye: DVec3,
-    /// Columns: right, up, backward.
+    /// Columns: right, up and backward, unit vectors in the world.
     pub basis: DMat3,
-    /// Factor on radiance.
+    /// The factor on radiance for display.
     pub exposure: f32,
     projection: Projection,
     size: DVec2,
-    /// In the tracer's space.
+    /// Position in the tracer's space, metres.
     origin: DVec3,
 }
 
-/// A ray of the camera, and how far along it the near and far planes are.
+/// A camera ray, which starts at the near plane, and the distance to the far plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraRay {
     pub ray: SpaceRay,
-    /// Metres along the ray up to the far plane; infinite without one.
+    /// Metres along the ray to the far plane of a parallel projection; infinite for a perspective one, which
+    /// has none.
     pub farthest: f64,
 }
 
 impl CameraRays {
-    /// The asked-for camera, else the active one, else the first.
+    /// Reads the camera `asked` for, or else the active one, or else the first.
     pub fn new(world: &mut World, asked: Option<Entity>, size: (u32, u32)) -> Result<Self, TraceError> {
         let entity = find(world, asked)?;
         let (Some(camera), Some(place)) = (world.get::<Camera>(entity), world.get::<GlobalTransform>(entity))
@@ -54,12 +56,13 @@ impl CameraRays {
         })
     }
 
-    /// The same, with another origin of the tracer's space.
+    /// Returns the same camera with another origin of the tracer's space.
     pub fn relative_to(self, origin: DVec3) -> Self {
         Self { origin: self.eye - origin, ..self }
     }
 
-    /// The ray through a place in pixels, (0, 0) the picture's upper left corner. It starts at the near plane, as a frame does.
+    /// Returns the ray through a point in pixels, where (0, 0) is the picture's upper left corner. It starts
+    /// at the near plane, as in a frame.
     pub fn through(&self, place: DVec2) -> CameraRay {
         let x = 2.0 * place.x / self.size.x - 1.0;
         let y = 1.0 - 2.0 * place.y / self.size.y;
@@ -81,17 +84,18 @@ impl CameraRays {
         }
     }
 
-    /// Metres along the line of sight from the eye to a point of the tracer's space: what the frame's fog counts.
+    /// Returns the distance in metres along the viewing axis from the eye to a point of the tracer's space,
+    /// which a frame's fog uses.
     pub fn depth(&self, point: DVec3) -> f64 {
         (self.origin - point).dot(self.basis.z_axis)
     }
 
-    /// Whether its rays start in different places.
+    /// Returns true for a parallel projection, whose rays start in different points.
     pub fn is_parallel(&self) -> bool {
         matches!(self.projection, Projection::Orthographic { .. })
     }
 
-    /// Where the eye is in the tracer's space.
+    /// Returns the eye's position in the tracer's space, metres.
     pub fn place(&self) -> DVec3 {
         self.origin
     }

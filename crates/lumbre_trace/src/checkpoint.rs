@@ -1,18 +1,21 @@
-//! What a path-traced picture has so far, as bytes, so that it goes on from there and ends with the same bits. Not the files that keep them.
+//! Serialization of a partly finished path-traced picture, so that a later run goes on from there and ends
+//! with the same bits. Reading and writing the files is left to the caller.
 //!
 //! ```text
 //!   magic      8 bytes   "LUMBRETR"
 //!   version    u32       VERSION; everything is little endian
 //!   identity  96 bytes   BLAKE3 of the program's version, of the scene, of the view and the options
-//!   checksum  32 bytes   BLAKE3 of all that follows
-//!   round      u32       rounds that are complete
-//!   shares     u8        whether samples are distributed by noise already
-//!   pixels               of each: sum, means and squares of its passes (3 f64 each), the brightest sample (f64), passes, samples, rays (u32)
-//!   light                of each auxiliary picture of light: of each pixel its sum (3 f64)
-//!   shares               f64 of each pixel, if there are any
+//!   checksum  32 bytes   BLAKE3 of everything after it
+//!   round      u32       number of complete rounds
+//!   shares     u8        1 if samples are already distributed by noise, else 0
+//!   pixels               for each pixel: sum, means and squares of its passes (3 f64 each),
+//!                        the brightest sample (f64), passes, samples, rays (u32 each)
+//!   light                for each auxiliary picture of light and each pixel: the sum (3 f64)
+//!   shares               for each pixel an f64, if samples are distributed by noise
 //! ```
 //!
-//! A pass of a pixel depends on the pixel and the pass alone, so that the passes of every pixel and the rounds are all the state there is.
+//! A pass of a pixel depends on the pixel and the number of the pass alone, so that the accumulated passes of
+//! every pixel and the number of rounds are all the state there is.
 
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -27,37 +30,39 @@ use crate::options::Ended;
 use crate::sample_distribution::SampleDistribution;
 use crate::view::View;
 
-/// A picture of paths between two passes, or within one.
+/// The state of a path-traced picture between two rounds, or within one.
 #[derive(Debug)]
 pub(crate) struct PathState {
-    /// Rounds that are complete; some pixels may have passes of the next.
+    /// Complete rounds; some pixels may already have their passes of the next one.
     pub round: u32,
     pub film: Film,
     pub distribution: Option<SampleDistribution>,
 }
 
-/// Takes the bytes of a checkpoint, to keep them somewhere.
+/// Receives the bytes of a checkpoint, to store them.
 pub type Keep<'a> = dyn Fn(&[u8]) + Sync + 'a;
 
-/// How a picture is continued: from what, and what becomes of its samples. Only paths are; a ray tree begins anew.
+/// How a picture goes on from an earlier run, and when its samples are kept for a later one. Applies to paths
+/// alone; a ray tree always starts from the beginning.
 #[derive(Clone, Copy, Default)]
 pub struct Continuation<'a> {
-    /// What an earlier run of the same picture has kept.
+    /// The checkpoint of an earlier run of the same picture.
     pub from: Option<&'a [u8]>,
-    /// Is given what the picture has: whenever `interval` is over, and where the picture was interrupted.
+    /// Is called with a checkpoint each time `interval` is over, and when the picture was interrupted.
     pub keep: Option<&'a Keep<'a>>,
-    /// Is given it where the picture ended as it was asked to, too, so that a later run can go on with more samples.
+    /// Whether `keep` is also called when the picture ends without an interruption, so that a later run can
+    /// go on with more samples.
     pub keep_complete: bool,
-    /// Time between two.
+    /// Least time between two checkpoints.
     pub interval: Duration,
 }
 
-/// Gives away what a picture has, and takes it back.
+/// Writes and reads the checkpoints of a picture.
 pub(crate) struct Keeper<'a> {
     view: &'a View,
     aovs: &'a LightAovs,
     continuation: Continuation<'a>,
-    /// Found when it is first needed: a scene with large textures takes a while.
+    /// Computed when it is first needed, since hashing a scene with large textures takes a while.
     identity: OnceLock<[Fingerprint; 3]>,
 }
 
@@ -66,16 +71,16 @@ impl<'a> Keeper<'a> {
         Self { view, aovs, continuation: *continuation, identity: OnceLock::new() }
     }
 
-    /// What an earlier run has kept.
+    /// Reads the checkpoint of the earlier run, if there is one.
     ///
     /// # Errors
-    /// [`CheckpointError`].
+    /// [`CheckpointError`] if it cannot be continued.
     pub fn kept(&self) -> Result<Option<PathState>, CheckpointError> {
         let from = self.continuation.from;
         from.map(|bytes| from_bytes(bytes, self.view, self.aovs, self.identity())).transpose()
     }
 
-    /// Time between two.
+    /// Least time between two checkpoints.
     pub fn interval(&self) -> Duration {
         self.continuation.interval
     }
@@ -98,13 +103,15 @@ impl<'a> Keeper<'a> {
 }
 
 const MAGIC: &[u8; 8] = b"LUMBRETR";
-/// Of the format, and of what the samples are: raised when the same options take others.
+/// Version of the format and of the samples themselves: it is raised when the same options give other
+/// samples.
 const VERSION: u32 = 1;
 const HEADER: usize = 8 + 4 + 96 + 32;
-/// Bytes of a pixel.
+/// Bytes per pixel.
 const PIXEL: usize = 10 * 8 + 3 * 4;
 
-/// What samples depend on: the program, the scene, the view of it.
+/// Fingerprints of everything that the samples depend on: the program, the scene, and the view with its
+/// options.
 fn identity(view: &View, aovs: &LightAovs) -> [Fingerprint; 3] {
     let options = &view.options;
     let asked = (options.size, options.integrator, options.depth, options.shadows, options.filter);
@@ -139,7 +146,7 @@ fn bytes(state: &PathState, identity: &[Fingerprint; 3]) -> Vec<u8> {
     file
 }
 
-/// What was kept, if it is of this picture.
+/// Reads a checkpoint, if it belongs to this picture.
 fn from_bytes(
     file: &[u8],
     view: &View,
@@ -198,7 +205,7 @@ fn state(mut left: Left<'_>, view: &View, aovs: &LightAovs) -> Option<PathState>
     left.0.is_empty().then_some(PathState { round, film, distribution })
 }
 
-/// Bytes that were not read yet.
+/// The bytes that were not read yet.
 struct Left<'a>(&'a [u8]);
 
 impl<'a> Left<'a> {

@@ -1,33 +1,35 @@
-//! How far two pictures are apart: in light, and as they are shown. Not how far they may be.
+//! Error metrics between two pictures, in linear radiance and as displayed. What error is acceptable is for
+//! the caller to say.
 
 use glam::DVec3;
 use serde::Serialize;
 
 use crate::flip;
 
-/// How far a picture is from a reference.
+/// The difference between a picture and a reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Root mean square difference over the reference's root mean square, all channels, linear.
+    /// Root mean square difference over the root mean square of the reference, over all channels, linear.
     pub relative_error: f64,
-    /// Mean difference over the reference's mean, linear: positive where the picture is brighter.
+    /// Mean difference over the mean of the reference, linear; positive where the picture is brighter.
     pub relative_bias: f64,
-    /// Largest difference of a channel, linear.
+    /// Largest absolute difference of a channel, linear.
     pub largest: f64,
-    /// Column and row where that is.
+    /// Column and row of the pixel with the largest difference.
     pub largest_at: [usize; 2],
-    /// Peak signal-to-noise ratio of the pictures as shown, decibels; nothing if they are the same.
+    /// Peak signal-to-noise ratio of the pictures as displayed, in decibels; `None` if they are equal.
     pub psnr: Option<f64>,
-    /// Mean of LDR-FLIP of the pictures as shown, 0 to 1.
+    /// Mean of LDR-FLIP of the pictures as displayed, 0 to 1.
     pub flip: f64,
     /// FLIP of every pixel, top row first.
     #[serde(skip)]
     pub map: Vec<f64>,
 }
 
-/// Compares pictures of one size: `linear` light and colours as `shown`, each the reference first; in [0, 1] as shown.
+/// Compares two pictures of the same size, given as linear radiance (`linear`) and as displayed in sRGB, in
+/// [0, 1] (`shown`); each array holds the reference first.
 ///
-/// Channels that are not finite in either picture count as infinitely far apart.
+/// A pixel with a channel that is not finite in either picture counts as infinitely different.
 pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> Comparison {
     let [reference, test] = linear;
     let (mut sum, mut brightness) = (0.0, 0.0);
@@ -56,8 +58,8 @@ pub fn compare(width: usize, linear: [&[DVec3]; 2], shown: [Vec<DVec3>; 2]) -> C
     }
 }
 
-/// Root mean square difference of two pictures of one size over the reference's root mean square, all channels, linear: the
-/// [`relative_error`](Comparison::relative_error) of [`compare`] alone.
+/// Root mean square difference of two pictures of the same size over the root mean square of the reference,
+/// over all channels, linear: [`relative_error`](Comparison::relative_error) without the rest of [`compare`].
 pub fn relative_error(reference: &[DVec3], test: &[DVec3]) -> f64 {
     let (mut squares, mut of_reference) = (0.0, 0.0);
     for (wanted, found) in reference.iter().zip(test) {
@@ -68,7 +70,7 @@ pub fn relative_error(reference: &[DVec3], test: &[DVec3]) -> f64 {
     over(squares, of_reference).sqrt()
 }
 
-/// A part of a size; nothing of nothing is nothing.
+/// `value / size`, with 0/0 = 0.
 fn over(value: f64, size: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / size }
 }

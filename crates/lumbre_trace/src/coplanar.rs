@@ -1,5 +1,6 @@
-//! Surfaces that lie in each other: which of them a ray meets. What is opaque wins, so that no light gets past a floor that glass stands on;
-//! solids are crossed together. Not what becomes of the ray.
+//! Coplanar surfaces, where rounding would decide which one a ray hits. An opaque one takes precedence, so
+//! that no light leaks past a floor that glass stands on; solids of glass that touch are crossed together, as
+//! one interface. The rays that go on are computed in `interface`.
 
 use glam::DVec3;
 
@@ -7,14 +8,16 @@ use crate::geometry::{Crossing, Meeting, SpaceRay};
 use crate::scene::{Passage, Scene};
 use crate::surface_point::SurfacePoint;
 
-/// Surfaces nearer to each other than this part of their coordinates lie in each other: more than rays are set off by.
+/// Surfaces closer to each other than this fraction of their coordinates count as coplanar. It is more than
+/// the offset of ray origins.
 const TOGETHER: f64 = 64.0 / (1 << 24) as f64;
-/// So many surfaces lie in one place at most.
+/// Largest number of surfaces in one place.
 const MOST_TOGETHER: usize = 8;
-/// Cosine between normals of one plane.
+/// Least cosine between the normals of coplanar surfaces.
 const PARALLEL: f64 = 0.999_999;
 
-/// The nearest surface for which `accept` holds, or an opaque one that lies in it, and its point where the ray meets it.
+/// Returns the nearest surface that `accept` takes, or an opaque one that is coplanar with it, and the point
+/// where the ray hits it.
 pub(crate) fn nearest_surface(
     scene: &Scene,
     ray: &SpaceRay,
@@ -38,8 +41,8 @@ pub(crate) fn nearest_surface(
     Some((meeting, SurfacePoint::new(scene, ray, &meeting)))
 }
 
-/// The other solids whose surface lies where one is met, each with the side that is met and its largest coordinate: glass that touches glass
-/// is one interface.
+/// Returns the other solids that have a coplanar surface at a point of a solid: glass that touches glass is
+/// one interface. Each is given with whether its front is hit, and with its largest coordinate.
 pub(crate) fn coplanar_solids(
     scene: &Scene,
     ray: &SpaceRay,
@@ -55,19 +58,20 @@ pub(crate) fn coplanar_solids(
         });
         let Some(meeting) = next.filter(|meeting| place.holds(scene, meeting)) else { break };
         let extent = SurfacePoint::new(scene, &place.around, &meeting).extent;
-        // Slightly different extents, so that the transmitted ray is set off by the larger.
+        // Slightly larger, so that the caller sees that several surfaces were crossed and offsets the
+        // transmitted ray by more.
         found.push((meeting.crossing.object, meeting.crossing.front, extent.max(point.extent) * 1.000_001));
     }
     found
 }
 
-/// Where surfaces count as one.
+/// The neighbourhood of a hit point in which surfaces may be coplanar.
 struct Place {
-    /// A ray that begins as far before the surface as it ends behind it.
+    /// A ray through the point that starts as far before the surface as it ends behind it.
     around: SpaceRay,
     /// Metres from its start to the surface.
     reach: f64,
-    /// Unit normal of the surface, towards the ray.
+    /// Unit geometric normal of the surface, towards the ray's origin.
     normal: DVec3,
 }
 
@@ -80,7 +84,8 @@ impl Place {
         Self { around, reach, normal: point.geometric }
     }
 
-    /// Only faces that lie in each other: where an edge of one touches the other, rays meet them one after another.
+    /// Returns true if the surfaces are parallel. Where the edge of one only touches the other, rays hit them
+    /// one after the other.
     fn holds(&self, scene: &Scene, meeting: &Meeting) -> bool {
         SurfacePoint::new(scene, &self.around, meeting).geometric.dot(self.normal) >= PARALLEL
     }

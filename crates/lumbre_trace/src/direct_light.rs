@@ -1,6 +1,6 @@
-//! The light that reaches a point of a surface straight from the scene's lights, and what the surface sends of it to the viewer:
-//! I_a k_a + Σ S_i f_att (k_d L_d (n·l) + k_s L_s …) + k_t L_s (t·v)ⁿ. The equations are `lumbre_optics`'; here is the sum over lights and what
-//! stands between. Not mirrored and transmitted rays.
+//! Direct light at a surface point, and what the surface reflects of it towards the viewer: I_a k_a + Σ S_i
+//! f_att (k_d L_d (n·l) + k_s L_s …) + k_t L_s (t·v)ⁿ. The equations are in `lumbre_optics`; this module sums
+//! over lights and traces the shadow rays. Mirrored and transmitted rays are in `ray_tree`.
 
 use glam::DVec3;
 use lumbre_optics::{
@@ -17,30 +17,31 @@ use crate::surface_point::SurfacePoint;
 /// The terms of the sum at one point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DirectLight {
-    /// k_a (I_a + Σ L_a), or what an irradiance volume has in place of I_a.
+    /// k_a (I_a + Σ L_a), or the irradiance volume's light in place of k_a I_a.
     pub ambient: DVec3,
-    /// The part of it that is no light's.
+    /// The part of `ambient` that belongs to no light.
     pub ambient_of_scene: DVec3,
     pub diffuse: DVec3,
     pub specular: DVec3,
-    /// Highlights of light that shines through.
+    /// Highlights of lights behind a transmissive surface.
     pub transmitted: DVec3,
     /// k_d E/π of the lightmap.
     pub baked: DVec3,
     pub emission: DVec3,
-    /// Shadow rays.
+    /// Number of shadow rays.
     pub rays: u32,
-    /// Of each light, by its number (emissive polygons after the lights), what it adds to the picture; only if it is asked for.
+    /// The contribution of each light, by its index, where emissive polygons follow the lights; empty unless
+    /// it is asked for.
     pub lights: Vec<LightTerm>,
 }
 
-/// What one light adds.
+/// The contribution of one light.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LightTerm {
     pub light: usize,
     /// S_i per channel.
     pub visibility: DVec3,
-    /// k_a L_a, which no shadow takes away.
+    /// k_a L_a, which shadows do not affect.
     pub ambient: DVec3,
     pub diffuse: DVec3,
     pub specular: DVec3,
@@ -48,25 +49,26 @@ pub(crate) struct LightTerm {
 }
 
 impl DirectLight {
-    /// Everything together.
+    /// Returns the sum of all terms.
     pub fn total(&self) -> DVec3 {
         self.ambient + self.diffuse + self.specular + self.transmitted + self.baked + self.emission
     }
 }
 
-/// How light is summed up.
+/// Options of the sum.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lighting {
     pub shadows: bool,
-    /// Terms of each light are wanted.
+    /// Whether the contribution of each light is wanted.
     pub by_light: bool,
 }
 
-/// Points along each edge of an emissive polygon that shadow rays go to.
+/// Number of shadow rays along each edge of an emissive polygon.
 const SHADOW_POINTS: u32 = 4;
 
-/// The light of all lamps at a point, for a viewer in a direction. `media` is on the viewer's side of the surface, `behind` with the index
-/// `eta` beyond it.
+/// Sums the light of all lamps and emissive polygons at a point, for a viewer in the direction `viewer`. The
+/// tuple holds the media on the viewer's side of the surface, those behind it, and the index of refraction
+/// behind over that in front.
 pub(crate) fn direct_light(
     scene: &Scene,
     point: &SurfacePoint,
@@ -78,7 +80,7 @@ pub(crate) fn direct_light(
     let mut light = DirectLight { emission: point.emission, ..DirectLight::default() };
     let mapped = point.baked.is_some();
     light.baked = point.baked.unwrap_or(DVec3::ZERO);
-    // Either holds what the ambient term stands for.
+    // Both lightmaps and irradiance volumes hold the indirect light that the ambient term stands for.
     let indirect = mapped || point.from_volume.is_some();
     light.ambient_of_scene = match point.from_volume {
         Some(from_volume) => from_volume,
@@ -99,7 +101,8 @@ pub(crate) fn direct_light(
         light.ambient += added.ambient;
         let mut through = DVec3::ZERO;
         if passing != DVec3::ZERO && !object.medium.thin {
-            // From behind: the index on the viewer's side over that on the light's.
+            // Light that shines through comes from behind: the index on the viewer's side over that on the
+            // light's side.
             let highlight = transmitted_highlight(
                 -point.optical_normal(viewer),
                 sample.direction,
@@ -188,7 +191,7 @@ impl DirectLight {
         }
     }
 
-    /// The term of a light that adds nothing else, so that nothing is asked of its shadow.
+    /// Records the contribution of a light that adds ambient light alone, for which no shadow ray is needed.
     fn add_ambient(&mut self, number: usize, ambient: DVec3, lighting: Lighting) {
         if lighting.by_light && ambient != DVec3::ZERO {
             let zero = DVec3::ZERO;
@@ -205,7 +208,7 @@ impl DirectLight {
     }
 }
 
-/// Metres to a light; infinite to distant ones.
+/// Returns the distance to a light in metres, infinite for distant lights.
 pub(crate) fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
     match placed.light.kind {
         LightKind::Point => placed.position.distance(point.position),
@@ -213,12 +216,13 @@ pub(crate) fn reach(placed: &PlacedLight, point: &SurfacePoint) -> f64 {
     }
 }
 
-/// A ray from a point towards a light, off the surface on the light's side.
+/// Returns the ray from a point towards a light, with its origin offset to the light's side of the surface.
 pub(crate) fn shadow_ray(point: &SurfacePoint, direction: DVec3) -> SpaceRay {
     SpaceRay::leaving(point.position, direction, point.geometric, point.extent)
 }
 
-/// How much of a polygon is seen, by a grid of points over it: the mean of what each lets through.
+/// Returns the visibility of a polygon: the mean transmittance to a grid of points on it, weighted by their
+/// light.
 fn polygon_visibility(
     scene: &Scene,
     point: &SurfacePoint,
@@ -237,7 +241,7 @@ fn polygon_visibility(
             }
             let to = light.corner + light.edge_u * u + light.edge_v * v - point.position;
             let distance = to.length();
-            // As much as the piece sends: by the solid angle, and above the horizon.
+            // In proportion to the irradiance of the piece: its solid angle times the cosine at the surface.
             let part =
                 (-to.dot(front) / distance.powi(3)).max(0.0) * to.dot(point.normal).max(0.0) / distance;
             if !(part > 0.0 && part.is_finite()) {
@@ -253,6 +257,7 @@ fn polygon_visibility(
             (sum, weight, rays) = (sum + visible * part, weight + part, rays + more);
         }
     }
-    // Where no point of the grid is above the horizon the polygon's light is next to nothing, and is left as it is.
+    // Where no point of the grid is above the horizon, the polygon's light is next to nothing and is not
+    // shadowed.
     if weight > 0.0 { (sum / weight, rays) } else { (DVec3::ONE, rays) }
 }

@@ -1,117 +1,117 @@
-//! Why a World cannot be traced.
+//! Errors of the tracer.
 
 use bevy_ecs::entity::Entity;
 use lumbre_mesh::MeshError;
 use lumbre_optics::MaterialError;
 use thiserror::Error;
 
-/// Why a World cannot be traced. Each says what to do about it.
+/// Reasons why a `World` cannot be traced. Every message says what to do about it.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TraceError {
-    /// There is no camera.
+    /// The scene has no camera.
     #[error("the scene has no camera; spawn one, or name one that there is")]
     NoCamera,
-    /// The entity asked for is no camera.
+    /// The entity given as the camera is not a camera with a transform.
     #[error("{entity} is not a camera with a transform; name one that is")]
     NotACamera {
         /// The entity.
         entity: Entity,
     },
-    /// A camera that sees nothing.
+    /// A camera with a parameter out of range, so that it would see nothing.
     #[error("the camera's {field} is {value}; it has to be {wanted}")]
     BadCamera {
-        /// The field.
+        /// The name of the field.
         field: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-        /// What it has to be.
+        /// The values it can have.
         wanted: &'static str,
     },
-    /// A picture without pixels, or with too many.
+    /// The picture has no pixels, or too many.
     #[error("a picture of {width} x {height} pixels cannot be traced; ask for 1 to 32768 along each side")]
     Size {
-        /// Columns.
+        /// Width in pixels.
         width: u32,
-        /// Rows.
+        /// Height in pixels.
         height: u32,
     },
-    /// An option that makes no sense.
+    /// An option is out of range.
     #[error("{option} is {value}; it has to be {wanted}")]
     Option {
-        /// Its name.
+        /// The name of the option.
         option: &'static str,
-        /// What it is.
+        /// Its value.
         value: String,
-        /// What it has to be.
+        /// The values it can have.
         wanted: &'static str,
     },
-    /// No light, no shining object and no other source has that name.
+    /// No light, no emissive object and no other light source has the name given for an auxiliary picture.
     #[error("no light and nothing that shines is called \"{name}\"; there are {known}")]
     NoSuchSource {
-        /// The name.
+        /// The name given.
         name: String,
-        /// The names that there are.
+        /// The names that exist, each in quotes.
         known: String,
     },
-    /// A mesh that is none.
+    /// A mesh is not valid.
     #[error("the mesh of \"{object}\" cannot be read: {source}")]
     Mesh {
-        /// The object.
+        /// The name of the object.
         object: String,
-        /// What is wrong.
+        /// What is wrong with the mesh.
         source: MeshError,
     },
-    /// A material that nothing can be lit with.
+    /// A material has values that cannot be lit.
     #[error("\"{object}\" cannot be lit: {source}")]
     Material {
-        /// The object.
+        /// The name of the object.
         object: String,
-        /// What is wrong.
+        /// What is wrong with the material.
         source: MaterialError,
     },
-    /// A surface by an equation that has no points.
+    /// An exact surface has no points: its equation is not valid, or its transform flattens it.
     #[error("the exact surface of \"{object}\" has none: {reason}")]
     Quadric {
-        /// The object.
+        /// The name of the object.
         object: String,
-        /// What is wrong, and what to do.
+        /// What is wrong, and what to do about it.
         reason: String,
     },
-    /// More triangles than there are numbers for.
+    /// There are more triangles than the hierarchy can index.
     #[error("the scene has {triangles} triangles, and 2^29 is the most; leave some out")]
     TooManyTriangles {
-        /// How many there are.
+        /// The number of triangles.
         triangles: usize,
     },
-    /// Samples that cannot be gone on from.
+    /// The samples of an earlier run cannot be continued.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The threads cannot be had.
+    /// The worker threads cannot be started.
     #[error("the threads cannot be started: {reason}; ask for fewer with --threads")]
     Threads {
-        /// What the system says.
+        /// The error message of the system.
         reason: String,
     },
 }
 
-/// Why samples that were kept cannot be gone on from.
+/// Reasons why the samples of an earlier run cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// Something else.
+    /// The data are not a checkpoint.
     #[error("these are no samples of a traced picture")]
     NotSamples,
-    /// Of another version of the program, which may take others.
+    /// They come from another version of the program, whose samples may differ.
     #[error("these samples are of another version of the program")]
     Version,
-    /// Cut short, or changed.
+    /// They are truncated or corrupted.
     #[error("these samples are damaged")]
     Damaged,
-    /// Of another scene.
+    /// They belong to another scene.
     #[error("the scene has changed since these samples were taken")]
     Scene,
-    /// Of another picture of the scene.
+    /// They belong to another picture of the same scene.
     #[error(
         "these samples are of another picture of the scene: size, camera, depth, shadows, filter, adaptive sampling and auxiliary pictures have to be the same"
     )]

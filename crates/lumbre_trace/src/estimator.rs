@@ -1,4 +1,5 @@
-//! What takes the samples of a pixel: which integrator follows them, what they come to. Not how many there are.
+//! Evaluates the samples of a pixel with the chosen integrator. How many samples a pixel gets is decided in
+//! `rendering`.
 
 use glam::DVec2;
 
@@ -11,7 +12,7 @@ use crate::random::Numbers;
 use crate::ray_tree::RayTree;
 use crate::view::View;
 
-/// The integrator of a picture, with the auxiliary pictures that its light falls to.
+/// The integrator of a picture, with the auxiliary pictures that its light belongs to.
 pub(crate) struct Estimator<'a> {
     view: &'a View,
     aovs: &'a LightAovs,
@@ -39,7 +40,7 @@ impl<'a> Estimator<'a> {
         Self { view, aovs, integrator }
     }
 
-    /// So many samples of a pixel in a pass.
+    /// Takes `samples` samples of a pixel in one pass.
     pub fn pixel(&self, pixel: (usize, usize), pass: u32, samples: u32) -> PixelSum {
         let mut sum = PixelSum::default();
         for index in 0..samples {

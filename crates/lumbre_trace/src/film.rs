@@ -1,4 +1,5 @@
-//! The picture while it grows: what the samples of each pixel came to. Not where the radiance comes from.
+//! Accumulation of samples per pixel, standard errors, and importance sampling of the reconstruction filter.
+//! Where the radiance comes from is in `ray_tree` and `path`.
 
 use glam::{DVec2, DVec3};
 
@@ -6,27 +7,28 @@ use crate::filter::Filter;
 use crate::light_terms::LightTerms;
 use crate::options::Cut;
 
-/// What one sample found.
+/// The result of one sample.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sample {
     pub radiance: DVec3,
     pub rays: u32,
-    /// Weight of what the limits cut off.
+    /// Sum of the weights of the rays that the limits cut off.
     pub cut: f64,
-    /// The brightest radiance of all its rays.
+    /// The brightest radiance that any of its rays returned.
     pub brightest: f64,
-    /// The brightest that any ray could have brought, by the points that were met; may be infinite.
+    /// Upper bound of the radiance that any of its rays could return, derived from the points that were hit;
+    /// may be infinite.
     pub limit: f64,
-    /// What the radiance is the sum of, if that is wanted.
+    /// The terms that the radiance is the sum of, if they are wanted.
     pub terms: LightTerms,
 }
 
-/// What the samples of a pixel came to in one pass.
+/// Sum of a pixel's samples in one pass.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct PixelSum {
     pub radiance: DVec3,
     pub weight: f64,
-    /// The part of the radiance that falls to each auxiliary picture.
+    /// The part of the radiance that belongs to each auxiliary picture.
     pub light: Vec<DVec3>,
     pub samples: u32,
     pub rays: u32,
@@ -36,7 +38,7 @@ pub(crate) struct PixelSum {
 }
 
 impl PixelSum {
-    /// Adds a sample of a weight: the sign of the filter where it lies.
+    /// Adds a sample with a weight, which is the sign of the filter at the sample.
     pub fn add(&mut self, sample: &Sample, weight: f64) {
         self.radiance += sample.radiance * weight;
         self.weight += weight;
@@ -48,29 +50,30 @@ impl PixelSum {
     }
 
     fn over_weight(&self, sum: DVec3) -> DVec3 {
-        // Samples whose signs cancel say nothing of the pixel.
+        // Samples whose signs cancel give no estimate of the pixel.
         if self.weight.abs() > 1e-6 { sum / self.weight } else { DVec3::ZERO }
     }
 
-    /// Their mean.
+    /// Returns the weighted mean of the samples.
     pub fn mean(&self) -> DVec3 {
         self.over_weight(self.radiance)
     }
 }
 
-/// All passes of a picture.
+/// The accumulated passes of a picture.
 #[derive(Debug)]
 pub(crate) struct Film {
     pub width: usize,
     pub pixels: Vec<FilmPixel>,
-    /// Of each auxiliary picture of light and each pixel: the sum of the passes' means, each times its samples.
+    /// For each auxiliary picture of light and each pixel: the sum of the passes' means, each times its
+    /// number of samples.
     pub light: Vec<Vec<DVec3>>,
 }
 
-/// All passes of a pixel.
+/// The accumulated passes of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FilmPixel {
-    /// Sum of the passes' means, each times its samples.
+    /// Sum of the passes' means, each times its number of samples.
     pub sum: DVec3,
     /// Sum of the squares of the passes' means.
     pub squares: DVec3,
@@ -99,17 +102,18 @@ impl FilmPixel {
         self.limit = self.limit.max(pass.limit);
     }
 
-    /// The pixel's radiance; 0 before the first pass.
+    /// Returns the pixel's radiance; 0 before the first pass.
     pub fn mean(&self) -> DVec3 {
         self.sum / f64::from(self.samples.max(1))
     }
 
-    /// Standard error of the mean by how much passes of as many samples differ; nothing before the second.
+    /// Returns the standard error of the mean, estimated from the differences between passes, all of which
+    /// are taken to have as many samples; `None` before the second pass.
     pub fn standard_error(&self) -> Option<DVec3> {
         (self.passes >= 2).then(|| (self.variance() / f64::from(self.passes)).map(f64::sqrt))
     }
 
-    /// Variance of a pass; 0 before there are two.
+    /// Returns the variance of a pass; 0 before the second pass.
     pub fn variance(&self) -> DVec3 {
         let count = f64::from(self.passes);
         if self.passes < 2 {
@@ -121,7 +125,7 @@ impl FilmPixel {
 }
 
 impl Film {
-    /// Without samples, with so many auxiliary pictures of light.
+    /// Creates a film without samples, with `light` auxiliary pictures of light.
     pub fn new((width, height): (usize, usize), light: usize) -> Self {
         let count = width * height;
         Self {
@@ -131,7 +135,7 @@ impl Film {
         }
     }
 
-    /// Adds a pass of a pixel.
+    /// Adds a pass to the pixel with index `at`.
     pub fn add(&mut self, at: usize, pass: &PixelSum) {
         self.pixels[at].add(pass);
         for (sums, sum) in self.light.iter_mut().zip(&pass.light) {
@@ -139,14 +143,14 @@ impl Film {
         }
     }
 
-    /// An auxiliary picture of light, by its number.
+    /// Returns the auxiliary picture of light with an index.
     pub fn light(&self, number: usize) -> Vec<DVec3> {
         let samples = self.pixels.iter().map(|pixel| f64::from(pixel.samples.max(1)));
         self.light[number].iter().zip(samples).map(|(sum, samples)| *sum / samples).collect()
     }
 
-    /// Root mean square of the pixels' standard errors over the mean radiance of the picture, all channels together; nothing before it can
-    /// be stated, and 0 for a black picture.
+    /// Returns the root mean square of the pixels' standard errors over the mean radiance of the picture, all
+    /// channels together; `None` while a pixel has no standard error, and 0 for a black picture.
     pub fn relative_error(&self) -> Option<f64> {
         let (mut variance, mut sum, mut count) = (0.0, 0.0, 0.0_f64);
         for pixel in &self.pixels {
@@ -158,7 +162,7 @@ impl Film {
         if mean <= 0.0 { Some(0.0) } else { Some((variance / count.max(1.0)).sqrt() / mean) }
     }
 
-    /// What the limits cut off.
+    /// Summarizes what the limits cut off.
     pub fn cut(&self) -> Cut {
         let brightest = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.brightest));
         let largest_weight = self.pixels.iter().fold(0.0_f64, |largest, pixel| largest.max(pixel.cut));
@@ -170,15 +174,17 @@ impl Film {
     }
 }
 
-/// Chooses places by a filter's size, so that every sample of a pixel counts alike but for the filter's sign.
+/// Samples positions in proportion to the filter's absolute value, so that all samples of a pixel have the
+/// same weight except for the filter's sign.
 #[derive(Clone, Debug)]
 pub(crate) struct FilterSampler {
     filter: Filter,
-    /// Distribution of |filter| from -radius to radius, beginning with 0 and ending with 1.
+    /// Cumulative distribution of |filter| along one axis, from -radius to radius; begins with 0 and ends
+    /// with 1.
     distribution: Vec<f64>,
 }
 
-/// Pieces of a filter's distribution.
+/// Number of intervals of a filter's distribution.
 const PIECES: usize = 512;
 
 impl FilterSampler {
@@ -195,7 +201,7 @@ impl FilterSampler {
         Self { filter, distribution }
     }
 
-    /// An offset from the pixel's middle in pixels, and the filter's sign there.
+    /// Returns an offset from the pixel's centre in pixels, and the filter's sign there.
     pub fn place(&self, numbers: DVec2) -> (DVec2, f64) {
         if self.filter == Filter::Box {
             return (numbers - 0.5, 1.0);
@@ -220,7 +226,7 @@ mod tests {
     fn a_step_seen_through_a_filter_is_the_filters_integral() {
         for filter in Filter::ALL {
             let sampler = FilterSampler::new(*filter);
-            // Radiance 1 to the right of 0.3 pixels off the middle.
+            // Radiance is 1 to the right of 0.3 pixels from the centre, and 0 to the left.
             let (mut sum, mut weight) = (0.0, 0.0);
             let steps = 400;
             for row in 0..steps {
@@ -246,7 +252,7 @@ mod tests {
 
     #[test]
     fn the_standard_error_is_that_of_the_mean() {
-        // Passes of one sample each: 1, 2, 3, 4 have the variance 5/3, of their mean 5/12.
+        // Passes of one sample each: 1, 2, 3, 4 have variance 5/3, and their mean has 5/12.
         let mut pixel = FilmPixel::default();
         for value in [1.0, 2.0, 3.0, 4.0] {
             let mut pass = PixelSum::default();

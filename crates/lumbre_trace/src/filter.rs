@@ -1,24 +1,25 @@
-//! Reconstruction filters: how much a sample counts for a pixel by how far off it lies. Not where the samples are.
+//! Reconstruction filters: the weight of a sample for a pixel by its offset from the pixel's centre. How
+//! samples are distributed over a filter is in `film`.
 
 use glam::DVec2;
 
-/// How samples make a pixel.
+/// The reconstruction filter of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Filter {
-    /// Every sample of the pixel's square alike.
+    /// All samples in the pixel's square count alike.
     #[default]
     Box,
-    /// Mitchell and Netravali's with B = C = 1/3, two pixels to every side: sharp, rings a little.
+    /// The filter of Mitchell and Netravali with B = C = 1/3 and a radius of 2 pixels: sharp, rings slightly.
     Mitchell,
-    /// Blackman and Harris's window, one and a half pixels to every side: soft, never rings.
+    /// The Blackman-Harris window with a radius of 1.5 pixels: soft, never rings.
     BlackmanHarris,
 }
 
 impl Filter {
-    /// All.
+    /// All filters.
     pub const ALL: &'static [Self] = &[Self::Box, Self::Mitchell, Self::BlackmanHarris];
 
-    /// The name used on the command line.
+    /// Returns the name used on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Box => "box",
@@ -27,12 +28,12 @@ impl Filter {
         }
     }
 
-    /// The choice with that name, if there is one.
+    /// Returns the filter with that name on the command line, or `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|choice| choice.name() == name)
     }
 
-    /// How far it reaches from a pixel's middle, in pixels.
+    /// Returns how far the filter reaches from a pixel's centre along each axis, in pixels.
     pub fn radius(self) -> f64 {
         match self {
             Self::Box => 0.5,
@@ -41,7 +42,7 @@ impl Filter {
         }
     }
 
-    /// Its value at an offset from a pixel's middle, in pixels.
+    /// Returns the filter's value at an offset from a pixel's centre, in pixels.
     pub fn value(self, offset: DVec2) -> f64 {
         self.along(offset.x.abs()) * self.along(offset.y.abs())
     }
@@ -93,11 +94,12 @@ mod tests {
                 assert!(x <= filter.radius() || value == 0.0);
             }
         }
-        // The known values of Mitchell's: 8/9 in the middle, 1/18 one pixel off, a lobe below 0 beyond.
+        // Known values of the Mitchell filter: 8/9 in the centre, 1/18 one pixel off, and a negative lobe
+        // beyond.
         let along = |x| Filter::Mitchell.along(x);
         assert!((along(0.0) - 8.0 / 9.0).abs() < 1e-15 && (along(1.0) - 1.0 / 18.0).abs() < 1e-15);
         assert!(along(1.5) < 0.0 && along(2.0).abs() < 1e-15);
-        // Shifted copies of it add up to 1 everywhere.
+        // It is a partition of unity: copies shifted by whole pixels add up to 1 everywhere.
         for x in [0.0, 0.2, 0.5, 0.9] {
             let sum: f64 = (-3..=3).map(|k| along((x + f64::from(k)).abs())).sum();
             assert!((sum - 1.0).abs() < 1e-14, "{sum}");

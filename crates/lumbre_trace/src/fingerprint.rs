@@ -1,15 +1,15 @@
-//! A hash of what a value says of itself when it is printed for debugging: all of its fields, those that are added later too, and every
-//! number to its last digit. Slow for large pictures; nothing to keep for years.
+//! A hash of a value's `Debug` output, which contains every field, also those added later, and every number
+//! exactly. Slow for large pictures, and not stable enough to be stored for years.
 
 use std::fmt::{self, Debug, Write};
 
-/// BLAKE3.
+/// A BLAKE3 hash.
 pub(crate) type Fingerprint = [u8; 32];
 
-/// Of a value.
+/// Hashes the `Debug` output of a value.
 pub(crate) fn of_debug(value: &dyn Debug) -> Fingerprint {
     let mut hash = Hash(blake3::Hasher::new());
-    // Hashing takes whatever is written to it.
+    // Writing to a hasher cannot fail.
     let written = write!(hash, "{value:?}");
     debug_assert!(written.is_ok());
     *hash.0.finalize().as_bytes()

@@ -1,4 +1,5 @@
-//! What is seen first: the surface through a place of the picture, and auxiliary pictures of all of them. Not the light on it.
+//! The first visible surface: through one point of the picture, and for all pixels as auxiliary pictures.
+//! Light is not evaluated.
 
 use glam::{DVec2, DVec3};
 
@@ -8,25 +9,26 @@ use crate::surface_point::SurfacePoint;
 use crate::tiles::for_every_pixel;
 use crate::view::{View, pixel_middle};
 
-/// What is seen through a place of the picture.
+/// The surface that is visible through a point of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstHit {
-    /// What people call the object.
+    /// The name of the object.
     pub object: String,
-    /// In the world, metres.
+    /// Position in the world, metres.
     pub position: DVec3,
-    /// Unit normal that is lit.
+    /// Unit shading normal.
     pub normal: DVec3,
-    /// Metres along the line of sight.
+    /// Distance in metres along the camera's viewing axis.
     pub depth: f64,
     /// k_d with its textures, linear RGB.
     pub albedo: DVec3,
-    /// Radiance that the surface sends by itself.
+    /// Emission of the surface, radiance.
     pub emission: DVec3,
 }
 
 impl FirstHit {
-    /// Through a place in pixels from the upper left corner; nothing where the background is.
+    /// Finds the surface through a point in pixels from the upper left corner; `None` where the background is
+    /// visible.
     pub(crate) fn through(view: &View, place: DVec2) -> Option<Self> {
         let point = first_point(view, place)?;
         Some(Self {
@@ -40,21 +42,21 @@ impl FirstHit {
     }
 }
 
-/// What is seen first through every pixel.
+/// The first visible surfaces of all pixels.
 #[derive(Clone, Debug)]
 pub(crate) struct FirstHits {
-    /// k_d and unit normal, averaged over samples, 0 where they see the background.
+    /// k_d and unit shading normal, averaged over samples; samples of the background count as 0.
     pub albedo: Vec<DVec3>,
     pub normals: Vec<DVec3>,
-    /// Metres along the line of sight through the middle; infinite where that sees the background.
+    /// Metres along the viewing axis through the pixel's centre; infinite where the background is visible.
     pub depths: Vec<f64>,
 }
 
-/// Samples of a pixel at most: edges are smooth enough by then.
+/// Largest number of samples per pixel, which is enough for smooth edges.
 const MOST_SAMPLES: u32 = 16;
 
 impl FirstHits {
-    /// By the places of the picture's own first samples.
+    /// Takes the same sample positions as the picture's own first pass.
     pub fn of(view: &View) -> Self {
         let samples = view.options.samples.unwrap_or(MOST_SAMPLES).min(MOST_SAMPLES);
         let (width, height) = view.size();
@@ -70,7 +72,7 @@ impl FirstHits {
             }
             let middle = first_point(view, pixel_middle(x, y));
             let depth = middle.map_or(f64::INFINITY, |point| view.camera.depth(point.position));
-            // Samples whose signs cancel say nothing of the pixel.
+            // Samples whose signs cancel give no estimate of the pixel.
             let mean = |sum: DVec3| if weight.abs() > 1e-6 { sum / weight } else { DVec3::ZERO };
             (mean(albedo), mean(normal), depth)
         };

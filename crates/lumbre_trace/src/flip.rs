@@ -1,5 +1,6 @@
-//! How different two pictures look when one flips between them: LDR-FLIP (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and
-//! Fairchild, "FLIP: A Difference Evaluator for Alternating Images", 2020), with its published constants. Not a difference of light.
+//! Perceived difference of two pictures when one flips between them: LDR-FLIP (Andersson, Nilsson,
+//! Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating Images",
+//! 2020), with its published constants. For differences in radiance see [`compare`](crate::compare).
 
 use std::f64::consts::PI;
 
@@ -7,39 +8,40 @@ use glam::{DMat3, DVec3};
 use lumbre_optics::decode_srgb;
 use rayon::prelude::*;
 
-/// Pixels per degree of a monitor of 0.7 m and 3840 pixels, seen from 0.7 m.
+/// Pixels per degree of a monitor 0.7 m and 3840 pixels wide, seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 0.7 * 3840.0 / 0.7 * PI / 180.0;
 
-/// Colours in sRGB, each channel in [0, 1], row by row.
+/// A picture of sRGB-encoded colours, each channel in [0, 1], row by row.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Columns.
+    /// Width in pixels.
     pub width: usize,
     /// Colours, top row first.
     pub pixels: Vec<DVec3>,
 }
 
-/// White of D65 by the matrix below.
+/// The D65 white point in XYZ, by the matrix of `to_xyz`.
 const WHITE: DVec3 = DVec3::new(0.950_428_545, 1.0, 1.088_900_371);
-/// Weights and widths of each channel's contrast sensitivity: two Gaussians.
+/// Contrast sensitivity function of each channel: weight and width of two Gaussians.
 const SENSITIVITY: [[f64; 4]; 3] =
     [[1.0, 0.0047, 0.0, 1e-5], [1.0, 0.0053, 0.0, 1e-5], [34.1, 0.04, 13.5, 0.025]];
-/// Width in degrees of what detects edges and points.
+/// Width in degrees of the filters that detect edges and points.
 const FEATURE: f64 = 0.082;
-/// The exponent of colour differences, and of feature differences.
+/// Exponents of colour differences and of feature differences.
 const COLOR_EXPONENT: f64 = 0.7;
 const FEATURE_EXPONENT: f64 = 0.5;
-/// Differences up to this share of the largest one are spread over this share of [0, 1].
+/// Colour differences up to the first number times the largest one are mapped to 0 up to the second number,
+/// and larger ones to the rest of [0, 1].
 const KNEE: [f64; 2] = [0.4, 0.95];
 
-/// The difference of each pixel, in [0, 1], of two pictures of one size.
+/// Returns the difference of each pixel, in [0, 1], of two pictures of the same size.
 pub fn flip(reference: &Picture, test: &Picture, pixels_per_degree: f64) -> Vec<f64> {
     let color = color_differences(reference, test, pixels_per_degree);
     let feature = feature_differences(reference, test, pixels_per_degree);
     color.iter().zip(feature).map(|(color, feature)| color.powf(1.0 - feature)).collect()
 }
 
-/// The mean difference, in [0, 1]; 0 of pictures without pixels.
+/// Returns the mean difference at [`PIXELS_PER_DEGREE`], in [0, 1]; 0 for pictures without pixels.
 pub fn mean_flip(reference: &Picture, test: &Picture) -> f64 {
     let map = flip(reference, test, PIXELS_PER_DEGREE);
     map.iter().sum::<f64>() / map.len().max(1) as f64
@@ -58,7 +60,7 @@ fn to_xyz() -> DMat3 {
     )
 }
 
-/// Luminance and two opponent colours, linear in XYZ.
+/// Converts linear sRGB to luminance and two opponent colours, linear in XYZ (the paper's YCxCz).
 fn opponent(linear: DVec3) -> DVec3 {
     let v = to_xyz() * linear / WHITE;
     DVec3::new(116.0 * v.y - 16.0, 500.0 * (v.x - v.y), 200.0 * (v.y - v.z))
@@ -69,7 +71,7 @@ fn from_opponent(color: DVec3) -> DVec3 {
     to_xyz().inverse() * (DVec3::new(y + color.y / 500.0, y, y - color.z / 200.0) * WHITE)
 }
 
-/// CIELAB, its colours weaker where it is dark (Hunt).
+/// Converts linear sRGB to CIELAB with its chroma reduced in the dark (Hunt effect).
 fn hunt_lab(linear: DVec3) -> DVec3 {
     let curve = |t: f64| {
         let delta: f64 = 6.0 / 29.0;
@@ -96,13 +98,13 @@ fn color_differences(reference: &Picture, test: &Picture, pixels_per_degree: f64
     reference.iter().zip(&test).map(|(a, b)| spread(color_distance(*a, *b))).collect()
 }
 
-/// What an eye resolves of a picture, in the space that colours are compared in.
+/// Applies the contrast sensitivity functions: what the eye resolves of a picture, in Hunt-adjusted CIELAB.
 fn filtered(picture: &Picture, pixels_per_degree: f64) -> Vec<DVec3> {
     let widest = SENSITIVITY.iter().flat_map(|s| [s[1], s[3]]).fold(0.0, f64::max);
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i64;
     let opponents: Vec<_> = picture.pixels.iter().map(|color| opponent(linear(*color))).collect();
     let (mut seen, mut sum) = (vec![DVec3::ZERO; opponents.len()], DVec3::ZERO);
-    // Each of the two Gaussians by itself is a product of one along rows and one along columns.
+    // Each of the two Gaussians is separable into rows and columns; their sum is not.
     for gaussian in [0, 2] {
         let along = kernel(radius, |x| {
             DVec3::from(SENSITIVITY.map(|s| (-(PI * x / pixels_per_degree).powi(2) / s[gaussian + 1]).exp()))
@@ -127,7 +129,7 @@ fn feature_differences(reference: &Picture, test: &Picture, pixels_per_degree: f
     reference.iter().zip(&test).map(difference).collect()
 }
 
-/// How much of an edge and of a point is at each pixel.
+/// Returns the strength of edges and of points at each pixel.
 fn features(picture: &Picture, pixels_per_degree: f64) -> Vec<[f64; 2]> {
     let deviation = 0.5 * FEATURE * pixels_per_degree;
     let radius = (3.0 * deviation).ceil() as i64;
@@ -142,7 +144,7 @@ fn features(picture: &Picture, pixels_per_degree: f64) -> Vec<[f64; 2]> {
     // Edges in the first channel, points in the second.
     let mut along =
         kernel(radius, |x| DVec3::new(-x, (x / deviation).powi(2) - 1.0, 0.0) * DVec3::splat(bell(x)));
-    // What is positive sums to 1, what is negative to -1.
+    // The kernel is normalized so that its positive weights sum to 1 and its negative weights to -1.
     let [above, below] = [1.0, -1.0]
         .map(|sign| along.iter().map(|weight| (sign * *weight).max(DVec3::ZERO)).sum::<DVec3>() * total);
     for weight in &mut along {
@@ -157,12 +159,12 @@ fn features(picture: &Picture, pixels_per_degree: f64) -> Vec<[f64; 2]> {
     across.iter().zip(&down).map(|(a, b)| [a.x.hypot(b.x), a.y.hypot(b.y)]).collect()
 }
 
-/// The weights from -radius to radius.
+/// Evaluates a kernel's weights at the integers from -radius to radius.
 fn kernel(radius: i64, weight: impl Fn(f64) -> DVec3) -> Vec<DVec3> {
     (-radius..=radius).map(|x| weight(x as f64)).collect()
 }
 
-/// Channel by channel, with weights that are those along a row times those along a column; what is beyond the border is as the border.
+/// Convolves each channel with a separable kernel; beyond the border the border's pixels are repeated.
 fn convolved(pixels: &[DVec3], width: usize, across: &[DVec3], down: &[DVec3]) -> Vec<DVec3> {
     let height = pixels.len() / width.max(1);
     let near = |at: usize, step: usize, weights: &[DVec3], end: usize| {

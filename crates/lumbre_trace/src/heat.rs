@@ -1,6 +1,7 @@
-//! The colour of a difference, for heat maps. Not the difference.
+//! Colour map of the heat maps that show differences.
 
-/// From 0, black, by violet, red and yellow to 1, white: the brighter the farther apart, in any print. Numbers beyond are taken for the nearer end.
+/// Maps 0 to black, 1 to white, and values between to violet, red and yellow, brighter with increasing value,
+/// so that it also works in print without colours. Values outside [0, 1] are clamped.
 pub fn heat_color(value: f64) -> [u8; 3] {
     const STOPS: [[f64; 3]; 5] =
         [[0.0, 0.0, 0.02], [0.34, 0.06, 0.43], [0.74, 0.21, 0.33], [0.98, 0.56, 0.04], [0.99, 1.0, 0.64]];

@@ -1,5 +1,5 @@
-//! How a surface divides a ray: what is mirrored, what is let through, and where to. Snell's law and Fresnel's equations themselves are
-//! `lumbre_optics`'. Not the diffuse and specular reflection of lights.
+//! The mirrored and transmitted rays at a surface and their factors. Snell's law and Fresnel's equations are
+//! in `lumbre_optics`; the reflection of lights is in `direct_light`.
 
 use glam::DVec3;
 use lumbre_optics::{fresnel_dielectric, reflected_direction, transmitted_direction};
@@ -10,27 +10,28 @@ use crate::medium::MediumStack;
 use crate::scene::{Object, Scene};
 use crate::surface_point::SurfacePoint;
 
-/// The rays that go on from a point.
+/// The rays that go on from a point of a surface that mirrors or transmits.
 #[derive(Clone, Debug)]
 pub(crate) struct Division {
-    /// Factor of what comes from the mirrored direction: k_r, and of k_t what is reflected by Fresnel's equations or totally.
+    /// Factor on the radiance from the mirrored direction: k_r, plus the part of k_t that Fresnel's equations
+    /// or total reflection send back.
     pub mirrored: DVec3,
-    /// Unit.
+    /// Unit vector.
     pub mirror_direction: DVec3,
-    /// Factor of what comes through.
+    /// Factor on the radiance from the transmitted direction.
     pub transmitted: DVec3,
-    /// Unit; the ray's own where light goes straight on.
+    /// Unit vector; the ray's own direction where light goes straight on.
     pub transmitted_direction: DVec3,
-    /// Index behind over index in front.
+    /// Index of refraction behind the surface over that in front.
     pub eta: f64,
-    /// Where the transmitted ray runs.
+    /// The media of the transmitted ray.
     pub behind: MediumStack,
-    /// Farthest coordinate of all surfaces that are crossed here.
+    /// Largest coordinate of all surfaces that are crossed here.
     pub extent: f64,
 }
 
 impl Division {
-    /// Of a ray in `media` that meets a point of a surface which mirrors or lets through.
+    /// Divides a ray in `media` that hits a point of a surface which mirrors or transmits.
     pub fn new(scene: &Scene, ray: &SpaceRay, point: &SurfacePoint, media: &MediumStack) -> Self {
         let object = &scene.objects[point.object];
         let viewer = -ray.direction;
@@ -81,20 +82,21 @@ impl Division {
         division
     }
 
-    /// The mirrored ray.
+    /// Returns the mirrored ray.
     pub fn mirrored_ray(&self, point: &SurfacePoint) -> SpaceRay {
         SpaceRay::leaving(point.position, self.mirror_direction, point.geometric, point.extent)
     }
 
-    /// The ray that goes through.
+    /// Returns the transmitted ray.
     pub fn transmitted_ray(&self, point: &SurfacePoint) -> SpaceRay {
-        // Past everything that was crossed together.
+        // Offset far enough to be past all surfaces that are crossed together.
         let room = if self.extent > point.extent { 4.0 } else { 1.0 };
         SpaceRay::leaving(point.position, self.transmitted_direction, point.geometric, room * self.extent)
     }
 }
 
-/// Of what a sheet deals with, the part that it reflects: by both faces, and the light that goes to and fro between them, 2 F/(1 + F).
+/// Returns the fraction of transmissible light that a thin sheet reflects: by both faces, with all
+/// reflections between them, 2 F/(1 + F).
 pub(crate) fn reflected_by_sheet(sheet: &Object, cosine: f64) -> f64 {
     if !sheet.medium.fresnel {
         return 0.0;
@@ -103,7 +105,8 @@ pub(crate) fn reflected_by_sheet(sheet: &Object, cosine: f64) -> f64 {
     2.0 * once / (1.0 + once)
 }
 
-/// r = 2 (n·v) n - v, or about the face's own normal where that would go through the surface.
+/// Returns the mirrored direction r = 2 (n·v) n - v, about the geometric normal where r would point into the
+/// surface.
 fn mirror(normal: DVec3, viewer: DVec3, geometric: DVec3) -> DVec3 {
     let direction = reflected_direction(normal, viewer);
     let direction =

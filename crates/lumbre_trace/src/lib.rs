@@ -1,4 +1,5 @@
-//! The reference picture: Whitted's recursive ray tracing and paths over the same World that frames are drawn of. No GPU, no files.
+//! Offline reference renderer: Whitted ray tracing and path tracing of the same `World` that frames are drawn
+//! from. It runs on the CPU alone and reads and writes no files.
 //!
 //! ```text
 //!   World ─► Scene: objects, lights, polygons ─► Geometry: triangles (lumbre_rays) + quadrics
@@ -10,15 +11,18 @@
 //!    tiles, rendering    ray_tree (Whitted)                          path (all light)
 //!                          direct_light ─► shadow_ray                  light_sampling ─► shadow_ray
 //!                          interface: mirror, Snell, Fresnel           lobe_sampling, interface
-//!                          medium: what rays are inside of             medium
-//!                          branch: the tree as data
+//!                          medium: the media around a ray              medium
+//!                          branch: the recorded tree
 //! ```
 //!
-//! - One lighting equation: every term comes from `lumbre_optics`, whose twins frames evaluate. With depth 0 and without shadows a picture
-//!   is the frame under Phong shading.
-//! - The same bits on any number of threads: every pixel is computed by itself, from its own numbers.
-//! - Points are found in f64: the hierarchy's f32 says which triangle, the ray's own arithmetic where. Chains of mirrors keep their digits.
-//! - What limits cut off is counted and stated ([`Cut`]); what paths are uncertain of too ([`TraceReport::standard_error`]).
+//! - One lighting equation: every term comes from `lumbre_optics`, whose shader twins light the frames. With
+//!   depth 0 and without shadows the picture is the frame under Phong shading.
+//! - The same bits on any number of threads: every pixel is computed independently, with random numbers of
+//!   its own.
+//! - Hit points are computed in f64: the f32 hierarchy finds the triangle, and the intersection is then
+//!   computed again in f64, so that long chains of mirrors keep their digits.
+//! - What the limits of depth and weight cut off is measured and reported ([`Cut`]), and so is the noise of
+//!   paths ([`TraceReport::standard_error`]).
 //!
 //! ```
 //! use std::{ops::ControlFlow, sync::Arc};

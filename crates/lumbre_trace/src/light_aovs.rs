@@ -1,4 +1,5 @@
-//! How light falls to auxiliary pictures: which terms of a sample each of them takes, and what the sources are called. Not the pictures.
+//! Assigns the terms of a sample to the auxiliary pictures of light, by their sources and parts. The pictures
+//! themselves accumulate in `film`.
 
 use std::collections::BTreeSet;
 
@@ -10,20 +11,20 @@ use crate::light_terms::{Source, Term};
 use crate::options::Integrator;
 use crate::scene::{Object, Scene};
 
-/// Names of sources that are neither lights nor objects.
+/// Names of the sources that are neither lights nor objects.
 const BACKGROUND: &str = "background";
 const AMBIENT: &str = "ambient";
 const BAKED: &str = "baked";
-/// The pictures of light that are asked for: which terms of a sample fall to each.
+/// The auxiliary pictures of light that are asked for, with the terms that belong to each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightAovs {
     pub aovs: Vec<Aov>,
-    /// Of each, its part and its sources, all without a list.
+    /// For each picture, its part and its sources; `None` means both parts and all sources.
     taken: Vec<(Option<LightPart>, Option<Vec<Source>>)>,
 }
 
 impl LightAovs {
-    /// Those of `asked`, with every source by its name.
+    /// Selects the pictures of light from `asked` and resolves the names of their sources.
     ///
     /// # Errors
     /// [`TraceError::NoSuchSource`].
@@ -67,7 +68,7 @@ impl LightAovs {
         !self.aovs.is_empty()
     }
 
-    /// Adds the terms of a sample to what each picture has of a pixel, times the sample's weight.
+    /// Adds the terms of a sample, times its weight, to the sums of a pixel in all pictures.
     pub fn add<'t>(&self, sums: &mut Vec<DVec3>, terms: impl Iterator<Item = &'t Term>, weight: f64) {
         sums.resize(self.aovs.len(), DVec3::ZERO);
         for term in terms {
@@ -81,7 +82,7 @@ impl LightAovs {
     }
 }
 
-/// Every source that a picture may have light of, by its name; several may have the same.
+/// Returns every source that may contribute to the picture, with its name. Several sources may share a name.
 fn named_sources(scene: &Scene, integrator: Integrator) -> Vec<(String, Source)> {
     let lights =
         scene.lights.iter().enumerate().map(|(number, placed)| (placed.name.clone(), Source::Light(number)));
@@ -90,7 +91,7 @@ fn named_sources(scene: &Scene, integrator: Integrator) -> Vec<(String, Source)>
     let objects = objects.map(|(number, object)| (object.name.clone(), Source::Object(number)));
     let others = [
         (BACKGROUND, Source::Background, true),
-        // Paths find that light themselves.
+        // Paths trace the light that ambient and baked light stand for.
         (AMBIENT, Source::Ambient, integrator == Integrator::Whitted),
         (BAKED, Source::Baked, integrator == Integrator::Whitted && scene.has_baked_light()),
     ];

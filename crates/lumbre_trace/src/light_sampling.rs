@@ -1,5 +1,6 @@
-//! Which light a path asks at a point, and where on it: one lamp by what it would send if nothing stood between, and one point of the emissive
-//! triangles by their power. Not whether it is seen. Where there are many lamps a tree says which few of them are weighed one by one.
+//! Light sampling for paths: chooses one lamp in proportion to its unoccluded light at a surface point, and
+//! one point on the emissive triangles in proportion to their power. Visibility is not tested here. Where
+//! there are many lamps, `light_tree` first selects the few that are weighed one by one.
 
 use std::f64::consts::PI;
 
@@ -13,66 +14,69 @@ use crate::metering::luminance;
 use crate::scene::{Object, Passage, Scene, sample_color};
 use crate::surface_point::SurfacePoint;
 
-/// The lights that paths can ask.
+/// The lights of a scene, prepared for sampling.
 #[derive(Debug)]
 pub(crate) struct LightSampler {
     emitters: Vec<Emitter>,
-    /// Distribution of the emitters, ending with 1.
+    /// Cumulative distribution of the emitters by power, ending with 1.
     distribution: Vec<f64>,
-    /// Numbers of the lamps, where they are few.
+    /// Indices of all lights, which are weighed one by one if there is no tree.
     lamps: Vec<usize>,
-    /// Where they are many.
+    /// Selects a few lamps where there are more than [`FEW_LAMPS`].
     tree: Option<LightTree>,
-    /// Chance per square metre of every triangle of the scene, by its number; empty without emitters.
+    /// Density per square metre with which a point of each triangle of the scene is chosen, by the triangle's
+    /// index; empty without emitters.
     densities: Vec<f64>,
 }
 
-/// A triangle that shines.
+/// An emissive triangle.
 #[derive(Clone, Copy, Debug)]
 struct Emitter {
     object: usize,
-    /// Number in its object.
+    /// Index in its object.
     number: u32,
     corners: [DVec3; 3],
-    /// Unit, to the front.
+    /// Unit vector, to the front.
     normal: DVec3,
     area: f64,
 }
 
-/// A point of a lamp as a surface meets it.
+/// A point on a lamp, sampled for a surface point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LampSample {
-    /// Which light of the scene.
+    /// Index of the light in the scene.
     pub number: usize,
-    /// Its light, along the ray to the point.
+    /// The lamp's light from the sampled direction.
     pub light: LightSample,
-    /// That it was chosen.
+    /// Probability that this lamp was chosen.
     pub chance: f64,
-    /// Metres; infinite to distant lights.
+    /// Metres; infinite for distant lights.
     pub distance: f64,
 }
 
-/// A point of an emissive triangle as a surface meets it.
+/// A point on an emissive triangle, sampled for a surface point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EmitterSample {
-    /// Whose triangle it is.
+    /// The object that the triangle belongs to.
     pub object: usize,
     /// Radiance towards the surface.
     pub radiance: DVec3,
-    /// Unit, to the light.
+    /// Unit vector towards the light.
     pub direction: DVec3,
     pub distance: f64,
-    /// Chance per steradian.
+    /// Probability density per steradian.
     pub density: f64,
 }
 
-/// So many lamps are weighed one by one at every point.
+/// Up to this many lights are weighed one by one at every point.
 const FEW_LAMPS: usize = 16;
-/// A texture that is dark in the middle of a triangle may be bright at its corners: a triangle's chance never falls below this part of it.
+/// Lower bound of the emissive texture's luminance where a triangle is weighed: a texture that is dark at the
+/// centroid may be bright elsewhere.
 const LEAST_TINT: f64 = 0.1;
-/// Lamps with a size reach beyond the horizon of their middle.
+/// Lower bound of the cosine with which a lamp with a size is weighed: part of it may be above the horizon
+/// where its centre is not.
 const SIZED_FLOOR: f64 = 0.1;
-/// The sine of the angle that a lamp is seen under is at most this.
+/// Upper bound of the sine of the half angle that a spherical lamp fills.
 const LARGEST_SINE: f64 = 0.99;
 
 impl LightSampler {
@@ -85,7 +89,7 @@ impl LightSampler {
             let object = &scene.objects[index];
             let [front, back] = EmissiveLight::radiance(&object.material).map(|color| color.as_dvec3());
             let shines = luminance(front) + luminance(back);
-            // What is seen through its own holes is met by chance alone.
+            // Emitters with alpha are not sampled: only paths that happen to hit them find their light.
             if shines <= 0.0 || matches!(object.passage(), Passage::Cut | Passage::Covering) {
                 continue;
             }
@@ -120,7 +124,7 @@ impl LightSampler {
         Self { emitters, distribution, lamps, tree, densities }
     }
 
-    /// A lamp at a point, and where on it the ray goes.
+    /// Samples a lamp for a point, and a direction towards it; `None` if no lamp sends light there.
     pub fn lamp(
         &self,
         scene: &Scene,
@@ -173,7 +177,8 @@ impl LightSampler {
         Some(LampSample { number, light, chance: of_asked * weight / total, distance })
     }
 
-    /// A point of the emissive triangles as a point of a surface meets it; nothing where it is the back of one, or there are none.
+    /// Samples a point on the emissive triangles for a surface point; `None` where the triangle's side emits
+    /// nothing, or if there are no emitters.
     pub fn emitter(
         &self,
         scene: &Scene,
@@ -209,28 +214,30 @@ impl LightSampler {
         })
     }
 
-    /// Chance per steradian that a triangle's point is chosen, seen so far away under a cosine; 0 of what is never chosen.
+    /// Returns the density per steradian with which [`emitter`](Self::emitter) chooses a point of a triangle,
+    /// seen at a distance and at a cosine to its normal; 0 for triangles that are never chosen.
     pub fn density(&self, triangle: Option<u32>, distance: f64, cosine: f64) -> f64 {
         let density = triangle.and_then(|triangle| self.densities.get(triangle as usize)).copied();
         density.unwrap_or(0.0) * distance * distance / cosine.abs().max(1e-12)
     }
 }
 
-/// What a side of a triangle sends, of what lights others.
+/// Returns the radiance of one side of a triangle, as far as it lights other surfaces.
 pub(crate) fn emitted(object: &Object, number: u32, weights: [f64; 2], front: bool) -> DVec3 {
     let radiance = EmissiveLight::radiance(&object.material)[usize::from(!front)].as_dvec3();
     if radiance == DVec3::ZERO { radiance } else { radiance * tint(object, number, weights) }
 }
 
-/// The emissive texture at a place of a triangle.
+/// Returns the emissive texture's colour at a place in a triangle.
 fn tint(object: &Object, number: u32, weights: [f64; 2]) -> DVec3 {
     let Some(texture) = &object.textures.emissive else { return DVec3::ONE };
     let (vertices, weights) = object.vertices(number, weights);
     sample_color(texture, object.coordinates(texture.tex_coord, vertices, weights)).truncate()
 }
 
-/// A lamp that is a sphere of one radiance: a direction within the cone that it fills, so weighted that all directions together are the
-/// light of its middle. The ray ends on the sphere.
+/// Samples a spherical lamp of uniform radiance: a direction within the cone that it fills, weighted so that
+/// the mean over all directions is the light of a lamp at its centre. The distance returned ends on the
+/// sphere.
 fn on_sphere_lamp(sample: LightSample, radius: f64, distance: f64, numbers: DVec2) -> (LightSample, f64) {
     let sine = (radius / distance.max(f64::MIN_POSITIVE)).clamp(0.0, LARGEST_SINE);
     if sine == 0.0 {
@@ -244,7 +251,7 @@ fn on_sphere_lamp(sample: LightSample, radius: f64, distance: f64, numbers: DVec
     (spread(sample, direction, cosine), reach)
 }
 
-/// A distant light that is a disc on the sky.
+/// Samples a distant light that is a disc on the sky.
 fn on_disc_of_sky(sample: LightSample, half_angle: f64, numbers: DVec2) -> LightSample {
     if half_angle <= 0.0 {
         return sample;
@@ -253,7 +260,7 @@ fn on_disc_of_sky(sample: LightSample, half_angle: f64, numbers: DVec2) -> Light
     spread(sample, within_cone(sample.direction, cosine, numbers), cosine)
 }
 
-/// The mean of cosines over a cone is (1 + cos)/2 of that of its axis.
+/// Makes up for the cosine: its mean over a cone is (1 + cos)/2 times that of the cone's axis.
 fn spread(sample: LightSample, direction: DVec3, cosine: f64) -> LightSample {
     LightSample { direction, attenuation: sample.attenuation * 2.0 / (1.0 + cosine), ..sample }
 }

@@ -1,38 +1,41 @@
-//! Light by where it comes from: every term that a sample sums up, with its source and with how many surfaces turned it on its way to the eye.
-//! What auxiliary pictures of single lights are made of. Not the sum itself.
+//! The terms that a sample's radiance is the sum of, each with its source and with the number of surfaces on
+//! its way to the eye. Auxiliary pictures of single lights are built from them; the sum itself is not
+//! computed here.
 
 use glam::DVec3;
 use smallvec::SmallVec;
 
-/// What sends light.
+/// What emits light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
-    /// A light of the scene, by its number.
+    /// A light of the scene, by its index.
     Light(usize),
-    /// An object that shines, or shows its colour whatever the light, by its number.
+    /// An emissive or unlit object, by its index.
     Object(usize),
-    /// The background, the sky, the colour of the fog.
+    /// The background, the sky and the colour of the fog.
     Background,
-    /// The ambient light of the scene as a whole.
+    /// The scene's global ambient light.
     Ambient,
-    /// Lightmaps and irradiance volumes, which do not say whose light they hold.
+    /// Lightmaps and irradiance volumes, which do not record whose light they hold.
     Baked,
 }
 
-/// A part of a sample's radiance.
+/// One part of a sample's radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Term {
     pub source: Source,
-    /// Surfaces that reflected or refracted it: 0 of what is seen as it shines, 1 of direct light, more of bounced light.
+    /// Surfaces that reflected or refracted it: 0 for emission that is seen directly, 1 for direct light,
+    /// more for indirect light.
     pub turns: u32,
-    /// W/(m² sr), as it arrives in the pixel.
+    /// W/(m² sr), as it contributes to the pixel.
     pub radiance: DVec3,
 }
 
-/// Turns of what is taken for bounced light without having been followed: ambient and baked light.
+/// Number of turns of light that stands for indirect light without having been traced: ambient and baked
+/// light.
 pub(crate) const BOUNCED: u32 = 2;
 
-/// The terms of a sample, where they are wanted.
+/// The terms of a sample, if they are wanted.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightTerms {
     wanted: bool,
@@ -40,7 +43,7 @@ pub(crate) struct LightTerms {
 }
 
 impl LightTerms {
-    /// None yet; all that come are forgotten unless they are `wanted`.
+    /// Creates an empty list, which discards all terms that are added unless they are `wanted`.
     pub fn new(wanted: bool) -> Self {
         Self { wanted, list: SmallVec::new() }
     }
@@ -49,24 +52,23 @@ impl LightTerms {
         self.wanted
     }
 
-    /// Adds a term.
     pub fn add(&mut self, source: Source, turns: u32, radiance: DVec3) {
         if self.wanted && radiance != DVec3::ZERO {
             self.list.push(Term { source, turns, radiance });
         }
     }
 
-    /// How many there are: where those that come next begin.
+    /// Returns the number of terms, which is the index of the next one.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// Times a factor, all since there were so many.
+    /// Multiplies all terms from index `first` on by a factor.
     pub fn scale_since(&mut self, first: usize, factor: DVec3) {
         self.list[first..].iter_mut().for_each(|term| term.radiance *= factor);
     }
 
-    /// Forgets them.
+    /// Removes all terms.
     pub fn clear(&mut self) {
         self.list.clear();
     }

@@ -1,8 +1,10 @@
-//! A few lamps among many for a point of a surface: a tree of boxes around lamps is walked down, each time into one of two boxes by what it
-//! would send at most, until few lamps are left. Not which of these: they are weighed one by one. Conty Estevez and Kulla, "Importance Sampling
-//! of Many Lights with Adaptive Tree Splitting", 2018, without their splitting.
+//! Selects a few of many lamps for a surface point. A tree of boxes around the lamps is descended, at each
+//! step into one of two boxes in proportion to an estimate of their light, until few lamps are left, which
+//! `light_sampling` weighs one by one. After Conty Estevez and Kulla, "Importance Sampling of Many Lights
+//! with Adaptive Tree Splitting", 2018, without their splitting.
 //!
-//! A box counts for something wherever one of its lamps does, so that no light is left out; how well it is judged decides about the noise alone.
+//! The estimate of a box is above 0 wherever one of its lamps sends light, so that no light is left out; its
+//! accuracy affects the noise alone.
 
 use std::ops::Range;
 
@@ -12,14 +14,14 @@ use lumbre_optics::{Attenuation, Light, LightKind};
 use crate::metering::luminance;
 use crate::scene::Scene;
 
-/// The tree over all lamps that have a place, and the lamps that have none.
+/// The tree over all lamps that have a position, and the distant lights.
 #[derive(Debug)]
 pub(crate) struct LightTree {
-    /// The root is the last.
+    /// The root is the last element.
     boxes: Vec<LightBox>,
-    /// Numbers of lamps, box by box.
+    /// Indices of the lamps, sorted so that every leaf's are together.
     lamps: Vec<usize>,
-    /// Those of distant lights.
+    /// Indices of the distant lights.
     distant: Vec<usize>,
 }
 
@@ -27,13 +29,13 @@ pub(crate) struct LightTree {
 struct LightBox {
     low: DVec3,
     high: DVec3,
-    /// Sum of the lamps' luminances.
+    /// Sum of the lamps' brightnesses.
     brightness: f64,
-    /// Of the brightest of them, without its end.
+    /// Attenuation of the brightest lamp, with an infinite range.
     attenuation: Attenuation,
-    /// Metres that the farthest reaching lamp reaches.
+    /// Largest range of a lamp, metres.
     reach: f64,
-    /// Some lamp has a size, and is seen above a horizon that hides its middle.
+    /// Whether any lamp has a size, and may be seen above a horizon that hides its centre.
     sized: bool,
     inside: Inside,
 }
@@ -41,13 +43,13 @@ struct LightBox {
 #[derive(Debug)]
 enum Inside {
     Boxes([usize; 2]),
-    /// Places in the list of lamps.
+    /// Range of [`LightTree::lamps`].
     Lamps(Range<usize>),
 }
 
-/// The most lamps of a leaf, which are weighed one by one.
+/// Largest number of lamps in a leaf.
 const FEW: usize = 8;
-/// A part of a box's light that counts for it below the horizon too, where a lamp in it has a size.
+/// Lower bound of the cosine for a box in which a lamp has a size, since part of it may be above the horizon.
 const BELOW_HORIZON: f64 = 0.1;
 
 impl LightTree {
@@ -69,7 +71,8 @@ impl LightTree {
         tree
     }
 
-    /// Some lamps, by `choice` in [0, 1), and the chance that it was these; nothing where no lamp's light arrives.
+    /// Selects some lamps by `choice` in [0, 1). Returns them, the probability of selecting them, and an
+    /// evenly distributed number that is left of `choice`; `None` where no lamp's light arrives.
     pub fn few(
         &self,
         scene: &Scene,
@@ -103,7 +106,8 @@ impl LightTree {
         }
     }
 
-    /// Adds the box of these lamps, whose list begins at a place of the whole one, and all boxes in it. Gives its number.
+    /// Adds the box around `lamps`, which begin at index `first` of the whole list, and all boxes within it.
+    /// Returns its index.
     fn add(&mut self, scene: &Scene, lamps: &mut [usize], first: usize) -> usize {
         let place = |number: &usize| scene.lights[*number].position;
         let low = lamps.iter().map(place).fold(DVec3::INFINITY, DVec3::min);
@@ -135,7 +139,7 @@ impl LightTree {
 }
 
 impl LightBox {
-    /// About the light that its lamps bring to a point of a surface, if nothing stands between; 0 only if none brings any.
+    /// Estimates the unoccluded light that the lamps send to a surface point; 0 only if none sends any.
     fn brings(&self, point: DVec3, normal: DVec3) -> f64 {
         let nearest = point.clamp(self.low, self.high);
         if nearest.distance(point) > self.reach {
@@ -147,7 +151,8 @@ impl LightBox {
         let distance = to.length();
         let mut cosine = 1.0;
         if distance > radius {
-            // The lamp that stands highest over the surface may be so much nearer to its normal than the middle of the box is.
+            // A lamp in the box may be closer to the surface's normal than the box's centre is, by up to this
+            // angle.
             let spread = (radius / distance).asin();
             let angle = (normal.dot(to) / distance).clamp(-1.0, 1.0).acos();
             cosine = (angle - spread).max(0.0).cos().max(if self.sized { BELOW_HORIZON } else { 0.0 });
@@ -156,7 +161,7 @@ impl LightBox {
     }
 }
 
-/// As lamps are weighed against each other.
+/// The brightness by which lamps are compared; 0 for a disabled lamp.
 fn brightness(light: &Light) -> f64 {
     if light.enabled {
         luminance(light.diffuse.as_dvec3()) + luminance(light.specular.as_dvec3())
@@ -165,7 +170,8 @@ fn brightness(light: &Light) -> f64 {
     }
 }
 
-/// Whether a choice falls to the first of two of which it has this share; what is left of the choice is as even as it was.
+/// Returns true if `choice` selects the first of two alternatives, whose probability is `share`. Multiplies
+/// `chance` by the probability of what was selected and rescales `choice` to [0, 1) again.
 fn take(choice: &mut f64, chance: &mut f64, share: f64) -> bool {
     let first = *choice < share;
     let (from, part) = if first { (0.0, share) } else { (share, 1.0 - share) };

@@ -1,6 +1,7 @@
-//! Directions by the lobes of a surface: cosine for the diffuse part, Phong's about the mirrored line of sight, Blinn's and the microfacets'
-//! about the normal of the half vector; and how probable each direction is. Not what the surface reflects: those are `lumbre_optics`'
-//! functions, whatever chose the direction.
+//! Importance sampling of a surface's lobes: a cosine distribution for the diffuse part, Phong's about the
+//! mirrored viewing direction, and Blinn's and the microfacets' by half vectors about the normal; with the
+//! density of every direction. The reflectance comes from `lumbre_optics`, whichever strategy sampled the
+//! direction.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,30 +11,31 @@ use lumbre_optics::{
     model_exponent, reflected_direction,
 };
 
-/// The lobes of a surface, seen from a direction.
+/// The lobes of a surface for one viewing direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lobes {
     model: ReflectionModel,
     surface: SurfaceSample,
     normal: DVec3,
     viewer: DVec3,
-    /// Chance of the specular lobe.
+    /// Probability of sampling the specular lobe.
     specular: f64,
     shape: Shape,
 }
 
-/// About what the specular lobe is spread, and how.
+/// The distribution from which the specular lobe is sampled.
 #[derive(Clone, Copy, Debug)]
 enum Shape {
-    /// cosⁿ about the mirrored line of sight.
+    /// cosⁿ about the mirrored viewing direction.
     Mirrored { exponent: f64 },
     /// cosⁿ⁺¹ of the half vector about the normal.
     HalfVector { exponent: f64 },
-    /// Trowbridge and Reitz's distribution of the half vector, α² given.
+    /// Trowbridge and Reitz's distribution (GGX) of the half vector.
     LongTail { alpha_squared: f64 },
 }
 
-/// The least chance of a lobe that is there: what one lobe seldom chooses the other may be full of.
+/// Least probability of a lobe that exists: where the density of one is low, the other may still reflect
+/// much.
 const LEAST_CHANCE: f64 = 0.1;
 
 impl Lobes {
@@ -68,12 +70,13 @@ impl Lobes {
         Self { model, surface: *surface, normal, viewer, specular, shape }
     }
 
-    /// Whether any direction reflects anything.
+    /// Returns true if no direction reflects anything.
     pub fn are_black(&self) -> bool {
         self.surface.diffuse == DVec3::ZERO && self.surface.specular == DVec3::ZERO
     }
 
-    /// About how much of the light the lobes send back, for choosing between them and other rays.
+    /// Returns roughly how much light the lobes reflect, for choosing between them and mirrored or
+    /// transmitted rays.
     pub fn albedo(&self) -> f64 {
         let share = match self.surface.lobe {
             Lobe::EnergyKeeping => 1.0,
@@ -82,7 +85,7 @@ impl Lobes {
         (self.surface.diffuse + self.surface.specular * share).element_sum() / 3.0
     }
 
-    /// A direction.
+    /// Samples a direction, by numbers in [0, 1). It may point below the surface.
     pub fn direction(&self, choice: f64, numbers: DVec2) -> DVec3 {
         if choice >= self.specular {
             return around(self.normal, power_of_cosine(numbers, 1.0));
@@ -103,7 +106,7 @@ impl Lobes {
         }
     }
 
-    /// Chance of a direction per steradian.
+    /// Returns the density with which [`direction`](Self::direction) samples a direction, per steradian.
     pub fn density(&self, direction: DVec3) -> f64 {
         let diffuse = self.normal.dot(direction).max(0.0) / PI;
         if self.specular == 0.0 {
@@ -134,7 +137,8 @@ impl Lobes {
         density(half.dot(self.normal)) / (4.0 * (0.5 * length).max(1e-12))
     }
 
-    /// The bidirectional reflectance times the cosine, linear RGB, 1/sr: the lighting equation for a light of unit irradiance.
+    /// Returns the bidirectional reflectance times the cosine, linear RGB, 1/sr: the lighting equation for a
+    /// light of unit irradiance.
     pub fn reflectance(&self, direction: DVec3) -> DVec3 {
         self.reflected(&LightSample {
             diffuse: DVec3::splat(1.0 / PI),
@@ -146,7 +150,7 @@ impl Lobes {
         })
     }
 
-    /// What is reflected of a light.
+    /// Returns the diffuse and specular reflection of a light.
     pub fn reflected(&self, light: &LightSample) -> DVec3 {
         let Contribution { diffuse, specular, .. } =
             light_contribution(self.model, self.surface, light, self.normal, self.viewer);
@@ -154,7 +158,7 @@ impl Lobes {
     }
 }
 
-/// cosⁿ about +Z, from two numbers.
+/// Samples cosⁿ about +Z from two numbers in [0, 1).
 fn power_of_cosine(numbers: DVec2, exponent: f64) -> DVec3 {
     on_sphere((1.0 - numbers.x).powf(1.0 / (exponent + 1.0)), numbers.y)
 }
@@ -163,20 +167,20 @@ fn density_of_power(cosine: f64, exponent: f64) -> f64 {
     if cosine <= 0.0 { 0.0 } else { (exponent + 1.0) / TAU * cosine.powf(exponent) }
 }
 
-/// A unit vector at an angle to +Z with this cosine.
+/// Returns the unit vector that has this cosine to +Z and this turn about it, in whole turns.
 fn on_sphere(cosine: f64, turn: f64) -> DVec3 {
     let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
     let (along_y, along_x) = (TAU * turn).sin_cos();
     DVec3::new(sine * along_x, sine * along_y, cosine)
 }
 
-/// A vector about +Z, turned to lie about an axis.
+/// Rotates a vector so that what was its +Z is an axis.
 pub(crate) fn around(axis: DVec3, vector: DVec3) -> DVec3 {
     let (right, up) = axis.any_orthonormal_pair();
     (right * vector.x + up * vector.y + axis * vector.z).normalize_or(axis)
 }
 
-/// A unit vector within a cone about an axis, all alike.
+/// Samples a direction within a cone about an axis, uniformly.
 pub(crate) fn within_cone(axis: DVec3, cosine: f64, numbers: DVec2) -> DVec3 {
     around(axis, on_sphere(1.0 - numbers.x * (1.0 - cosine), numbers.y))
 }
@@ -220,14 +224,15 @@ mod tests {
     #[test]
     fn densities_add_up_to_what_is_chosen() {
         for lobes in every_lobe() {
-            // By directions that are chosen evenly: the density's integral over the sphere, which is 1 but for what half vectors send below
-            // the horizon of no surface.
+            // The integral of the density over the whole sphere is 1. Part of it may be below the horizon,
+            // where half vectors reflect the viewing direction into the surface.
             let count = 100_000u32;
             let (mut whole, mut upper) = (0.0, 0.0);
             for index in 0..count {
                 let mut numbers = Numbers::new(7, index >> 16, index & 0xffff);
                 let pair = numbers.pair();
-                // Half of them about the lobes, by the balance heuristic, so that sharp ones are met.
+                // Half of the directions are uniform and half are sampled from the lobes, so that sharp lobes
+                // are resolved; the balance heuristic combines them.
                 let direction = if index % 2 == 0 {
                     on_sphere(1.0 - 2.0 * pair.x, pair.y)
                 } else {
@@ -246,7 +251,8 @@ mod tests {
     #[test]
     fn chosen_directions_estimate_the_integral_of_the_reflectance() {
         for lobes in every_lobe() {
-            // Against a grid over the hemisphere, in the cosine and the turn, with the grid's pole at the mirrored direction, where it is fine.
+            // The reference is a sum over a grid on the hemisphere, whose pole is the mirrored direction,
+            // where the grid is finest.
             let count = 60_000u32;
             let mut sum = DVec3::ZERO;
             for index in 0..count {
@@ -263,7 +269,7 @@ mod tests {
             let (rows, columns) = (800, 160);
             let mut wanted = DVec3::ZERO;
             for row in 0..rows {
-                // Squared twice: the rows crowd at the pole.
+                // The fourth power concentrates the rows at the pole.
                 let edge = |row: i32| 2.0 * (f64::from(row) / f64::from(rows)).powi(4);
                 let (low, high) = (edge(row), edge(row + 1));
                 for column in 0..columns {

@@ -1,4 +1,5 @@
-//! In which medium a ray runs: media inside media as a stack, and what each absorbs. Not refraction.
+//! The nested media that a ray is inside of, as a stack, and their absorption. Refraction at their surfaces
+//! is in `interface`.
 
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -11,26 +12,27 @@ use crate::scene::{Object, Scene};
 pub(crate) struct Layer {
     pub object: usize,
     pub index: f64,
-    /// 1/m.
+    /// Absorption coefficient, 1/m.
     pub absorption: DVec3,
 }
 
-/// The solids that a ray is inside of, the innermost last. Outside of all is air.
+/// The solids that a ray is inside of, the innermost last; empty in air.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct MediumStack(SmallVec<[Layer; 4]>);
 
-/// More surfaces than this around one point are no scene but a mistake.
+/// Largest number of surfaces that are crossed to find the media of a point. More than this mean a broken
+/// scene.
 const MOST_SURFACES: usize = 4096;
 
 impl MediumStack {
-    /// The media at a point in free space, found by a ray to infinity: what it leaves without having entered it contains the point, the
-    /// innermost first.
+    /// Finds the media at a point in free space with a ray to infinity: a solid that it leaves without having
+    /// entered it contains the point, and the innermost is left first.
     pub fn at(scene: &Scene, point: DVec3) -> Self {
         let mut around = SmallVec::<[Layer; 4]>::new();
         if !scene.solids {
             return Self(around);
         }
-        // Along no axis and no diagonal, where the edges of made things lie.
+        // Parallel to no axis and no diagonal, so that the ray rarely hits the edges of modelled objects.
         let direction = DVec3::new(0.5377, 0.7213, 0.4368).normalize();
         let mut entered: Vec<usize> = Vec::new();
         let mut ray = SpaceRay::new(point, direction);
@@ -53,7 +55,7 @@ impl MediumStack {
         Self(around)
     }
 
-    /// The media behind a surface of a solid, met from its front or its back.
+    /// Returns the media behind a surface of a solid that is hit from its front or its back.
     pub fn across(&self, object: usize, solid: &Object, front: bool) -> Self {
         let mut behind = self.clone();
         if front {
@@ -64,8 +66,8 @@ impl MediumStack {
         behind
     }
 
-    /// On this side of a surface of a solid: inside of it if its back is met, whatever was known before (a surface that does not close has
-    /// no way in).
+    /// Returns the media in front of a surface of a solid. If its back is hit, the solid is among them even
+    /// if it was never entered, as where its surface is not closed.
     pub fn before(&self, object: usize, solid: &Object, front: bool) -> Self {
         let inside = self.0.iter().any(|layer| layer.object == object);
         let mut here = self.clone();
@@ -75,16 +77,17 @@ impl MediumStack {
         here
     }
 
-    /// The index of refraction here.
+    /// Returns the index of refraction of the innermost medium; 1 in air.
     pub fn index(&self) -> f64 {
         self.0.last().map_or(1.0, |layer| layer.index)
     }
 
-    /// What is left of the light after so many metres here.
+    /// Returns the transmittance over a distance in metres.
     #[inline]
     pub fn transmittance(&self, distance: f64) -> DVec3 {
         match self.0.last() {
-            // What does not absorb lets through all of it, from infinity too.
+            // Channels without absorption transmit all light, also over an infinite distance, where the
+            // product would not be a number.
             Some(layer) if layer.absorption != DVec3::ZERO => layer
                 .absorption
                 .map(|absorption| if absorption > 0.0 { (-absorption * distance).exp() } else { 1.0 }),
@@ -92,7 +95,7 @@ impl MediumStack {
         }
     }
 
-    /// The solid here, if there is one.
+    /// Returns the innermost solid, or `None` in air.
     pub fn innermost(&self) -> Option<usize> {
         self.0.last().map(|layer| layer.object)
     }

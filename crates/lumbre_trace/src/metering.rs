@@ -1,25 +1,26 @@
-//! Exposure by metering a traced picture, as frames are metered. Not the display.
+//! Automatic exposure of a traced picture from its log-average luminance, by the same rule as frames.
 
 use glam::DVec3;
 
-/// What the log-average luminance becomes: the middle grey of photography.
+/// The displayed value that the log-average luminance is exposed to: photographic middle grey.
 const MIDDLE_GREY: f64 = 0.18;
-/// Below this a pixel shows no light, and is not metered.
+/// Pixels of this luminance or less count as unlit and are not metered.
 const DARK: f64 = 1e-7;
 
-/// What metering found.
+/// The result of metering a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metering {
-    /// Log-average luminance of what is lit, in units of radiance.
+    /// Log-average luminance of the lit pixels, in units of radiance.
     pub luminance: f64,
-    /// The factor on radiance that shows it as a middle grey.
+    /// The factor on radiance that displays this luminance as middle grey.
     pub exposure: f32,
-    /// Share of what is lit that would be white without an exposure, 0 to 1.
+    /// Fraction of the lit pixels whose luminance is 1 or more, which would be white without an exposure; 0
+    /// to 1.
     pub clipped: f64,
 }
 
 impl Metering {
-    /// Of radiances; nothing if none is lit.
+    /// Meters the radiance of all pixels; returns `None` if none is lit.
     pub fn of(pixels: &[DVec3]) -> Option<Self> {
         let luminance = |pixel: &DVec3| luminance(*pixel);
         let lit: Vec<f64> =
@@ -34,13 +35,13 @@ impl Metering {
         Some(Self { luminance, exposure, clipped })
     }
 
-    /// The exposure value at ISO 100 whose factor is this exposure: the factor is 1 / (1.2 · 2^EV).
+    /// Returns the exposure value (EV) at ISO 100 that gives this exposure: the factor is 1 / (1.2 · 2^EV).
     pub fn exposure_value(&self) -> f64 {
         -(1.2 * f64::from(self.exposure)).log2()
     }
 }
 
-/// Of linear RGB with sRGB's primaries.
+/// Luminance of linear RGB with sRGB's primaries.
 pub(crate) fn luminance(color: DVec3) -> f64 {
     color.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }

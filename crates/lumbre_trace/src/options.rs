@@ -1,4 +1,5 @@
-//! What can be asked of a picture, and what is said about it afterwards. Plain data.
+//! The options of a traced picture, the picture itself and the report on it: plain data, with the validation
+//! of the options.
 
 use std::time::Duration;
 
@@ -11,22 +12,23 @@ use crate::TraceError;
 use crate::aov::{Aov, AovPicture};
 use crate::filter::Filter;
 
-/// How light is followed.
+/// Selects the light transport algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
-    /// The documents' ray tree: lamps with hard shadows, mirrors, glass; diffuse light from other surfaces as lightmaps have it.
+    /// Whitted's ray tree: direct light of the lamps with hard shadows, mirrors and glass. Diffuse light from
+    /// other surfaces comes from lightmaps and irradiance volumes only.
     #[default]
     Whitted,
-    /// Paths: all light as it is, with noise that is stated.
+    /// Path tracing: all light transport, unbiased, with noise whose standard error is reported.
     Path,
 }
 
 impl Integrator {
-    /// Both.
+    /// Both integrators.
     pub const ALL: &'static [Self] = &[Self::Whitted, Self::Path];
 
-    /// The name used on the command line.
+    /// Returns the name used on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Whitted => "whitted",
@@ -34,49 +36,55 @@ impl Integrator {
         }
     }
 
-    /// The choice with that name, if there is one.
+    /// Returns the integrator with that name on the command line, or `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|choice| choice.name() == name)
     }
 }
 
-/// What is asked of a picture.
+/// What to trace, how, and for how long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TraceOptions {
-    /// The camera; else the active one, else the first.
+    /// The camera; `None` takes the active one, or the first if none is active.
     pub camera: Option<Entity>,
     /// Width and height in pixels.
     pub size: (u32, u32),
-    /// How light is followed.
+    /// The light transport algorithm.
     pub integrator: Integrator,
-    /// This specular model in place of the scene's.
+    /// Replaces every object's specular reflection model.
     pub reflection: Option<ReflectionModel>,
-    /// Mirrored and transmitted rays one after another. Of paths all reflections count, and without a number only chance ends them.
+    /// Largest number of mirrored and transmitted rays in succession. A path's diffuse and glossy reflections
+    /// count too. `None` means [`DEFAULT_DEPTH`] for the ray tree, and for paths that only Russian roulette
+    /// ends them.
     pub depth: Option<u32>,
-    /// Rays of the tree that count for less than this in every channel are not traced.
+    /// Rays of the ray tree whose weight in the pixel is below this in every channel are not traced; 0 to 1.
     pub weight: f64,
-    /// Lights cast shadows.
+    /// Whether lights cast shadows.
     pub shadows: bool,
-    /// The ray tree reads lightmaps as a frame does. Paths never do.
+    /// Whether the ray tree reads lightmaps as frames do. Paths never read them.
     pub lightmaps: bool,
-    /// The ray tree reads irradiance volumes as a frame does. Paths never do.
+    /// Whether the ray tree reads irradiance volumes as frames do. Paths never read them.
     pub irradiance_volumes: bool,
-    /// Samples of every pixel: exactly so many of the ray tree, at most so many paths.
+    /// Samples per pixel. The ray tree takes exactly this many, 1 without a number. Paths take at most this
+    /// many, rounded up to a multiple of 4; without a number [`DEFAULT_PATHS`], or [`MAXIMUM_SAMPLES`] if
+    /// `error` or `time` is given.
     pub samples: Option<u32>,
-    /// Relative standard error of the whole picture at which paths are enough.
+    /// Path tracing ends when the relative standard error of the whole picture is this or less.
     pub error: Option<f64>,
-    /// After which no more samples are begun.
+    /// When this much time is over, no further samples are started.
     pub time: Option<Duration>,
-    /// Worker threads; as many as there are cores without this.
+    /// Number of worker threads; `None` takes one per core.
     pub threads: Option<usize>,
-    /// How samples make a pixel.
+    /// The reconstruction filter that weights the samples of a pixel.
     pub filter: Filter,
-    /// Of the ray tree: pixels whose samples differ by more than this, as shown, get up to [`samples`](Self::samples) of them, others a
-    /// quarter. Without it all get all.
+    /// For the ray tree with 4 or more samples: all pixels get a quarter of the [`samples`](Self::samples),
+    /// and only those that then differ from a neighbour by more than this, as displayed, in [0, 1], get the
+    /// rest. `None` gives all samples to all pixels.
     pub adaptive: Option<f64>,
-    /// Of paths: pixels get samples in proportion to their noise, and [`samples`](Self::samples) of them in the mean.
+    /// For paths: distributes samples in proportion to each pixel's noise, with [`samples`](Self::samples) of
+    /// them per pixel on average.
     pub sample_by_noise: bool,
-    /// Auxiliary pictures that are wanted beside the picture.
+    /// Auxiliary pictures to produce beside the main one.
     pub aovs: Vec<Aov>,
 }
 
@@ -104,22 +112,22 @@ impl Default for TraceOptions {
     }
 }
 
-/// The ray tree's depth where none is asked for.
+/// Depth of the ray tree if none is given.
 pub const DEFAULT_DEPTH: u32 = 5;
-/// The ray tree's least weight where none is asked for: a quarter of an eight-bit step of a white surface.
+/// Smallest weight of a traced ray if none is given: a quarter of an 8-bit step of a white surface.
 pub const DEFAULT_WEIGHT: f64 = 1.0 / 1024.0;
-/// Paths of every pixel where neither a number nor an error nor a time is asked for.
+/// Paths per pixel if neither a number of samples nor an error nor a time is given.
 pub const DEFAULT_PATHS: u32 = 64;
-/// Deeper trees than this would outgrow a thread's stack.
+/// Largest depth allowed: deeper trees would overflow a thread's stack.
 pub const MAXIMUM_DEPTH: u32 = 1000;
-/// Most samples of a pixel.
+/// Largest number of samples per pixel allowed.
 pub const MAXIMUM_SAMPLES: u32 = 1 << 20;
 
 impl TraceOptions {
-    /// Whether it makes sense.
+    /// Checks that all options are in range.
     ///
     /// # Errors
-    /// [`TraceError::Size`] and [`TraceError::Option`], the first fault.
+    /// [`TraceError::Size`] or [`TraceError::Option`] for the first option that is out of range.
     pub fn validate(&self) -> Result<(), TraceError> {
         let (width, height) = self.size;
         if !((1..=32_768).contains(&width) && (1..=32_768).contains(&height)) {
@@ -149,14 +157,14 @@ impl TraceOptions {
     }
 }
 
-/// How far a picture is.
+/// Progress of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// 0 to 1; of paths that go on until an error or a time is reached, what is expected.
+    /// 0 to 1; an estimate where paths go on until an error or a time is reached.
     pub fraction: f64,
-    /// Samples that every pixel has.
+    /// Samples that every pixel has so far.
     pub samples: u32,
-    /// Relative standard error of the whole picture so far, if it can be stated.
+    /// Relative standard error of the whole picture so far, once it can be stated.
     pub error: Option<f64>,
 }
 
@@ -164,71 +172,73 @@ pub struct Progress {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ended {
-    /// All that was asked for is there.
+    /// All samples were taken.
     Complete,
-    /// The error asked for is reached.
+    /// The requested error was reached.
     Error,
-    /// The time is over.
+    /// The time was over.
     Time,
-    /// Somebody interrupted it.
+    /// The listener interrupted it.
     Interrupted,
 }
 
-/// A picture, top row first.
+/// A traced picture, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Columns.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
     /// Radiance of every pixel, linear RGB, W/(m² sr); 0 where nothing was traced.
     pub radiance: Vec<DVec3>,
-    /// Standard error of every pixel's radiance, if it was sampled often enough to state it.
+    /// Standard error of every pixel's radiance, if every pixel has enough samples to state it.
     pub standard_error: Option<Vec<DVec3>>,
-    /// Rays of every pixel, shadow rays too.
+    /// Rays traced for every pixel, shadow rays included.
     pub rays: Vec<u32>,
-    /// Factor on radiance of the camera.
+    /// The camera's exposure: the factor on radiance for display.
     pub exposure: f32,
     /// The auxiliary pictures that were asked for.
     pub aovs: Vec<AovPicture>,
 }
 
-/// What is said about a picture.
+/// Statistics of a traced picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TraceReport {
-    /// How light was followed.
+    /// The light transport algorithm.
     pub integrator: Integrator,
     /// Why it ended.
     pub ended: Ended,
-    /// Seconds.
+    /// Duration in seconds.
     pub seconds: f64,
-    /// Rays, shadow rays too.
+    /// Rays traced, shadow rays included.
     pub rays: u64,
-    /// Millions of rays a second.
+    /// Millions of rays per second.
     pub mega_rays_per_second: f64,
-    /// Samples of a pixel: the least and the most.
+    /// Smallest and largest number of samples of a pixel.
     pub samples: [u32; 2],
-    /// Share of the pixels that have any, 0 to 1.
+    /// Fraction of the pixels that have any sample, 0 to 1.
     pub finished: f64,
-    /// Relative standard error of the whole picture: root mean square of the pixels' standard errors over the mean radiance.
+    /// Relative standard error of the whole picture: the root mean square of the pixels' standard errors over
+    /// the mean radiance.
     pub standard_error: Option<f64>,
     /// What the limits of depth and weight cut off.
     pub cut: Cut,
-    /// What was left out, and why.
+    /// What was left out of the scene, and why.
     pub notes: Vec<String>,
 }
 
-/// What the limits cut off of the ray trees.
+/// What the limits of depth, weight and ray count cut off the ray trees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cut {
-    /// Weight of the rays that were not traced, summed up by pixel: the mean over all pixels.
+    /// Sum of the weights of a pixel's untraced rays, in its worst sample, averaged over all pixels.
     pub mean_weight: f64,
-    /// Of the pixel that lost most.
+    /// The largest such sum of any pixel.
     pub largest_weight: f64,
-    /// The brightest radiance that any ray of the picture brought, W/(m² sr).
+    /// The brightest radiance that any traced ray returned, W/(m² sr).
     pub brightest: f64,
-    /// So much radiance may be missing from any pixel at most, if no point that was not seen sends more by itself than the points that
-    /// were: the largest weight times the largest local light over 1 - (k_r + k_t). Nothing where that series has no end: a surface that
-    /// passes on all light and adds some.
+    /// Upper bound of the radiance that may be missing from any pixel, provided that no point that was not
+    /// seen emits more by itself than the points that were: the largest weight times the largest local light
+    /// over 1 - (k_r + k_t). `None` where that series diverges, at a surface that passes on all light and
+    /// adds some.
     pub bound: Option<f64>,
 }

@@ -1,9 +1,10 @@
-//! Paths: all light as it is, by chance. At every point one lamp and one emissive triangle are asked, and the path goes on by the lobes of
-//! the surface, its mirror or its glass; what both find is weighed by the balance heuristic (Veach and Guibas 1995), what goes on for long
-//! ends by Russian roulette. Nothing is left out or clamped, so that the mean over many paths is the light.
+//! Path tracing, an unbiased estimate of all light. At every point the light of one lamp and of one emissive
+//! triangle is sampled, and the path goes on by the lobes of the surface, its mirror or its glass; both
+//! strategies are combined by the balance heuristic (Veach and Guibas 1995), and long paths end by Russian
+//! roulette. Nothing is left out or clamped, so that the mean over many paths converges to the light.
 //!
-//! What no path finds: lamps without a size, and those of a size, through glass that refracts. Such light is a caustic of a point, and needs
-//! rays from the lamp. Emissive triangles and the sky are found through glass.
+//! Not found: the light of lamps, with or without a size, through glass that refracts. Such caustics would
+//! need paths that start at the lamp. Emissive triangles and the sky are found through glass.
 
 use glam::{DVec2, DVec3};
 use lumbre_optics::{apply_fog, fog_weight};
@@ -23,40 +24,43 @@ use crate::scene::Scene;
 use crate::shadow_ray::{Glass, transmittance};
 use crate::surface_point::SurfacePoint;
 
-/// What follows the paths of a picture.
+/// Traces the paths of a picture.
 pub(crate) struct Paths<'a> {
     scene: &'a Scene,
     camera: &'a CameraRays,
     lights: LightSampler,
-    /// Reflections of a path; without a number only chance ends it.
+    /// Largest number of reflections and refractions; `None` leaves the end to Russian roulette.
     depth: Option<u32>,
     shadows: bool,
 }
 
-/// Points before chance may end a path.
+/// Number of reflections and refractions before Russian roulette may end a path.
 const SAFE_DEPTH: u32 = 4;
-/// The largest chance of going on: between two perfect mirrors a path would not end otherwise.
+/// Largest probability of going on: otherwise a path between two perfect mirrors would never end.
 const LIKELIEST: f64 = 0.95;
-/// Surfaces that a path goes straight through, sheets and what covers in part, and all others.
+/// Largest number of surfaces of a path, including those that it goes straight through: thin sheets and
+/// partly covering surfaces.
 const MOST_SURFACES: u32 = 100_000;
 
-/// A path on its way.
+/// The state of a path while it is traced.
 struct Walk {
     ray: SpaceRay,
     farthest: f64,
     media: MediumStack,
     throughput: DVec3,
-    /// The part of `throughput` that is the change of solid angles by refraction, and goes when the path leaves the glass.
+    /// The part of `throughput` that comes from refraction changing solid angles, 1/η² at each interface; it
+    /// is 1 again once the path has left the glass.
     squeezed: f64,
-    /// What it brings.
+    /// The radiance found so far.
     radiance: DVec3,
-    /// What that is the sum of, if it is wanted.
+    /// The terms that the radiance is the sum of, if they are wanted.
     terms: LightTerms,
-    /// Chance per steradian of the last direction, and metres since: nothing where it was a mirror's, glass's or the camera's.
+    /// Density per steradian with which the last direction was sampled, and metres since that scattering;
+    /// `None` after the camera, a mirror or glass, whose directions are not sampled.
     last: Option<(f64, f64)>,
     reflections: u32,
     rays: u32,
-    /// It has met nothing but sheets and what covers in part.
+    /// Whether it has met nothing so far but thin sheets and partly covering surfaces.
     first: bool,
 }
 
@@ -72,7 +76,7 @@ impl<'a> Paths<'a> {
         Self { scene, camera, lights: LightSampler::new(scene), depth, shadows }
     }
 
-    /// One path, and the terms of its light.
+    /// Traces one path, with the terms of its light.
     pub fn sample(
         &self,
         camera: &CameraRay,
@@ -98,7 +102,7 @@ impl<'a> Paths<'a> {
                 break;
             }
         }
-        // Lights at the ends of f64 may still be too much for a product of factors.
+        // With lights near the limits of f64 the product of factors may overflow.
         let mut radiance = walk.radiance;
         if !radiance.is_finite() {
             radiance = DVec3::ZERO;
@@ -112,7 +116,8 @@ impl<'a> Paths<'a> {
         let scene = self.scene;
         walk.rays += 1;
         let looks = walk.last.is_none();
-        // What looks sees through the backs of what has none; light stops there.
+        // Rays from the eye, mirrors and glass pass the culled backs of single-sided surfaces, as a
+        // rasterizer does. Rays that carry light are blocked by them.
         let found = nearest_surface(scene, &walk.ray, walk.farthest, |crossing| {
             if looks { scene.is_seen(crossing) } else { scene.blocks(crossing) }
         });
@@ -142,7 +147,7 @@ impl<'a> Paths<'a> {
         self.scatter(walk, &point, since, numbers)
     }
 
-    /// Fog between the eye and what it sees, as a frame has it.
+    /// Adds the fog between the eye and what it sees, as frames have it.
     fn add_fog(&self, walk: &mut Walk, point: &SurfacePoint) {
         let Some(fog) = &self.scene.settings.fog else { return };
         let clear = fog_weight(&fog.mode, self.camera.depth(point.position));
@@ -150,7 +155,8 @@ impl<'a> Paths<'a> {
         walk.throughput *= clear;
     }
 
-    /// What the surface sends by itself: all of it to what looks; to others by how probable the ways are on which it is found.
+    /// Adds the emission of the surface: all of it after the camera, a mirror or glass, where light sampling
+    /// cannot find it, and otherwise weighted by the balance heuristic.
     fn add_emission(&self, walk: &mut Walk, point: &SurfacePoint, place: &Place, since: f64) {
         let Some((density, _)) = walk.last else {
             walk.brings(Source::Object(point.object), walk.reflections, point.emission);
@@ -170,7 +176,7 @@ impl<'a> Paths<'a> {
         walk.brings(Source::Object(point.object), walk.reflections, radiance * share);
     }
 
-    /// Asks the lights, and sends the path on.
+    /// Samples the lights, and then the direction in which the path goes on.
     fn scatter(&self, walk: &mut Walk, point: &SurfacePoint, since: f64, numbers: &mut Numbers) -> Next {
         let scene = self.scene;
         let object = &scene.objects[point.object];
@@ -204,7 +210,7 @@ impl<'a> Paths<'a> {
                 if object.medium.thin {
                     return walk.goes_straight(point, since);
                 }
-                // Radiance is squeezed with the solid angle.
+                // Refraction changes the solid angle of a beam, and its radiance with it, by 1/η².
                 let squeezed = 1.0 / (division.eta * division.eta);
                 walk.throughput *= squeezed;
                 walk.squeezed *= squeezed;
@@ -218,12 +224,13 @@ impl<'a> Paths<'a> {
             return Next::Ends;
         }
         walk.throughput *= lobes.reflectance(direction) * (total / (local * density));
-        // What finds a light by this direction would have found it with this chance: that of the lobes alone times theirs.
+        // The density that the balance heuristic compares: the probability of choosing the lobes at all,
+        // times their density.
         let chance = density * local / total;
         walk.turns(shadow_ray(point, direction), Some(chance), numbers)
     }
 
-    /// The light of one lamp and of one emissive triangle.
+    /// Next-event estimation: adds the light of one sampled lamp and of one sampled emissive triangle.
     fn ask_lights(
         &self,
         walk: &mut Walk,
@@ -242,7 +249,7 @@ impl<'a> Paths<'a> {
         }
         let (choice, place) = (numbers.next(), numbers.pair());
         if let Some(sample) = self.lights.emitter(self.scene, point, choice, place) {
-            // A path that ends here will not find it itself.
+            // A path that ends here cannot hit the emitter itself.
             let found = if last { 0.0 } else { self.chance(walk, point, lobes, sample.direction) };
             let reflected = lobes.reflectance(sample.direction) * sample.radiance / (sample.density + found);
             let seen = self.seen(walk, point, (sample.direction, sample.distance, &[]), reflected);
@@ -250,7 +257,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// Chance per steradian that the path itself goes on in a direction by its lobes.
+    /// Returns the density per steradian with which the path itself goes on in a direction by its lobes.
     fn chance(&self, walk: &Walk, point: &SurfacePoint, lobes: &Lobes, direction: DVec3) -> f64 {
         let object = &self.scene.objects[point.object];
         let local = lobes.albedo().max(1e-3);
@@ -262,7 +269,7 @@ impl<'a> Paths<'a> {
         lobes.density(direction) * local / total
     }
 
-    /// What arrives of it.
+    /// Returns how much of a sampled light arrives at the point; 0 from below the geometric horizon.
     fn seen(
         &self,
         walk: &mut Walk,
@@ -285,7 +292,8 @@ impl<'a> Paths<'a> {
 }
 
 impl Walk {
-    /// Light that the rest of the path reflects to the eye, after so many surfaces.
+    /// Adds light that arrives at the path's last point, times the throughput. `turns` counts the surfaces on
+    /// its whole way to the eye.
     fn brings(&mut self, source: Source, turns: u32, light: DVec3) {
         let radiance = self.throughput * light;
         self.radiance += radiance;
@@ -302,7 +310,7 @@ impl Walk {
         }
     }
 
-    /// Through a sheet, or past what covers in part: the same line goes on.
+    /// Goes on in the same direction, through a thin sheet or past a partly covering surface.
     fn goes_straight(&mut self, point: &SurfacePoint, since: f64) -> Next {
         self.farthest -= point.distance;
         self.ray = SpaceRay::leaving(point.position, self.ray.direction, point.geometric, point.extent);
@@ -310,7 +318,8 @@ impl Walk {
         Next::Goes
     }
 
-    /// Into another direction, if chance lets it.
+    /// Goes on along a new ray, unless Russian roulette ends the path. `density` is `None` for mirrors and
+    /// glass.
     fn turns(&mut self, ray: SpaceRay, density: Option<f64>, numbers: &mut Numbers) -> Next {
         self.ray = ray;
         self.farthest = f64::INFINITY;
@@ -321,7 +330,8 @@ impl Walk {
             return Next::Ends;
         }
         if self.reflections > SAFE_DEPTH {
-            // By the power that it carries: radiance in glass is squeezed, and a path is worth no less there.
+            // By the power that the path carries: radiance is scaled in glass, but a path is worth no less
+            // there.
             let chance = (self.throughput.max_element() / self.squeezed).min(LIKELIEST);
             if numbers.next() >= chance {
                 return Next::Ends;
@@ -336,7 +346,8 @@ impl Walk {
 mod tests {
     use super::*;
 
-    /// A path in glass that has lost no power goes on as likely as one outside, though radiance is less there.
+    /// A path in glass that has lost no power goes on as likely as one outside, although its radiance is
+    /// scaled.
     #[test]
     fn chance_ends_paths_by_their_power_whatever_they_are_in() {
         let goes_on = |throughput: f64, squeezed: f64| {

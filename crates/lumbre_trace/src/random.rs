@@ -1,24 +1,25 @@
-//! Numbers that look random and are not: Owen-scrambled Sobol points, one sequence a pixel and pass. Not what they choose.
+//! Sample numbers: Owen-scrambled Sobol points, one sequence per pixel and pass.
 
 use glam::DVec2;
 
-/// A sample's numbers in [0, 1), one after another.
+/// The numbers of one sample in [0, 1), one dimension after the other.
 #[derive(Clone, Debug)]
 pub(crate) struct Numbers {
     index: u32,
     dimension: u32,
     seed: u32,
-    /// Of the four dimensions that the next one is among.
+    /// The four dimensions that the next number is among.
     four: [f32; 4],
 }
 
-/// Dimensions of `sobol_burley`; beyond them its sequences begin again with another seed.
+/// Number of dimensions of `sobol_burley`; beyond them its sequences begin again with another seed.
 const DIMENSIONS: u32 = 256;
-/// Points of `sobol_burley`.
+/// Number of points of `sobol_burley`.
 const POINTS: u32 = 1 << 16;
 
 impl Numbers {
-    /// Of a sample of a pixel in a pass. Passes are independent of each other, samples of one pass fill the space between them.
+    /// Starts the numbers of a sample of a pixel in a pass. Passes are independent of each other; the samples
+    /// of one pass are distributed evenly between each other.
     pub fn new(pixel: u32, pass: u32, sample: u32) -> Self {
         Self {
             index: sample % POINTS,
@@ -28,7 +29,7 @@ impl Numbers {
         }
     }
 
-    /// The next number.
+    /// Returns the next number.
     pub fn next(&mut self) -> f64 {
         let within = (self.dimension % 4) as usize;
         if within == 0 {
@@ -40,14 +41,14 @@ impl Numbers {
         f64::from(self.four[within])
     }
 
-    /// The next two.
+    /// Returns the next two numbers.
     pub fn pair(&mut self) -> DVec2 {
         let x = self.next();
         DVec2::new(x, self.next())
     }
 }
 
-/// A bijection of u32 without visible order ("lowbias32").
+/// A bijective hash of u32 ("lowbias32").
 fn hash(value: u32) -> u32 {
     let mut value = value.wrapping_add(0x3c6e_f372);
     value ^= value >> 16;

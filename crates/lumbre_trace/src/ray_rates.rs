@@ -1,5 +1,5 @@
-//! How fast a scene's rays are found, beside how fast the bare hierarchy of triangles finds them: what masks, exact surfaces, glass and f64
-//! cost. The rays of a picture, without the light they bring.
+//! Measures how fast a picture's primary and shadow rays are found, compared with the bare triangle
+//! hierarchy: the cost of alpha masks, exact surfaces, glass and f64. No light is evaluated.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -15,30 +15,32 @@ use crate::shadow_ray::{Glass, transmittance};
 use crate::surface_point::SurfacePoint;
 use crate::view::{View, pixel_middle};
 
-/// Of one kind of rays, on one thread.
+/// The rate of one kind of rays, on one thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayRate {
-    /// How many rays there are.
+    /// Number of rays.
     pub rays: usize,
-    /// Of these, how many met something, or were not let through.
+    /// Number of rays that hit something or were blocked, as the tracer and as the hierarchy alone finds
+    /// them.
     pub met: [usize; 2],
-    /// Millions a second as the tracer finds them, and as the hierarchy alone does: the best of all rounds.
+    /// Millions of rays per second of the tracer and of the hierarchy alone, each in its best round.
     pub millions_per_second: [f64; 2],
-    /// The tracer's rate over the hierarchy's: the median of the rounds, in each of which both take turns.
+    /// The tracer's rate over the hierarchy's: the median over the rounds, each of which times both.
     pub ratio: f64,
 }
 
-/// Of a picture's rays.
+/// The rates of a picture's rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayRates {
-    /// Through the middle of every pixel, to the nearest surface.
+    /// Rays through the centres of all pixels, to the nearest surface.
     pub primary: RayRate,
-    /// From what these meet to every lamp above its horizon, of those to which both answer the same.
+    /// Rays from the points that these hit to every lamp above their horizon, without those about which the
+    /// tracer and the hierarchy disagree.
     pub shadow: RayRate,
 }
 
 impl RayRates {
-    /// Measured in so many rounds.
+    /// Measures the rates in `rounds` rounds.
     pub(crate) fn of(view: &View, rounds: usize) -> Self {
         let scene = &view.scene;
         let bare = scene.geometry.hierarchy();
@@ -54,7 +56,7 @@ impl RayRates {
     }
 }
 
-/// The rays, for the tracer and for the bare hierarchy.
+/// The rays of a picture, as the tracer and as the bare hierarchy takes them.
 #[derive(Default)]
 struct PictureRays<'a> {
     primary: Vec<(SpaceRay, f64)>,
@@ -112,7 +114,8 @@ impl<'a> PictureRays<'a> {
                 false => ray.for_triangles(distance),
             };
             let own = Shadow { ray, distance, media: view.media(), bulbs: &placed.bulbs };
-            // The bare hierarchy ends rays at bulbs and glass: another question, and a shorter one.
+            // The bare hierarchy lets bulbs and glass block rays: that is another question, and quicker to
+            // answer.
             if own.is_hidden(&view.scene) == view.scene.geometry.hierarchy().any_hit(&bare) {
                 self.shadow.push(own);
                 self.bare_shadow.push(bare);
@@ -121,7 +124,8 @@ impl<'a> PictureRays<'a> {
     }
 }
 
-/// Rays whose times are taken together: as many as a processor's first cache holds, since tracing has each ray at hand when it is asked.
+/// Number of rays that are timed together: few enough for a core's first-level cache, since the tracer too
+/// has each ray in cache when it traces it.
 const AT_HAND: usize = 128;
 
 fn rate<A: Clone, B: Clone>(
@@ -150,7 +154,7 @@ fn rate<A: Clone, B: Clone>(
     }
 }
 
-/// How many rays meet something, and the seconds that it took to know.
+/// Returns how many rays hit something, and the time that took in seconds.
 fn timed<R: Clone>(rays: &[R], meets: impl Fn(&R) -> bool) -> (usize, f64) {
     let (mut met, mut seconds) = (0, 0.0);
     for rays in rays.chunks(AT_HAND) {

@@ -1,5 +1,6 @@
-//! Whitted's ray tree: at every point the light of the lamps, and two rays more, one mirrored and one through the surface,
-//! I = I_a k_a O_d + Σ S_i f_att I_p (…) + k_r I_r + k_t I_t. Diffuse light from other surfaces is what a lightmap has of it. Not paths.
+//! Whitted's recursive ray tracing: at every point the direct light of the lamps, plus one mirrored and one
+//! transmitted ray, I = I_a k_a O_d + Σ S_i f_att I_p (…) + k_r I_r + k_t I_t. Diffuse light from other
+//! surfaces comes from lightmaps and irradiance volumes only; `path` has all light.
 
 use glam::DVec3;
 use lumbre_optics::{apply_fog, fog_weight};
@@ -15,18 +16,18 @@ use crate::medium::MediumStack;
 use crate::scene::Scene;
 use crate::surface_point::SurfacePoint;
 
-/// Where the tree ends.
+/// Limits at which the recursion ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Mirrored and transmitted rays, one after another.
+    /// Largest number of mirrored and transmitted rays in succession.
     pub depth: u32,
-    /// Rays that count for less in every channel are not traced.
+    /// Rays with a smaller weight in every channel are not traced.
     pub weight: f64,
-    /// Rays of one tree, shadow rays apart.
+    /// Largest number of rays of one tree, shadow rays not counted.
     pub rays: u32,
 }
 
-/// What grows the trees of a picture.
+/// Traces the trees of a picture.
 pub(crate) struct RayTree<'a> {
     pub scene: &'a Scene,
     pub camera: &'a CameraRays,
@@ -34,25 +35,27 @@ pub(crate) struct RayTree<'a> {
     pub lighting: Lighting,
 }
 
-/// What a tree found.
+/// The result of one tree.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
     pub radiance: DVec3,
-    /// Sum of the weights of the rays that were cut off: times the radiance that they would have brought, that is the error.
+    /// Sum of the weights of the rays that were cut off. Times the radiance that they would have returned, it
+    /// is the error.
     pub cut: f64,
-    /// All rays, shadow rays too.
+    /// Number of rays, shadow rays included.
     pub rays: u32,
-    /// The brightest radiance that any ray of the tree brought.
+    /// The brightest radiance that any ray of the tree returned.
     pub brightest: f64,
-    /// The brightest that any ray of the tree could bring, however far it were followed: of every point its own light over what
-    /// k_r + k_t leaves of 1. Infinite where a point that passes on all light adds some.
+    /// Upper bound of the radiance that any ray of the tree could return at any depth: the largest over all
+    /// points of the point's own light over 1 - (k_r + k_t). Infinite where a point that passes on all light
+    /// adds some.
     pub limit: f64,
-    /// What the radiance is the sum of, if that is wanted.
+    /// The terms that the radiance is the sum of, if they are wanted.
     pub terms: LightTerms,
 }
 
 impl Seen {
-    /// A point that adds light of its own and passes on a part of what comes.
+    /// Updates the bound for a point that adds light of its own and passes on a part of what arrives.
     fn meets(&mut self, own: DVec3, passed_on: DVec3) {
         for channel in 0..3 {
             let (own, left) = (own[channel], 1.0 - passed_on[channel]);
@@ -65,21 +68,22 @@ impl Seen {
     }
 }
 
-/// A ray on its way.
+/// A ray that is still to be traced.
 struct Twig<'m> {
     ray: SpaceRay,
     farthest: f64,
     media: &'m MediumStack,
     weight: DVec3,
     depth: u32,
-    /// Surfaces that reflected or refracted it; sheets and what covers in part do not turn a ray.
+    /// Surfaces that reflected or refracted it so far. Going straight through a thin sheet or a partly
+    /// covering surface does not count.
     turns: u32,
-    /// It comes straight from the eye.
+    /// Whether it is the camera ray, or its straight continuation behind a partly covering surface.
     first: bool,
 }
 
 impl RayTree<'_> {
-    /// The tree of a camera ray, and every branch of it if there is room for them.
+    /// Traces the tree of a camera ray, and records all its branches if `record` is given.
     pub fn grow(
         &self,
         ray: SpaceRay,
@@ -108,7 +112,7 @@ impl RayTree<'_> {
         let scene = self.scene;
         let found = nearest_surface(scene, &twig.ray, twig.farthest, |crossing| scene.is_seen(crossing));
         let Some((_, point)) = found else {
-            // Nothing absorbs on the way to infinity but what has no end, and that leaves nothing.
+            // An absorbing medium without an end leaves nothing in the channels that it absorbs.
             let background = scene.settings.shown_background().as_dvec3();
             let radiance = match twig.media.transmittance(f64::INFINITY) {
                 clear if clear == DVec3::ONE => background,
@@ -166,7 +170,8 @@ impl RayTree<'_> {
         radiance
     }
 
-    /// What a surface sends to where the ray comes from: lamps, mirror, transmission.
+    /// Returns the radiance that a lit surface sends back along the ray: direct light, mirror and
+    /// transmission.
     fn lit(
         &self,
         twig: &Twig<'_>,
@@ -225,7 +230,8 @@ impl RayTree<'_> {
         radiance
     }
 
-    /// A ray more, times its factor, if the limits let it grow.
+    /// Traces one more ray and returns its radiance times `factor`; 0 if the limits cut it off, which is
+    /// counted.
     fn branch_off(
         &self,
         kind: Kind,
@@ -254,7 +260,7 @@ impl RayTree<'_> {
         radiance
     }
 
-    /// The terms of the light at a point, each with its source.
+    /// Adds the terms of the light at a point, each with its source.
     fn add_terms(&self, terms: &mut LightTerms, point: &SurfacePoint, light: &DirectLight, turns: u32) {
         let lights = self.scene.lights.len();
         for term in &light.lights {

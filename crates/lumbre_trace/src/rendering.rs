@@ -1,4 +1,5 @@
-//! A picture on its way: passes over all pixels until there are samples enough, the time is over, or somebody interrupts. Not what a sample is.
+//! Sampling of a whole picture: passes over all pixels until there are enough samples, the time is over or
+//! the listener interrupts. What one sample is, `estimator` says.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -18,15 +19,18 @@ use crate::sample_distribution::SampleDistribution;
 use crate::tiles::for_every_pixel;
 use crate::view::View;
 
-/// Who is told how far a picture is, and says whether to go on.
+/// Callback that receives the progress and decides whether to go on. It is called from several threads, but
+/// never concurrently.
 pub type Listener<'a> = dyn Fn(Progress) -> ControlFlow<()> + Sync + 'a;
 
-/// Paths of a pixel in one pass: passes are what the standard error is taken from.
+/// Paths per pixel in one pass. The standard error is estimated from the variance between passes.
 pub(crate) const PASS: u32 = 4;
-/// Passes before a standard error is believed: two that happen to agree are no proof. The same tell where more samples are worth most.
+/// Passes of every pixel before a standard error is trusted, since two passes may agree by chance. The noise
+/// of these passes also decides the distribution of
+/// [`sample_by_noise`](crate::TraceOptions::sample_by_noise).
 const FEWEST_PASSES: u32 = 8;
 
-/// One picture on its way.
+/// The state that all passes of one picture share.
 pub(crate) struct Rendering<'a> {
     view: &'a View,
     aovs: &'a LightAovs,
@@ -35,10 +39,10 @@ pub(crate) struct Rendering<'a> {
     interrupted: AtomicBool,
 }
 
-/// What can be said of a picture before a pass.
+/// The progress of a picture before a pass.
 #[derive(Clone, Copy, Default)]
 struct Before {
-    /// Of the whole.
+    /// Fraction of the whole picture that is done.
     fraction: f64,
     samples: u32,
     error: Option<f64>,
@@ -55,7 +59,8 @@ impl<'a> Rendering<'a> {
         }
     }
 
-    /// The ray tree: as many samples as are asked for, with `adaptive` a quarter of them where nothing is to be seen.
+    /// Traces ray trees: the requested number of samples per pixel, or with `adaptive` a quarter of them
+    /// where neighbouring pixels hardly differ.
     pub fn ray_trees(&self) -> (Film, Ended) {
         let options = &self.view.options;
         let samples = options.samples.unwrap_or(1);
@@ -69,7 +74,7 @@ impl<'a> Rendering<'a> {
             let ended = self.pass(&mut film, 1.0, Before::default(), |_, pixel| take(0, samples, pixel));
             return (film, ended);
         };
-        // A quarter of the samples everywhere, the rest where they show something.
+        // A quarter of the samples everywhere, the rest only where neighbouring pixels differ.
         let first = samples / 4;
         let ended = self.pass(&mut film, 0.5, Before::default(), |_, pixel| take(0, first, pixel));
         if ended != Ended::Complete {
@@ -82,7 +87,8 @@ impl<'a> Rendering<'a> {
         (film, ended)
     }
 
-    /// Paths, from where they were left: rounds of a pass for every pixel, or, after the first rounds, of more where the noise is.
+    /// Traces paths, going on from an earlier state if there is one. Each round adds one pass to every pixel
+    /// or, once samples are distributed by noise, more passes to the noisier pixels.
     pub fn paths(&self, from: Option<PathState>, keeper: &Keeper<'_>) -> (Film, Ended) {
         let options = &self.view.options;
         let open_ended = options.error.is_some() || options.time.is_some();
@@ -129,7 +135,8 @@ impl<'a> Rendering<'a> {
         (state.film, ended)
     }
 
-    /// How far a picture is whose end is an error or a time: errors fall with the root of the samples.
+    /// Estimates the progress of a picture that ends at an error or a time. The error falls with the square
+    /// root of the number of samples.
     fn fraction(&self, by_samples: f64, error: Option<f64>) -> f64 {
         let options = &self.view.options;
         let by_error = options.error.zip(error).map_or(0.0, |(wanted, error)| (wanted / error).powi(2));
@@ -142,7 +149,9 @@ impl<'a> Rendering<'a> {
         Film::new(self.view.size(), self.aovs.aovs.len())
     }
 
-    /// Adds to the film what `take` has of every pixel, by its number and its place. What an end left undone is not there.
+    /// Calls `take` with the index and the coordinates of every pixel and adds the passes that it returns to
+    /// the film. Tiles that were not started when the picture ended are skipped. `share` is this pass's
+    /// fraction of the whole picture.
     fn pass(
         &self,
         film: &mut Film,
@@ -176,7 +185,7 @@ impl<'a> Rendering<'a> {
     }
 
     fn tell(&self, progress: Progress) {
-        // Whoever comes while another is telling has nothing newer to say.
+        // While another thread reports, this report is dropped: it says nothing newer.
         let Ok(listener) = self.listener.try_lock() else { return };
         if listener(progress).is_break() {
             self.interrupted.store(true, Ordering::Relaxed);
@@ -184,7 +193,7 @@ impl<'a> Rendering<'a> {
     }
 }
 
-/// The pixels that differ from a neighbour by more than a threshold, as they are shown.
+/// Marks both pixels of every pair of neighbours that differ by more than a threshold, as displayed.
 fn busy_pixels(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
     let width = film.width;
     let height = film.pixels.len() / width;

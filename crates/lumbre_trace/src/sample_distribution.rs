@@ -1,26 +1,28 @@
-//! Where samples are worth most: pixels get them in proportion to their noise, which for one number of samples makes the squared error of the
-//! whole picture least (Neyman 1934). Not when a picture is good enough.
+//! Distributes samples over the pixels in proportion to their noise, which for a given number of samples
+//! minimizes the squared error of the whole picture (Neyman 1934). When a picture is good enough is decided
+//! in `rendering`.
 //!
-//! A pixel that chooses by its own samples when to stop is wrong: it stops when it happens to be dark. So the noise of a pixel is told by its
-//! neighbours' first samples, which its own are independent of, once and for all. Its mean is as true as with any fixed number of samples,
-//! and so is its standard error.
+//! A pixel that decides by its own samples when to stop is biased: it stops when it happens to be dark. So
+//! the noise of a pixel is estimated once from the first samples of its neighbours, which are independent of
+//! its own. Its mean is then as unbiased as with a fixed number of samples, and its standard error as valid.
 
 use crate::film::Film;
 
-/// Shares of the pixels.
+/// The share of the samples of every pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SampleDistribution {
-    /// Passes of a pixel for one of the mean pixel.
+    /// Passes of a pixel per pass of the average pixel.
     shares: Vec<f64>,
 }
 
-/// Neighbours up to so many pixels away are asked.
+/// Neighbours up to this many pixels away are taken into account.
 const REACH: usize = 2;
-/// Part of the samples that is spread evenly: noise that no neighbour has met yet is met at last.
+/// Fraction of the samples that is distributed evenly, so that noise that no neighbour has met yet is found
+/// eventually.
 const EVEN: f64 = 0.25;
 
 impl SampleDistribution {
-    /// By the passes that every pixel has.
+    /// Computes the shares from the passes that every pixel has.
     pub fn of(film: &Film) -> Self {
         let (width, height) = (film.width, film.pixels.len() / film.width);
         let variances: Vec<f64> = film.pixels.iter().map(|pixel| pixel.variance().element_sum()).collect();
@@ -44,19 +46,20 @@ impl SampleDistribution {
         Self { shares: noise.iter().map(share).collect() }
     }
 
-    /// From what [`shares`](Self::shares) gave.
+    /// Restores a distribution from its [`shares`](Self::shares).
     pub fn from_shares(shares: Vec<f64>) -> Self {
         Self { shares }
     }
 
-    /// Of every pixel.
+    /// Returns the share of every pixel: its passes per pass of the average pixel.
     pub fn shares(&self) -> &[f64] {
         &self.shares
     }
 
-    /// Passes of a pixel when the mean pixel has `rounds`, of which all had the `first` ones alike.
+    /// Returns the passes of a pixel when the average pixel has `rounds`, of which the `first` ones were the
+    /// same for all pixels.
     pub fn passes(&self, pixel: usize, first: u32, rounds: u32) -> u32 {
-        // Far below 2^32: there are at most 2^18 rounds, and no share is above the number of pixels.
+        // Far below 2^32: there are at most 2^18 rounds, and no share exceeds the number of pixels.
         first + (f64::from(rounds.saturating_sub(first)) * self.shares[pixel]) as u32
     }
 }
@@ -68,7 +71,7 @@ mod tests {
     use super::*;
     use crate::film::{PixelSum, Sample};
 
-    /// A row of pixels, each with two passes that differ from 1 by so much.
+    /// A row of pixels, each with two passes that differ from 1 by its noise.
     fn film(noise: &[f64]) -> Film {
         let mut film = Film::new((noise.len(), 1), 0);
         for (at, noise) in noise.iter().enumerate() {
@@ -90,7 +93,7 @@ mod tests {
         let mut other = noise;
         other[3] = 0.9;
         let others = SampleDistribution::of(&film(&other));
-        // What the pixel itself does changes the others' part, not the order between it and a pixel that does not see either.
+        // More noise in pixel 3 raises the share of pixel 5, which has it for a neighbour, but not its own.
         assert!(
             (others.shares[3] - EVEN) / (others.shares[5] - EVEN) < (shares[3] - EVEN) / (shares[5] - EVEN)
         );

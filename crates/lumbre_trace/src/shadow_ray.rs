@@ -1,5 +1,6 @@
-//! Shadow rays: how much of a light comes through to a point, S_i between 0 and 1 per channel. Glass lets through k_t at every surface, what
-//! covers in part the rest of that; neither bends the ray, so that no light is focused. Not the light itself.
+//! Shadow rays: the transmittance S_i from a point to a light, between 0 and 1 per channel. Every surface of
+//! glass transmits k_t, and a partly covering surface what its coverage leaves. Neither bends the ray, so
+//! that light is not focused.
 
 use std::cell::Cell;
 
@@ -11,20 +12,20 @@ use crate::medium::MediumStack;
 use crate::scene::{Passage, Scene};
 use crate::surface_point::SurfacePoint;
 
-/// What the rays towards lights are let through by.
+/// Which transmissive surfaces let shadow rays pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Glass {
-    /// Sheets and solids, as the documents have it.
+    /// Thin sheets and solids, which the ray tree passes in straight lines.
     LetsThrough,
-    /// Sheets alone: what refracts is met by paths, not by straight lines.
+    /// Thin sheets alone: light through refracting solids is left to paths.
     OnlySheets,
 }
 
-/// After so many surfaces nothing is left, or the scene is a mistake.
+/// Largest number of surfaces that a ray passes. By then no light is left, or the scene is broken.
 const MOST_SURFACES: usize = 1024;
 
-/// The part of the light that arrives along a ray, from a distance that may be infinite. `media` is where the ray starts; `bulbs` are objects
-/// that do not count. The second value counts the rays that were traced for it.
+/// Returns the transmittance along a ray up to a distance, which may be infinite, and the number of rays that
+/// were traced for it. `media` holds the media at the ray's start; objects in `bulbs` do not block it.
 pub(crate) fn transmittance(
     scene: &Scene,
     ray: &SpaceRay,
@@ -37,7 +38,8 @@ pub(crate) fn transmittance(
         return (if hidden { DVec3::ZERO } else { media.transmittance(distance) }, 1);
     }
     let open = |object: usize| scene.see_through && scene.is_open(object, glass == Glass::LetsThrough);
-    // A ray that nothing hides has seen all that lies on its way.
+    // Set if a surface was passed that transmits part of the light. A ray that is not blocked tests all
+    // surfaces on its way.
     let through = Cell::new(false);
     let hidden = scene.geometry.any_between(ray, distance, |crossing| {
         if bulbs.contains(&crossing.object) {

@@ -1,4 +1,5 @@
-//! What a surface is where a ray meets it: point, normals, coefficients with textures multiplied in. Not the light that falls on it.
+//! The surface at a ray's hit point: position, normals, and material coefficients with all textures applied.
+//! Light is not evaluated.
 
 use glam::{DVec3, DVec4};
 use lumbre_optics::{
@@ -9,40 +10,40 @@ use lumbre_optics::{
 use crate::geometry::{Meeting, Place, SpaceRay};
 use crate::scene::{Object, Scene, sample_color, sample_lightmap, sample_linear};
 
-/// One point of a surface, seen along a ray.
+/// A hit point on a surface, seen along a ray.
 #[derive(Clone, Debug)]
 pub(crate) struct SurfacePoint {
     pub object: usize,
-    /// In the tracer's space, metres.
+    /// Position in the tracer's space, metres.
     pub position: DVec3,
     /// Metres along the ray.
     pub distance: f64,
-    /// Unit normal of the face itself, on the side from which the ray comes.
+    /// Unit geometric normal, on the side that the ray comes from.
     pub geometric: DVec3,
-    /// Unit normal that is lit: interpolated, mapped, and turned as the scene's two-sided rule says.
+    /// Unit shading normal: interpolated, normal-mapped, and flipped according to the scene's two-sided rule.
     pub normal: DVec3,
-    /// The ray comes to the front.
+    /// Whether the ray hits the front.
     pub front: bool,
     pub surface: SurfaceSample,
     pub emission: DVec3,
-    /// How much it covers of what is behind, 0 to 1.
+    /// Opacity of an alpha-blended surface, 0 to 1; 1 for all others.
     pub coverage: f64,
-    /// k_d E/π of its lightmap.
+    /// k_d E/π of the lightmap.
     pub baked: Option<DVec3>,
-    /// k_d E/π of the irradiance volume around it, where it has no lightmap.
+    /// k_d E/π of the irradiance volume that lights an object without a lightmap.
     pub from_volume: Option<DVec3>,
-    /// Largest coordinate of what was met: its rounding is relative to that.
+    /// Largest coordinate of the surface that was hit, to which rounding errors are relative.
     pub extent: f64,
-    /// Number of the triangle in the scene, if it is one.
+    /// Index of the triangle in the scene; `None` on exact surfaces.
     pub triangle: Option<u32>,
 }
 
-/// A point found in f64 may be apart from the one that the f32 hierarchy found by this part of its distance, where rays graze, and by what
-/// the ray was set off by.
+/// Largest difference, relative to the distance, between the f64 hit and the f32 hit of the hierarchy up to
+/// which the former is trusted. Grazing rays differ more. The offset of the ray's origin comes on top.
 const TRUSTED: f64 = 1e-3;
 
 impl SurfacePoint {
-    /// Where a ray meets a surface.
+    /// Evaluates the surface where a ray hits it.
     pub fn new(scene: &Scene, ray: &SpaceRay, meeting: &Meeting) -> Self {
         let crossing = &meeting.crossing;
         let object = &scene.objects[crossing.object];
@@ -66,7 +67,8 @@ impl SurfacePoint {
         let [a, b, c] = corners;
         let cross = (b - a).cross(c - a);
         let face = try_normalize(cross).unwrap_or(-ray.direction);
-        // The hierarchy's corners are f32; the point is found again in f64, so that long chains of mirrors keep their digits.
+        // The hierarchy's corners are f32. The point is computed again in f64, so that long chains of mirrors
+        // keep their digits.
         let (distance, found) =
             refined(ray, corners, cross, meeting.distance).unwrap_or((meeting.distance, found));
         let (vertices, weights) = object.vertices(triangle, found);
@@ -180,20 +182,22 @@ impl SurfacePoint {
             coverage: coverage(object, f64::from(object.material.alpha)),
             baked: None,
             from_volume: object.volume_light(position, lit_normal, surface.diffuse),
-            // The point is as uncertain as the coordinates of what the ray began with.
+            // The point is as uncertain as the coordinates of the ray's origin.
             extent: position.abs().max(ray.origin.abs()).max_element(),
             triangle: None,
         }
     }
 
-    /// The normal that mirrors and refracts: the lit one, or the face's own where that would look through the surface.
+    /// Returns the normal for mirroring and refraction: the shading normal, or the geometric one where the
+    /// viewer is behind the shading normal.
     pub fn optical_normal(&self, viewer: DVec3) -> DVec3 {
         let facing = if self.normal.dot(self.geometric) < 0.0 { -self.normal } else { self.normal };
         if facing.dot(viewer) > 0.0 { facing } else { self.geometric }
     }
 }
 
-/// Whether a surface seen from behind is lit from there: where the scene says so, and inside of glass always.
+/// Returns true if a back face is lit with its own normal: under the scene's two-sided rule, and always
+/// inside glass.
 fn backs_are_lit(object: &Object) -> bool {
     (object.material.double_sided && object.two_sided) || object.is_solid()
 }
@@ -206,8 +210,8 @@ fn towards(normal: DVec3, ray: &SpaceRay) -> DVec3 {
     if normal.dot(ray.direction) > 0.0 { -normal } else { normal }
 }
 
-/// Distance and weights of the second and third corner where a ray meets a triangle's plane, in f64; nothing where it grazes so that the
-/// distance could not be trusted.
+/// Intersects a ray with a triangle's plane in f64. Returns the distance and the weights of the second and
+/// third corner, or `None` where the ray is so grazing that the distance cannot be trusted.
 fn refined(ray: &SpaceRay, [a, b, c]: [DVec3; 3], cross: DVec3, near: f64) -> Option<(f64, [f64; 2])> {
     let along = ray.direction.dot(cross);
     let distance = (a - ray.origin).dot(cross) / along;
@@ -221,7 +225,7 @@ fn refined(ray: &SpaceRay, [a, b, c]: [DVec3; 3], cross: DVec3, near: f64) -> Op
     let second = offset.cross(c - a).dot(cross) / area;
     let third = (b - a).cross(offset).dot(cross) / area;
     let (second, third) = (second.clamp(0.0, 1.0), third.clamp(0.0, 1.0));
-    // On the edge rather than beyond it.
+    // Rounding may put the point beyond the edge; this moves it onto the edge.
     let sum = (second + third).max(1.0);
     (second.is_finite() && third.is_finite()).then_some((distance, [second / sum, third / sum]))
 }

@@ -1,14 +1,16 @@
-//! The picture in squares that all cores share, each by itself, so that the same bits come out on any number of threads. Not what is in them.
+//! Distributes the pixels of a picture over all threads in square tiles. Each pixel is computed
+//! independently, so that the result has the same bits on any number of threads.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-/// Side of a square in pixels.
+/// Side of a tile in pixels.
 const SIDE: usize = 16;
 
-/// Computes `pixel(x, y)` for every pixel, square by square; a square that `stop` forbids to begin stays `None`. `advance` hears of every
-/// finished square, as its share of the picture, in no particular order.
+/// Computes `pixel(x, y)` for every pixel, tile by tile. A tile that `stop` prevents from starting stays
+/// `None`. `advance` receives the fraction of the tiles that are finished after each of them, in no
+/// particular order.
 pub(crate) fn for_every_pixel<T: Send>(
     (width, height): (usize, usize),
     pixel: impl Fn(usize, usize) -> T + Sync,
@@ -31,7 +33,7 @@ pub(crate) fn for_every_pixel<T: Send>(
         .collect()
 }
 
-/// Some neighbouring pixels.
+/// A rectangle of neighbouring pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Square {
     left: usize,
@@ -41,13 +43,13 @@ pub(crate) struct Square {
 }
 
 impl Square {
-    /// Its pixels, row by row.
+    /// Returns its pixels, row by row.
     pub fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
         (self.top..self.bottom).flat_map(move |y| (self.left..self.right).map(move |x| (x, y)))
     }
 }
 
-/// All squares, row by row.
+/// Returns all tiles of a picture, row by row.
 fn squares(width: usize, height: usize) -> Vec<Square> {
     let rows = (0..height).step_by(SIDE);
     rows.flat_map(|top| {

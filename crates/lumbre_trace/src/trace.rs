@@ -1,5 +1,5 @@
-//! A picture of a World, from the options to the pixels: reads the scene, chooses the integrator, takes samples until there are enough. Not
-//! how light is followed: that is `ray_tree` and `path`.
+//! The entry points of the tracer: reads the World, runs the integrator until there are enough samples, and
+//! develops picture and report. The integrators themselves are in `ray_tree` and `path`.
 
 use std::time::Instant;
 
@@ -20,13 +20,14 @@ use crate::ray_rates::RayRates;
 use crate::rendering::{Listener, Rendering};
 use crate::view::View;
 
-/// Bytes of a thread's stack: trees of the greatest depth fit, and what is not used is never touched.
+/// Stack size of a thread in bytes: enough for trees of [`MAXIMUM_DEPTH`](crate::MAXIMUM_DEPTH). Pages that
+/// are never touched cost no memory.
 const STACK: usize = 256 << 20;
 
-/// Traces a picture of a World. `listener` is called from several threads, one at a time.
+/// Traces a picture of a World. `listener` is called from several threads, but never concurrently.
 ///
 /// # Errors
-/// [`TraceError`], before the first ray.
+/// [`TraceError`], before the first ray is traced.
 pub fn trace(
     world: &mut World,
     options: &TraceOptions,
@@ -35,24 +36,24 @@ pub fn trace(
     Tracer::new(world, options)?.picture(listener)
 }
 
-/// A World that has been read, with what is asked of it.
+/// A World that was read and is ready to be traced with fixed options.
 pub struct Tracer {
     view: View,
     light: LightAovs,
 }
 
 impl Tracer {
-    /// Reads a World. Its global transforms are brought up to date.
+    /// Reads a World and brings its global transforms up to date.
     ///
     /// # Errors
-    /// [`TraceError`].
+    /// [`TraceError`] if the options are out of range or the World cannot be traced.
     pub fn new(world: &mut World, options: &TraceOptions) -> Result<Self, TraceError> {
         let view = View::new(world, options)?;
         let light = LightAovs::new(&options.aovs, &view.scene, options.integrator)?;
         Ok(Self { view, light })
     }
 
-    /// Traces the picture.
+    /// Traces the picture from its first sample.
     ///
     /// # Errors
     /// [`TraceError::Threads`].
@@ -60,10 +61,11 @@ impl Tracer {
         self.continued(&Continuation::default(), listener)
     }
 
-    /// Traces the picture, from what an earlier run has kept of it. It ends with the bits of a run that was never interrupted.
+    /// Traces the picture, going on from what an earlier run kept of it. The result has the same bits as a
+    /// run that was never interrupted.
     ///
     /// # Errors
-    /// [`TraceError::Checkpoint`] before the first ray, [`TraceError::Threads`].
+    /// [`TraceError::Checkpoint`] before the first ray is traced, [`TraceError::Threads`].
     pub fn continued(
         &self,
         continuation: &Continuation<'_>,
@@ -88,7 +90,8 @@ impl Tracer {
         Ok(self.developed(&film, aovs, ended, started.elapsed().as_secs_f64()))
     }
 
-    /// The ray tree through a place of the picture, in pixels from its upper left corner; the middle of a pixel is half a pixel off.
+    /// Returns the ray tree through a point of the picture, in pixels from its upper left corner; pixel
+    /// centres are at half-integers.
     pub fn tree(&self, place: DVec2) -> Branch {
         let view = &self.view;
         let camera = view.camera.through(place);
@@ -99,32 +102,34 @@ impl Tracer {
             tree.grow(camera.ray, camera.farthest, &media, Some(&mut root), LightTerms::default());
         };
         std::thread::scope(|scope| {
-            // Deep trees need more than a main thread's stack.
+            // Deep trees need more stack than a main thread has.
             let thread = std::thread::Builder::new().stack_size(STACK);
             if let Ok(thread) = thread.spawn_scoped(scope, &mut grow) {
-                // What it did is in the tree.
+                // The result is in `root`.
                 let _ = thread.join();
             }
         });
         root
     }
 
-    /// The surface that is seen through a place of the picture; nothing where the background is.
+    /// Returns the surface that is visible through a point of the picture, in pixels from its upper left
+    /// corner, or `None` for the background.
     pub fn first_hit(&self, place: DVec2) -> Option<FirstHit> {
         FirstHit::through(&self.view, place)
     }
 
-    /// How fast the picture's rays are found beside the bare hierarchy of triangles, on this thread, in so many rounds.
+    /// Measures how fast the picture's rays are found compared with the bare triangle hierarchy, on the
+    /// calling thread, in `rounds` rounds.
     pub fn ray_rates(&self, rounds: usize) -> RayRates {
         RayRates::of(&self.view, rounds)
     }
 
-    /// What was left out of the World, and why.
+    /// Returns what was left out of the World, and why.
     pub fn notes(&self) -> &[String] {
         &self.view.scene.notes
     }
 
-    /// The auxiliary pictures that are asked for.
+    /// Builds the auxiliary pictures that were asked for, each once.
     fn aovs(&self, film: &Film) -> Vec<AovPicture> {
         let asked = &self.view.options.aovs;
         let first_hits = asked.iter().any(Aov::is_first_hit).then(|| FirstHits::of(&self.view));

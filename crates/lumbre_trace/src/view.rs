@@ -1,4 +1,5 @@
-//! A scene seen by a camera under options: what all samples of a picture have in common. Not the samples.
+//! A scene as a camera sees it under given options: what all samples of a picture share. Samples are taken in
+//! `estimator`.
 
 use bevy_ecs::world::World;
 use glam::DVec2;
@@ -15,26 +16,27 @@ use crate::random::Numbers;
 use crate::ray_tree::{Limits, RayTree};
 use crate::scene::Scene;
 
-/// Rays of one tree at most, shadow rays apart: what glass in glass would multiply without end is cut off, and counted.
+/// Largest number of rays of one tree, shadow rays not counted. Glass within glass would multiply them
+/// without end; what is cut off is counted.
 const MOST_RAYS: u32 = 100_000;
 
-/// What is seen, and how.
+/// The scene, the camera and the options of a picture.
 pub(crate) struct View {
     pub scene: Scene,
     pub camera: CameraRays,
-    /// The media that the eye is in.
+    /// The media that contain the eye.
     media: MediumStack,
     pub options: TraceOptions,
     filter: FilterSampler,
 }
 
 impl View {
-    /// Reads a World. Its global transforms are brought up to date.
+    /// Reads a World and brings its global transforms up to date.
     pub fn new(world: &mut World, options: &TraceOptions) -> Result<Self, TraceError> {
         options.validate()?;
         update_transforms(world);
         let camera = CameraRays::new(world, options.camera, options.size)?;
-        // Paths find that light themselves.
+        // Paths trace the light that lightmaps and irradiance volumes hold.
         let read = options.integrator == Integrator::Whitted;
         let baked_light = [options.lightmaps && read, options.irradiance_volumes && read];
         let scene = Scene::new(world, camera.eye, options.reflection, baked_light)?;
@@ -44,7 +46,7 @@ impl View {
         Ok(Self { media, camera, options: options.clone(), filter, scene })
     }
 
-    /// Width and height of the picture in pixels.
+    /// Returns width and height of the picture in pixels.
     pub fn size(&self) -> (usize, usize) {
         (self.options.size.0 as usize, self.options.size.1 as usize)
     }
@@ -62,22 +64,24 @@ impl View {
         RayTree { scene: &self.scene, camera: &self.camera, limits, lighting }
     }
 
-    /// The numbers of a sample, where it goes through the picture, in pixels from the upper left corner, and the sign it counts with.
+    /// Returns the random numbers of a sample, its position in the picture in pixels from the upper left
+    /// corner, and the sign of its weight.
     pub fn sample_place(&self, (x, y): (usize, usize), pass: u32, index: u32) -> (Numbers, DVec2, f64) {
         let pixel = (y as u32).wrapping_mul(65_537).wrapping_add(x as u32);
         let mut numbers = Numbers::new(pixel, pass, index);
-        // One ray of a tree goes through the middle, as a frame's does.
+        // A single ray of the ray tree goes through the pixel's centre, as in a frame.
         let alone = self.options.integrator == Integrator::Whitted && self.options.samples.unwrap_or(1) == 1;
         let (offset, sign) = if alone { (DVec2::ZERO, 1.0) } else { self.filter.place(numbers.pair()) };
         (numbers, pixel_middle(x, y) + offset, sign)
     }
 
-    /// The media that the eye is in.
+    /// Returns the media that contain the eye.
     pub fn media(&self) -> &MediumStack {
         &self.media
     }
 
-    /// Rays of a pinhole start in one place; parallel ones do not.
+    /// Returns the media at the start of a camera ray. The rays of a parallel projection start in different
+    /// points, those of a perspective one at the eye.
     pub fn media_of(&self, ray: &SpaceRay) -> MediumStack {
         if self.scene.solids && self.camera.is_parallel() {
             MediumStack::at(&self.scene, ray.origin)
@@ -87,7 +91,7 @@ impl View {
     }
 }
 
-/// The middle of a pixel, in pixels from the upper left corner.
+/// Returns the centre of a pixel, in pixels from the upper left corner.
 pub(crate) fn pixel_middle(x: usize, y: usize) -> DVec2 {
     DVec2::new(x as f64 + 0.5, y as f64 + 0.5)
 }

@@ -1,4 +1,5 @@
-//! FLIP against what its authors publish of it, and against what any difference of pictures has to be.
+//! FLIP against its authors' published results, and against properties that any difference of pictures must
+//! have.
 
 use glam::DVec3;
 use lumbre_trace::flip::{PIXELS_PER_DEGREE, Picture, flip};
@@ -33,14 +34,15 @@ fn what_is_the_same_differs_by_nothing() {
 
 #[test]
 fn even_pictures_by_hand() {
-    // No edges and no blur: HyAB to the power 0.7 of Hunt's CIELAB, mapped. Black to white is 100^0.7 = 25.119 of the 41.27 between green and
-    // blue: 0.95 + 0.05 (25.119 - 16.51)/(41.27 - 16.51) = 0.967. Green to blue is 1 by definition.
+    // No edges and no blur: HyAB to the power 0.7 in Hunt-adjusted CIELAB, then mapped to [0, 1]. Black to
+    // white is 100^0.7 = 25.119 of the 41.27 between green and blue: 0.95 + 0.05 (25.119 - 16.51)/(41.27 -
+    // 16.51) = 0.967. Green to blue is 1 by definition.
     let even = |color: DVec3| picture(24, 24, |_, _| color);
     let black_white = mean(&even(DVec3::ZERO), &even(DVec3::ONE));
     assert!((black_white - 0.967).abs() < 1e-3, "{black_white}");
     let green_blue = mean(&even(DVec3::Y), &even(DVec3::Z));
     assert!((green_blue - 1.0).abs() < 1e-9, "{green_blue}");
-    // A grey of L* 50 is sRGB 0.4663: 50^0.7 = 15.462 lies below the knee: 0.95/16.51 of it.
+    // A grey of L* 50 is sRGB 0.4663. 50^0.7 = 15.462 is below the knee, where the factor is 0.95/16.51.
     let grey = mean(&even(DVec3::ZERO), &even(DVec3::splat(0.466_3)));
     assert!((grey - 0.95 * 50f64.powf(0.7) / (0.4 * 41.27)).abs() < 1e-3, "{grey}");
 }
@@ -57,7 +59,7 @@ fn more_noise_is_more_and_fine_noise_is_less_than_coarse() {
     let noisy = |strength: f64, size: usize| {
         picture(96, 96, |x, y| {
             let sign = if (x / size + y / size).is_multiple_of(2) { 1.0 } else { -1.0 };
-            // Red against green of nearly one luminance: no feature, only colour.
+            // Red against green of nearly the same luminance: a difference in colour, but no feature.
             DVec3::new(0.5 + strength * sign, 0.5 - 0.5 * strength * sign, 0.5)
         })
     };
@@ -69,7 +71,7 @@ fn more_noise_is_more_and_fine_noise_is_less_than_coarse() {
 
 #[test]
 fn an_edge_that_comes_and_goes_is_seen() {
-    // Ten pixels of a line one pixel wide: the feature raises what the blurred colour says.
+    // A line one pixel wide: its feature difference raises what the blurred colours alone would give.
     let grey = picture(96, 96, |_, _| DVec3::splat(0.5));
     let line = picture(96, 96, |x, _| DVec3::splat(if x == 48 { 0.8 } else { 0.5 }));
     let map = flip(&grey, &line, PIXELS_PER_DEGREE);
@@ -79,7 +81,7 @@ fn an_edge_that_comes_and_goes_is_seen() {
 
 #[test]
 fn the_published_implementation_finds_the_same() {
-    // What flip-evaluator 1.7 (PyPI) finds as LDR-FLIP of the same pictures, in f32.
+    // LDR-FLIP of the same pictures by flip-evaluator 1.7 (PyPI), which computes in f32.
     let bytes = |color: [usize; 3]| DVec3::from(color.map(|byte| byte as f64 / 255.0));
     let ramp = |x: usize, y: usize| bytes([4 * x % 256, 5 * y % 256, 2 * (x + y) % 256]);
     let grain = |x: usize, y: usize| {

@@ -1,4 +1,4 @@
-//! Rays against what geometry says of them: mirrors, slabs, lenses, absorption, exact surfaces near and far.
+//! Rays against geometric closed forms: mirrors, slabs, lenses, absorption, and exact surfaces near and far.
 
 mod support;
 
@@ -16,7 +16,8 @@ use support::*;
 
 #[test]
 fn a_mirror_ball_turns_rays_by_the_angle_of_their_offset() {
-    // A ray that passes the middle at a distance b meets the sphere under asin(b), and is turned by π - 2 asin(b).
+    // A ray that passes the centre at a distance b hits the sphere at the angle asin(b) and is turned by π -
+    // 2 asin(b).
     for offset in [0.0, 0.1, 0.5, 0.9, 0.999, 0.999_999] {
         let mut world = World::new();
         exact(&mut world, Quadric::sphere(1.0), mirror(1.0), Transform::IDENTITY);
@@ -28,7 +29,7 @@ fn a_mirror_ball_turns_rays_by_the_angle_of_their_offset() {
         let turned = next(&tree, Kind::Mirrored).expect("it is mirrored").direction;
         let angle = turned.x.atan2(-turned.z);
         let wanted = PI - 2.0 * f64::asin(offset);
-        // Near the rim the angle is as uncertain as the root of the rounding.
+        // Near the rim the error of the angle is the square root of the rounding error.
         assert!(
             (angle - wanted).abs() < 1e-12 / (1.0 - offset * offset).sqrt(),
             "{offset}: {angle} for {wanted}"
@@ -68,7 +69,7 @@ fn light_is_totally_reflected_beyond_the_critical_angle() {
         (FRAC_PI_2 - 1e-3, false),
     ] {
         let mut world = World::new();
-        // The eye is inside, below the upper face of a ball of glass that is cut by a plane: a half space will do.
+        // The eye is inside glass, below its upper face; a half space is enough.
         exact(&mut world, Quadric::new(QuadricShape::Plane), glass(1.5), Transform::IDENTITY);
         let eye = DVec3::new(0.0, -1.0, 0.0);
         camera(&mut world, eye, eye + DVec3::new(f64::sin(angle), f64::cos(angle), 0.0), 0.1);
@@ -79,7 +80,8 @@ fn light_is_totally_reflected_beyond_the_critical_angle() {
         assert_eq!(transmitted.is_some(), leaves, "{angle}");
         match transmitted {
             Some(through) => {
-                // Snell: near the critical angle the direction hangs on the root of what is left.
+                // Snell's law. Near the critical angle the remaining component is a square root of a small
+                // difference.
                 let sine = 1.5 * angle.sin();
                 assert!((through.direction.x - sine).abs() < 1e-9, "{angle}: {}", through.direction);
                 assert!(next(&tree, Kind::Mirrored).is_none());
@@ -94,7 +96,7 @@ fn light_is_totally_reflected_beyond_the_critical_angle() {
 
 #[test]
 fn a_ball_lens_focuses_near_its_axis_at_its_focal_length() {
-    // n R/(2 (n - 1)) from the middle; spherical aberration grows with the square of the height.
+    // Focal length n R/(2 (n - 1)) from the centre; spherical aberration grows with the square of the height.
     for index in [1.2, 1.5, 1.8] {
         let height = 1e-4;
         let mut world = World::new();
@@ -109,7 +111,7 @@ fn a_ball_lens_focuses_near_its_axis_at_its_focal_length() {
     }
 }
 
-/// Two mirrors that face each other, which glow a little.
+/// Two weakly emissive mirrors that face each other.
 fn facing_mirrors(weight: f32, emission: f32) -> World {
     let mut world = World::new();
     let mut glowing = mirror(weight);
@@ -134,19 +136,19 @@ fn a_chain_of_mirrors_is_a_geometric_series() {
         for pixel in &picture.radiance {
             assert!((pixel.x / wanted - 1.0).abs() < 1e-12, "{depth}: {pixel} for {wanted}");
         }
-        // What was cut off is what the series still has: its weight is stated, and the bound holds.
+        // What was cut off is the rest of the series: its weight is reported, and the bound holds.
         let rest = 8.0 * ratio.powi(depth as i32 + 1);
         assert!((report.cut.largest_weight / ratio.powi(depth as i32 + 1) - 1.0).abs() < 1e-9);
         let bound = report.cut.bound.expect("the series ends");
         assert!((bound / rest - 1.0).abs() < 1e-9, "{depth}: {bound} for {rest}");
     }
-    // By weight: .75^n falls below 10⁻⁶ at the 49th mirror.
+    // Limited by weight: .75^n falls below 10⁻⁶ at the 49th mirror.
     let mut world = facing_mirrors(0.75, 2.0);
     let deep = TraceOptions { depth: Some(1000), weight: 1e-6, ..options(2) };
     let (picture, report) = draw(&mut world, &deep);
     assert!((picture.radiance[0].x - 8.0).abs() < 8.0 * 1e-6);
     assert!(report.cut.largest_weight > 0.0 && report.cut.largest_weight < 1e-6);
-    // Perfect mirrors end by the depth, not never.
+    // Between perfect mirrors, the depth ends the recursion.
     let (picture, _) = draw(&mut facing_mirrors(1.0, 1.0), &TraceOptions { depth: Some(1000), ..options(1) });
     assert!((picture.radiance[0].x - 1001.0).abs() < 1e-9);
 }
@@ -176,7 +178,8 @@ fn absorption_follows_beer_and_lambert() {
 
 #[test]
 fn exact_surfaces_keep_their_digits_far_away_and_at_grazing_rays() {
-    // A ball of one metre from 10⁶ radii away, met at a known offset: the textbook's discriminant would have no digit left.
+    // A ball with a radius of one metre, seen from up to 10⁶ radii away at a known offset, where the
+    // textbook's discriminant would have no digits left.
     for distance in [10.0, 1e3, 1e6] {
         for offset in [0.0, 0.5, 0.999] {
             let mut world = World::new();
@@ -184,18 +187,18 @@ fn exact_surfaces_keep_their_digits_far_away_and_at_grazing_rays() {
             camera(&mut world, DVec3::new(offset, 0.0, distance), DVec3::new(offset, 0.0, 0.0), 1e-3);
             let tree = tree(&mut world, &options(64));
             let point = tree.point.expect("it meets the ball");
-            // In the world; the tracer has an origin of its own far out.
+            // In world space; far out, the tracer has an origin of its own.
             assert!((point.position.length() - 1.0).abs() < 1e-14 + 4e-16 * distance, "on the ball");
             let wanted = tree.origin.z - ((1.0_f64 - offset) * (1.0 + offset)).sqrt();
             assert!((point.distance - wanted).abs() < 4e-10, "{distance} {offset}: {}", point.distance);
         }
-        // Just beside it.
+        // A ray just beside it.
         let mut world = World::new();
         exact(&mut world, Quadric::sphere(1.0), black(), Transform::IDENTITY);
         camera(&mut world, DVec3::new(1.0 + 1e-8, 0.0, distance), DVec3::new(1.0 + 1e-8, 0.0, 0.0), 1e-3);
         assert!(tree(&mut world, &options(64)).point.is_none(), "{distance}");
     }
-    // A ball of 10⁶ metres under the eye, seen along its horizon.
+    // A ball with a radius of 10⁶ metres below the eye, seen along its horizon.
     let radius = 1e6;
     let mut world = World::new();
     exact(&mut world, Quadric::sphere(radius), black(), Transform::IDENTITY);
@@ -249,7 +252,7 @@ fn every_exact_surface_is_met_where_its_equation_says() {
         }
     };
     for shape in shapes {
-        // Turned, stretched and mirrored.
+        // Rotated, stretched and mirrored.
         let place = Transform::from_xyz(0.3, -0.2, 0.1)
             .with_rotation(DQuat::from_rotation_x(0.4) * DQuat::from_rotation_z(0.9))
             .with_scale(DVec3::new(1.0, -1.5, 0.8));
@@ -268,7 +271,7 @@ fn every_exact_surface_is_met_where_its_equation_says() {
             let tree = tree(&mut world, &options(16));
             let own = place.affine().inverse();
             let (start, along) = (own.transform_point3(eye), own.transform_vector3(tree.direction));
-            // The first change of sign, by small steps: what the eye sees first.
+            // The first change of sign along the ray, in small steps: the surface that the eye sees first.
             let inside = |t: f64| {
                 let p = start + along * t;
                 (value(&shape, p) < 0.0, p.abs().max_element() <= 2.0)
@@ -284,7 +287,7 @@ fn every_exact_surface_is_met_where_its_equation_says() {
                     assert!((point.distance - t).abs() < 1e-3, "{shape:?}: {} for {t}", point.distance);
                     let p = own.transform_point3(point.position);
                     assert!(value(&shape, p).abs() < 1e-12, "{shape:?}: off by {}", value(&shape, p));
-                    // The normal is the gradient's, by differences along two directions in the surface and one across.
+                    // The normal points along the gradient, checked by a difference across the surface.
                     let step = 1e-6 * point.normal;
                     let across = value(&shape, own.transform_point3(point.position + step))
                         - value(&shape, own.transform_point3(point.position - step));
@@ -292,7 +295,7 @@ fn every_exact_surface_is_met_where_its_equation_says() {
                     assert!(point.normal.dot(tree.direction) < 0.0);
                 }
                 (None, None) => {}
-                // Where a ray grazes, or leaves through the trim, steps may miss what is there.
+                // Where a ray grazes the surface or leaves the box, the steps may miss it.
                 (found, _) => assert!(
                     found.as_ref().is_none_or(|point| grazes(point.normal, tree.direction)
                         || own.transform_point3(point.position).abs().max_element() > 1.99),
@@ -310,7 +313,7 @@ fn grazes(normal: DVec3, direction: DVec3) -> bool {
 
 #[test]
 fn a_light_shines_through_glass_in_part_and_makes_a_highlight_behind_it() {
-    // A floor lit through a sheet of k_t = .25: a quarter of the light, S_i between 0 and 1.
+    // A floor lit through a sheet with k_t = .25 in red: a quarter of the light, S_i between 0 and 1.
     let mut world = World::new();
     exact(&mut world, Quadric::new(QuadricShape::Plane), Material::matt(Vec3::ONE), Transform::IDENTITY);
     let sheet = Material { transmission: Vec3::new(0.25, 0.5, 0.0), ..black() };
@@ -325,7 +328,8 @@ fn a_light_shines_through_glass_in_part_and_makes_a_highlight_behind_it() {
     let lamp = &found.light.as_ref().expect("it is lit").lights[0];
     assert_eq!(lamp.visibility, DVec3::new(0.25, 0.5, 0.0));
 
-    // Document [I]'s k_t L (t.v)^n: seen straight through glass of index 1 towards the lamp it is all of k_t L at the lamp's distance.
+    // Document [I]'s k_t L (t.v)^n: seen straight through glass of index 1 towards the lamp, it is all of k_t
+    // L at the lamp's distance.
     let mut world = World::new();
     let mut lens = Material { transmission: Vec3::splat(0.5), ior: 1.0, ..black() };
     lens.front.shininess = 20.0;

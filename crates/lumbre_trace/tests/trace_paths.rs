@@ -1,5 +1,5 @@
-//! Paths against closed forms, against the ray tree's limits, and against an independent path tracer's irradiance; glass in its hard cases; the
-//! same bits on any number of threads.
+//! Path tracing against closed forms, against the ray tree, and against the irradiance that an independent
+//! path tracer found; hard cases of glass; and the same bits on any number of threads.
 
 mod support;
 
@@ -16,14 +16,14 @@ use lumbre_trace::{Ended, Integrator, Kind, TraceOptions, Tracer};
 
 use support::*;
 
-/// Mean of a picture's channels.
+/// Returns the mean over all pixels and channels.
 fn mean(pixels: &[DVec3]) -> f64 {
     pixels.iter().map(|pixel| pixel.element_sum() / 3.0).sum::<f64>() / pixels.len() as f64
 }
 
 #[test]
 fn a_furnace_of_one_reflectance_glows_as_the_series_says() {
-    // Inside a closed box that sends 1 and reflects ρ, all directions bring 1/(1 - ρ).
+    // Inside a closed box of emission 1 and reflectance ρ, the radiance is 1/(1 - ρ) in every direction.
     for reflectance in [0.0, 0.5, 0.8] {
         let mut world = World::new();
         let mut walls = glowing(1.0, reflectance);
@@ -43,8 +43,8 @@ fn a_furnace_of_one_reflectance_glows_as_the_series_says() {
 
 #[test]
 fn what_shines_lights_a_floor_by_its_form_factor() {
-    // A square lamp above a floor: irradiance over π is L F at every point, whichever of the two ways finds it. A mesh of many lamps, one of
-    // which is bright, must not matter either.
+    // A square lamp above a floor: irradiance over π is L F at every point, whether light sampling or the
+    // path itself finds the lamp. The lamp is a mesh of several triangles, which must not matter either.
     let form_factor = |x: f64, z: f64, side: f64, height: f64| {
         let corner = |a: f64, b: f64| {
             let (a, b) = (a / height, b / height);
@@ -80,7 +80,8 @@ fn what_shines_lights_a_floor_by_its_form_factor() {
 
 #[test]
 fn lobes_in_a_furnace_reflect_what_the_lighting_equation_reflects() {
-    // A shiny floor under an even sky, by paths, against the equation's integral over the hemisphere by a grid.
+    // A shiny floor under a uniform sky: paths against the lighting equation integrated over a grid on the
+    // hemisphere.
     for model in [ReflectionModel::Phong, ReflectionModel::Blinn, ReflectionModel::TorranceSparrow] {
         for lobe in [Lobe::Bare, Lobe::EnergyKeeping] {
             let front = Surface {
@@ -150,7 +151,8 @@ fn a_lamp_with_a_size_is_as_bright_as_its_middle() {
 
 #[test]
 fn a_ball_of_glass_in_a_furnace_is_not_to_be_seen() {
-    // What Fresnel's equations take from one way they give to the other: 1 everywhere. By trees down to weights of 10⁻⁶, and by paths.
+    // What Fresnel's equations take from one ray they give to the other: 1 everywhere. By trees down to
+    // weights of 10⁻⁶, and by paths.
     let ball = || {
         let mut world = World::new();
         let entity = exact(&mut world, Quadric::sphere(1.0), glass(1.5), Transform::IDENTITY);
@@ -173,7 +175,7 @@ fn a_ball_of_glass_in_a_furnace_is_not_to_be_seen() {
     assert!((found - 1.0).abs() < (5.0 * error).max(1e-12) && (found - 1.0).abs() < 1e-3);
 }
 
-/// Light through blocks of glass side by side along z, each a thickness, an index and a shift of its start.
+/// Blocks of glass in a row along -z; each is given by its thickness, its index and the gap in front of it.
 fn blocks(parts: &[(f64, f32, f64)]) -> World {
     let mut world = World::new();
     let mut z = 0.0;
@@ -189,7 +191,8 @@ fn blocks(parts: &[(f64, f32, f64)]) -> World {
 
 #[test]
 fn glass_that_touches_glass_has_no_face_between() {
-    // Two blocks of one glass in contact are one block; with a gap of a millimetre they are two. Coordinates that f32 holds exactly, and others.
+    // Two blocks of the same glass in contact are one block; with a gap of a millimetre they are two. With
+    // coordinates that f32 can represent exactly, and others.
     for unit in [0.25, 0.1, 7.3] {
         for slant in [0.0, 0.4] {
             let count = |parts: &[(f64, f32, f64)]| {
@@ -199,7 +202,7 @@ fn glass_that_touches_glass_has_no_face_between() {
                 let mut faces = 0;
                 let mut branch = &tree;
                 while branch.point.is_some() {
-                    // No light is reflected where nothing changes.
+                    // No light is reflected where the index does not change.
                     let mirrored = next(branch, Kind::Mirrored);
                     faces += usize::from(mirrored.is_some_and(|mirrored| mirrored.factor.x > 1e-9));
                     branch = next(branch, Kind::Transmitted).expect("light goes on");
@@ -225,7 +228,7 @@ fn a_bubble_in_glass_is_air_and_a_stone_in_water_is_stone() {
         let mut indices = Vec::new();
         loop {
             indices.push(branch.point.as_ref().map(|point| point.index as f32));
-            // By Bouguer's formula n r sin φ stays what it was in every shell.
+            // By Bouguer's formula n r sin φ is the same in every shell.
             if let Some(point) = &branch.point {
                 let reach = branch.origin.cross(branch.direction).length() * point.index;
                 assert!((reach - 0.3).abs() < 1e-12, "{outer} {inner}: {reach}");
@@ -236,7 +239,7 @@ fn a_bubble_in_glass_is_air_and_a_stone_in_water_is_stone() {
             }
         }
         assert_eq!(indices, [Some(1.0), Some(outer), Some(inner), Some(outer), None]);
-        // An eye in the middle of it all knows where it is.
+        // The media of an eye at the centre are found as well.
         look_from(&mut world, DVec3::ZERO, DVec3::NEG_Z, 0.1);
         let tree = tree(&mut world, &options(8));
         assert_eq!(tree.point.as_ref().map(|point| point.index as f32), Some(inner));
@@ -247,7 +250,7 @@ fn a_bubble_in_glass_is_air_and_a_stone_in_water_is_stone() {
 
 #[test]
 fn rays_that_start_on_a_surface_do_not_meet_it() {
-    // A lit sphere, far from the origin and near, by mesh and by equation: no speck of its own shadow.
+    // A lit sphere, near the origin and far from it, as a mesh and as an exact surface: without shadow acne.
     for place in [DVec3::ZERO, DVec3::new(1e5, -2e5, 3e5)] {
         for is_exact in [true, false] {
             let mut world = World::new();
@@ -264,7 +267,7 @@ fn rays_that_start_on_a_surface_do_not_meet_it() {
             let (lit, _) = draw(&mut world, &options(64));
             let open = TraceOptions { shadows: false, ..options(64) };
             let (open, _) = draw(&mut world, &open);
-            // From the lamp itself nothing lies in shadow, but for the facets at the rim, which lie behind the horizon that their normals feign.
+            // Seen from the lamp, nothing is in shadow.
             let dark = lit.radiance.iter().zip(&open.radiance).filter(|(lit, open)| lit != open).count();
             assert_eq!(dark, 0, "{place} exact {is_exact}");
         }
@@ -296,7 +299,7 @@ fn the_bits_are_the_same_on_any_number_of_threads() {
     }
 }
 
-/// A ball of glass, a mirror and a lamp over a floor.
+/// A glass ball, a mirror and a lamp above a floor.
 fn facing_scene() -> World {
     let mut world = World::new();
     exact(
@@ -323,7 +326,7 @@ fn an_error_asked_for_ends_it_and_an_interruption_keeps_what_is_there() {
     assert_eq!(report.ended, Ended::Error);
     let stated = report.standard_error.expect("it is stated");
     assert!(stated <= 0.1);
-    // The stated error is about what the picture is off by against one with forty times the samples.
+    // The reported error is about the difference from a picture with forty times the samples.
     let samples = 40 * report.samples[1];
     let (better, _) = draw(&mut world, &paths(32, samples));
     let squares: f64 =
@@ -344,7 +347,7 @@ fn an_error_asked_for_ends_it_and_an_interruption_keeps_what_is_there() {
     assert!(picture.radiance.iter().any(|pixel| pixel.x > 0.0));
 }
 
-/// Position, normal and irradiance with its standard error, as the other path tracer has found it.
+/// Position, normal and irradiance with its standard error, as the other path tracer found them.
 struct Reference {
     position: DVec3,
     normal: DVec3,
@@ -380,7 +383,7 @@ fn paths_agree_with_another_path_tracer_at_its_points() {
         let (Some(model), Some(points)) = (shared(model), shared(points)) else { return };
         let mut world = World::new();
         lumbre_scene::load(&mut world, &model).expect("the model loads");
-        // The reference is of diffuse surfaces.
+        // The reference has diffuse surfaces only.
         for mut material in world.query::<&mut Material>().iter_mut(&mut world) {
             material.front.specular = Vec3::ZERO;
         }
@@ -428,14 +431,16 @@ fn paths_agree_with_another_path_tracer_at_its_points() {
             100.0 * variance.sqrt() / sum
         );
         assert!(count > 100, "{count} channels are too few to compare");
-        // Channels of one path go together, so that three times the variance of independent ones bounds it.
+        // The channels of one path are correlated, so that three times the variance of independent ones is a
+        // bound.
         assert!(difference.abs() < 5.0 * (3.0 * variance).sqrt(), "{}: {difference}", model.display());
     }
 }
 
 #[test]
 fn a_sheet_in_the_way_leaves_what_both_ways_agree_on() {
-    // A lamp behind a thin sheet with Fresnel reflection: seen by shadow rays, and by paths that go through it; once each, not twice.
+    // A lamp behind a thin sheet: both shadow rays and paths through the sheet find it, and must count it
+    // once, not twice.
     let mut world = World::new();
     let front = Surface { diffuse: Vec3::splat(0.5), ..Surface::default() };
     world.spawn((Mesh(Arc::new(shapes::plane(60.0, 60.0, 1, 1))), Material { front, ..Material::default() }));
@@ -455,8 +460,8 @@ fn a_sheet_in_the_way_leaves_what_both_ways_agree_on() {
 
 #[test]
 fn one_lamp_among_hundreds_is_chosen_without_leaving_any_out() {
-    // Lamps of many strengths, cones, ranges and sizes over a floor, two of them distant: without bounces paths have to bring what the ray
-    // tree sums up over all of them.
+    // Lamps of many strengths, cones and ranges above a floor, two of them distant: without bounces, paths
+    // must find the light that the ray tree sums over all of them.
     let world = || {
         let mut world = World::new();
         let floor = Transform::from_xyz(0.0, 0.0, 0.0);
@@ -492,7 +497,8 @@ fn one_lamp_among_hundreds_is_chosen_without_leaving_any_out() {
     let [wanted, got] = [&whole, &found].map(|picture| mean(&picture.radiance));
     let error = report.standard_error.expect("there are passes enough");
     println!("300 lamps: {got:.5} of {wanted:.5}, noise of the picture {:.2} %", 100.0 * error);
-    // A lamp that is left out, or found with another chance than is said, is more than noise: of the mean over 256 pixels, and of each.
+    // A lamp that is left out, or chosen with another probability than stated, shows as more than noise: in
+    // the mean over 256 pixels, and in each.
     assert!((got / wanted - 1.0).abs() < 5.0 * error / 16.0, "{got} for {wanted}");
     let apart = |(a, b): (&DVec3, &DVec3)| (*a - *b).length_squared() / 3.0;
     let squares: f64 = whole.radiance.iter().zip(&found.radiance).map(apart).sum();

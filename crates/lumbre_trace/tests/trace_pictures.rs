@@ -1,5 +1,5 @@
-//! What belongs to a picture beside its radiance: auxiliary pictures whose sums are the picture, samples that go where the noise is, and
-//! pictures that are continued to the same bits.
+//! Tests of whole pictures apart from their radiance: auxiliary pictures that sum to the picture, samples
+//! distributed by noise, and pictures that are continued with the same bits.
 
 mod support;
 
@@ -20,7 +20,8 @@ use lumbre_trace::{
 
 use support::*;
 
-/// Two lamps, a panel that shines, a ball of glass, a mirror, a pane that covers in part, fog, ambient light and a sky, over a floor.
+/// Two lamps, an emissive panel, a glass ball, a mirror, an alpha-blended pane, fog, ambient light and a sky,
+/// above a floor.
 fn room() -> World {
     let mut world = World::new();
     let fog = Fog { mode: FogMode::Linear { start: 1.0, end: 20.0 }, color: Vec3::new(0.1, 0.2, 0.3) };
@@ -51,7 +52,7 @@ fn room() -> World {
     world
 }
 
-/// The pixels of an auxiliary picture.
+/// Returns the pixels of an auxiliary picture.
 fn colors<'p>(picture: &'p Picture, name: &str) -> &'p [DVec3] {
     let found = picture.aovs.iter().find(|found| found.aov.to_string() == name);
     match found.map(|found| &found.values) {
@@ -67,7 +68,7 @@ fn asked(names: &[&str]) -> Vec<Aov> {
     names.iter().map(|name| Aov::from_name(name).expect("there is such a picture")).collect()
 }
 
-/// How far the sum of pictures is from another at most, of the brightest channel.
+/// Returns the largest difference between a picture and the sum of others, relative to the brightest channel.
 fn apart(whole: &[DVec3], parts: &[&[DVec3]]) -> f64 {
     let brightest = whole.iter().fold(0.0_f64, |brightest, pixel| brightest.max(pixel.max_element()));
     let sums = (0..whole.len()).map(|at| parts.iter().map(|part| part[at]).sum::<DVec3>());
@@ -100,7 +101,7 @@ fn parts_of_light_sum_up_to_the_picture() {
             (indirect, of_sources("indirect")),
             (&picture.radiance, of_sources("light")),
         ] {
-            // Rounding of as many additions as there are terms.
+            // The rounding errors of as many additions as there are terms.
             let apart = apart(whole, &parts);
             assert!(apart < 1e-12, "{integrator:?}: {apart:e}");
         }
@@ -113,7 +114,8 @@ fn parts_of_light_sum_up_to_the_picture() {
 
 #[test]
 fn a_light_alone_is_the_picture_without_the_others() {
-    // The ray tree asks every lamp by itself, so that its part is the picture of a World that has no other, to rounding.
+    // The ray tree evaluates every lamp independently, so that a lamp's part equals, to within rounding, the
+    // picture of a World without the others.
     let aovs = asked(&["light:left"]);
     let (picture, _) = draw(&mut room(), &TraceOptions { aovs, samples: Some(4), ..options(40) });
     let mut world = room();
@@ -142,13 +144,14 @@ fn a_light_alone_is_the_picture_without_the_others() {
 
 #[test]
 fn direct_light_of_paths_is_all_that_one_reflection_brings() {
-    // Two matt walls and a lamp: paths of one reflection are the direct light, to the bit of the same numbers.
+    // In this room nearly all light that paths of depth 1 find is direct.
     let aovs = asked(&["direct"]);
     let (picture, _) = draw(&mut room(), &TraceOptions { aovs, ..paths(32, 16) });
     let (once, _) = draw(&mut room(), &TraceOptions { depth: Some(1), ..paths(32, 16) });
     let direct = colors(&picture, "direct");
     let sum = |pixels: &[DVec3]| pixels.iter().map(|pixel| pixel.element_sum()).sum::<f64>();
-    // With a limit, what ends there is not weighed against going on: another estimate of the same light.
+    // At the last point of a limited path, light samples are not weighted against the path's own
+    // continuation: a different estimate of the same light.
     let relative = sum(direct) / sum(&once.radiance) - 1.0;
     println!("direct light over the light of one reflection: {:+.2} %", 100.0 * relative);
     assert!(relative.abs() < 0.02, "{relative}");
@@ -168,10 +171,10 @@ fn what_is_seen_first_is_what_the_scene_says() {
         },
         None => panic!("{name} is not there"),
     };
-    // The ball's top is 3.4 m below the eye.
+    // The top of the ball is 3.4 m below the eye.
     let middle = 4 * 9 + 4;
     assert!((numbers("depth")[middle] - 3.4).abs() < 1e-3, "{}", numbers("depth")[middle]);
-    // Seen a centimetre off its middle, with a radius of 60.
+    // Seen a centimetre off the ball's centre, with a radius of 60 centimetres.
     let normal = DVec3::new(0.0, (1.0 - 1.0 / 3600.0_f64).sqrt(), 1.0 / 60.0);
     assert!((colors(&picture, "normal")[middle] - normal).length() < 1e-6);
     assert_eq!(colors(&picture, "albedo")[middle], DVec3::ZERO);
@@ -196,7 +199,7 @@ fn a_source_that_is_not_there_is_named_with_those_that_are() {
     assert_eq!(known, r#""ambient", "background", "left", "panel", "right""#);
 }
 
-/// A picture that ends when its samples were kept so often, and what was kept last.
+/// Traces a picture, interrupts it after `after` calls of the listener, and returns the last checkpoint.
 fn interrupted(options: &TraceOptions, from: Option<&[u8]>, after: usize) -> (TraceReport, Vec<u8>) {
     let kept = Mutex::new(Vec::new());
     let told = Mutex::new(0);
@@ -234,7 +237,8 @@ fn a_picture_that_is_continued_has_the_bits_of_one_that_never_stopped() {
             ..paths(40, 64)
         };
         let (whole, report) = draw(&mut room(), &options);
-        // Nine squares a round: within the first round, within a later one, and after the samples went where the noise is.
+        // There are nine tiles per round: the picture is interrupted within the first round, within a later
+        // one, and after the samples were distributed by noise.
         let mut kept: Option<Vec<u8>> = None;
         for after in [4, 31, 50] {
             let (report, bytes) = interrupted(&options, kept.as_deref(), after);
@@ -245,7 +249,7 @@ fn a_picture_that_is_continued_has_the_bits_of_one_that_never_stopped() {
         let (end, of_end) = continued(&options, &kept).expect("it goes on");
         assert_eq!(whole, end);
         assert_eq!((report.samples, report.rays), (of_end.samples, of_end.rays));
-        // More samples of the same picture go on too.
+        // More samples of the same picture can be added too.
         let more = TraceOptions { samples: Some(96), ..options.clone() };
         assert_eq!(draw(&mut room(), &more).0, continued(&more, &kept).expect("it goes on").0);
     }
@@ -279,7 +283,7 @@ fn samples_of_something_else_are_refused() {
     let mut bytes = kept.clone();
     bytes[9] ^= 1;
     assert_eq!(refused(&options, &bytes), CheckpointError::Version);
-    // Another scene: one lamp is a little brighter, one ball a little larger.
+    // Another scene: one lamp is slightly brighter, or one ball slightly larger.
     let change = |change: &dyn Fn(&mut World)| {
         let mut world = room();
         change(&mut world);
@@ -306,7 +310,7 @@ fn samples_of_something_else_are_refused() {
 
 #[test]
 fn samples_by_noise_are_true_and_so_is_their_stated_error() {
-    // A corner of the picture is noisy, most of it is not.
+    // A corner of the picture is noisy; most of it is not.
     let (reference, _) = draw(&mut room(), &paths(32, 8192));
     let options = |samples, sample_by_noise| TraceOptions { sample_by_noise, ..paths(32, samples) };
     let off = |picture: &Picture| {
@@ -326,14 +330,15 @@ fn samples_by_noise_are_true_and_so_is_their_stated_error() {
         "by noise: stated {stated:.4}, found {found:.4}, {} rays, samples {:?}",
         of_noise.rays, of_noise.samples
     );
-    // As many samples in the mean, longer paths among them, and less error.
+    // The same number of samples on average, with longer paths among them, and a smaller error.
     let more = of_noise.rays as f64 / of_even.rays as f64;
     assert!((0.9..1.3).contains(&more), "{more} times the rays");
     assert!(of_noise.samples[0] < 200 && of_noise.samples[1] > 300, "{:?}", of_noise.samples);
     assert!(found < 0.95 * off_even, "{found} for {off_even}");
-    // The stated error is the one found, within what a thousand pixels with a few noisy ones among them leave uncertain.
+    // The reported error is the measured one, within the uncertainty of a thousand pixels of which few are
+    // noisy.
     assert!((0.7..1.4).contains(&(found / stated)), "{found} stated as {stated}");
-    // No bias: the mean over pixels is off by no more than its own standard error allows.
+    // No bias: the mean over all pixels differs by no more than its own standard error allows.
     let bias = |picture: &Picture| {
         let sum = |pixels: &[DVec3]| pixels.iter().map(|pixel| pixel.element_sum()).sum::<f64>();
         sum(&picture.radiance) / sum(&reference.radiance) - 1.0

@@ -1,4 +1,5 @@
-//! Putting things into a World as a glTF file holds them: nodes, primitives below them, lights on them.
+//! Spawns objects into a World in the structure of a glTF file: nodes with primitives below them and lights
+//! on them.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ pub struct Builder<'w> {
     glow: Arc<TriangleMesh>,
 }
 
-/// The look of a mesh: what a glTF material holds.
+/// The appearance of a mesh: the contents of a glTF material.
 struct Look {
     name: String,
     material: Material,
@@ -33,23 +34,23 @@ struct Look {
 }
 
 impl<'w> Builder<'w> {
-    /// Fills this World.
+    /// Creates a builder that fills a World.
     pub fn new(world: &'w mut World) -> Self {
         let glow = Arc::new(lumbre_mesh::shapes::tetrahedral_sphere(0.06, 2, false));
         Self { world, textures: HashMap::new(), glow }
     }
 
-    /// A node without anything.
+    /// Spawns an empty node.
     pub fn node(&mut self, name: &str, place: Transform) -> Entity {
         self.world.spawn((Name::new(name.to_owned()), place)).id()
     }
 
-    /// A node below another one.
+    /// Spawns an empty node below another one.
     pub fn child(&mut self, parent: Entity, name: &str, place: Transform) -> Entity {
         self.world.spawn((Name::new(name.to_owned()), place, ChildOf(parent))).id()
     }
 
-    /// Something that stands still.
+    /// Spawns a static object.
     pub fn fixed(
         &mut self,
         name: &str,
@@ -63,7 +64,7 @@ impl<'w> Builder<'w> {
         node
     }
 
-    /// Something that stands still and that the baker leaves out: it mirrors, or light passes through it.
+    /// Spawns a static object that the baker leaves out, because it mirrors or transmits light.
     pub fn clear(
         &mut self,
         name: &str,
@@ -77,7 +78,7 @@ impl<'w> Builder<'w> {
         node
     }
 
-    /// Something that moves.
+    /// Spawns a moving object.
     pub fn moving(
         &mut self,
         name: &str,
@@ -93,18 +94,18 @@ impl<'w> Builder<'w> {
         node
     }
 
-    /// Lets the player through a node's meshes.
+    /// Lets the player walk through a node's meshes.
     pub fn let_through(&mut self, node: Entity) {
         self.world.entity_mut(node).insert(Extras(json!({"lumbre_demo": {"solid": false}})));
     }
 
-    /// A light that the baker takes over; it does not move.
+    /// Spawns a static light that the baker takes over.
     pub fn baked_light(&mut self, name: &str, place: Transform, light: Light) {
         let node = self.node(name, place);
         self.world.entity_mut(node).insert(Light { bake: BakeMode::Static, ..light });
     }
 
-    /// A light that moves, in a small glowing ball of its colour.
+    /// Spawns a moving light within a small emissive ball of its colour.
     pub fn moving_light(&mut self, name: &str, place: Transform, light: Light, motion: &Motion) -> Entity {
         let node = self.node(name, place);
         let look = glowing(light.diffuse);
@@ -114,7 +115,7 @@ impl<'w> Builder<'w> {
         node
     }
 
-    /// A light on something that moves, in a small glowing ball of its colour.
+    /// Spawns a light within a small emissive ball of its colour, below a moving node.
     pub fn carried_light(&mut self, carrier: Entity, name: &str, place: Transform, light: Light) {
         let node = self.child(carrier, name, place);
         let look = glowing(light.diffuse);
@@ -123,14 +124,14 @@ impl<'w> Builder<'w> {
         self.primitive(node, "glow", glow, look, Mobility::Dynamic);
     }
 
-    /// A camera.
+    /// Spawns a camera.
     pub fn camera(&mut self, name: &str, place: Transform) -> Entity {
         let node = self.node(name, place);
         self.world.entity_mut(node).insert(Camera::default());
         node
     }
 
-    /// More geometry on a node that moves: what a light hangs from.
+    /// Adds geometry to a moving node, such as what a light hangs from.
     pub fn hang(&mut self, node: Entity, name: &str, mesh: TriangleMesh, paint: Paint) {
         let look = self.look(paint);
         self.primitive(node, name, Arc::new(mesh), look, Mobility::Dynamic);
@@ -178,7 +179,7 @@ fn motion_extras(motion: &Motion) -> Extras {
     Extras(json!({"lumbre_demo": {"motion": motion}}))
 }
 
-/// The ball around a light: its hue, as bright as the display goes.
+/// Returns the look of the ball around a light: the light's hue at a fixed brightness.
 fn glowing(color: Vec3) -> Look {
     let emission = color / color.max_element().max(1e-6) * 1.5;
     let front = Surface { emission, ..Material::matt(Vec3::splat(0.1)).front };
@@ -191,13 +192,13 @@ fn glowing(color: Vec3) -> Look {
     }
 }
 
-/// A small coloured light that is at its strongest finite and ends at `range` metres.
+/// Returns a small coloured light whose attenuation is finite at distance 0 and ends at `range` metres.
 pub fn wisp(color: Vec3, range: f32) -> Light {
     let attenuation = Attenuation { constant: 1.0, linear: 0.0, quadratic: 1.2, clamp: false, range };
     Light { attenuation, ..Light::point(color) }
 }
 
-/// A spotlight with soft edges that reaches far.
+/// Returns a spotlight with a soft edge.
 pub fn beam(color: Vec3, outer_degrees: f32, range: f32) -> Light {
     let outer = outer_degrees.to_radians();
     let attenuation = Attenuation { constant: 1.0, linear: 0.0, quadratic: 0.12, clamp: false, range };

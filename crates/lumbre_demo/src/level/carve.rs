@@ -1,7 +1,8 @@
-//! Rooms carved out of solid rock: boxes of air, boxes of matter in them, and the surface between. Not what stands in the rooms.
+//! Rooms carved out of solid rock: boxes of air, boxes of matter within them, and the surface between.
+//! Furniture is added by the rooms.
 //!
-//! The surface of a union of boxes is closed whatever the boxes are, and all of it lies on one grid, so no light leaks through a
-//! seam and no vertex sits in the middle of a neighbour's edge.
+//! The surface of a union of boxes is closed whatever the boxes are, and all of it lies on one grid, so that
+//! no light leaks through a seam and there are no T-junctions.
 
 use std::collections::BTreeMap;
 
@@ -10,24 +11,24 @@ use lumbre_mesh::TriangleMesh;
 
 use super::paint::Paint;
 
-/// What covers the six sides of a box of air, by where they are.
+/// The paints of the six sides of a box of air.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Finish {
-    /// Below.
+    /// The side below.
     pub floor: Paint,
-    /// Above.
+    /// The side above.
     pub ceiling: Paint,
-    /// Towards -x, +x, -z, +z.
+    /// The sides towards -x, +x, -z and +z.
     pub walls: [Paint; 4],
 }
 
 impl Finish {
-    /// The same on all four walls.
+    /// Creates a finish with the same paint on all four walls.
     pub fn new(floor: Paint, ceiling: Paint, walls: Paint) -> Self {
         Self { floor, ceiling, walls: [walls; 4] }
     }
 
-    /// The paint towards a negative (false) or positive end of an axis.
+    /// Returns the paint at the negative (false) or positive end of an axis.
     fn towards(&self, axis: usize, positive: bool) -> Paint {
         match (axis, positive) {
             (0, _) => self.walls[usize::from(positive)],
@@ -38,40 +39,40 @@ impl Finish {
     }
 }
 
-/// A box of air. Where two overlap the later one decides.
+/// A box of air. Where two boxes overlap, the later one decides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
-    /// The room it belongs to.
+    /// The room that it belongs to.
     pub room: &'static str,
     /// Smallest corner, metres.
     pub min: DVec3,
     /// Largest corner, metres.
     pub max: DVec3,
-    /// What covers it.
+    /// The paints of its sides.
     pub finish: Finish,
 }
 
-/// A box of matter inside the air: a step, a podium, a beam.
+/// A box of matter inside the air, such as a step, a podium or a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Matter {
     /// Smallest corner, metres.
     pub min: DVec3,
     /// Largest corner, metres.
     pub max: DVec3,
-    /// What covers it.
+    /// The paint of its sides.
     pub paint: Paint,
 }
 
-/// The boxes of a level.
+/// The boxes that make up a level.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// Rooms, doorways, windows.
+    /// Rooms, doorways and windows.
     pub air: Vec<Air>,
-    /// What is left standing.
+    /// Matter inside the air.
     pub matter: Vec<Matter>,
 }
 
-/// What fills a cell of the grid.
+/// The contents of a grid cell.
 #[derive(Clone, Copy, PartialEq)]
 enum Cell {
     Rock,
@@ -80,13 +81,14 @@ enum Cell {
 }
 
 impl Plan {
-    /// Whether a point is in air.
+    /// Returns true if a point is in air.
     #[cfg(test)]
     pub fn is_air(&self, point: DVec3) -> bool {
         matches!(self.fill(point), Cell::Air(_))
     }
 
-    /// The surface, cut into rectangles no longer than `spacing` metres: a mesh per room and paint.
+    /// Builds the surface from rectangles with edges of at most `spacing` metres: one mesh per room and
+    /// paint.
     pub fn surface(&self, spacing: f64) -> BTreeMap<(&'static str, Paint), TriangleMesh> {
         let lines: [Vec<f64>; 3] = std::array::from_fn(|axis| self.lines(axis, spacing));
         let counts: [usize; 3] = std::array::from_fn(|axis| lines[axis].len().saturating_sub(1));
@@ -137,7 +139,8 @@ impl Plan {
         self.air.iter().rposition(|one| holds(one.min, one.max)).map_or(Cell::Rock, Cell::Air)
     }
 
-    /// The grid's coordinates along an axis: every side of every box, and equal parts between them.
+    /// Returns the grid's coordinates along an axis: the sides of all boxes, with equal divisions between
+    /// them.
     fn lines(&self, axis: usize, spacing: f64) -> Vec<f64> {
         let air = self.air.iter().flat_map(|one| [one.min[axis], one.max[axis]]);
         let matter = self.matter.iter().flat_map(|one| [one.min[axis], one.max[axis]]);
@@ -146,7 +149,7 @@ impl Plan {
         sides.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
         let mut lines = Vec::new();
         for pair in sides.windows(2) {
-            // A millionth less, so that 3 m / 0.5 m is not seven parts.
+            // The tolerance of a millionth prevents rounding from dividing 3 m by 0.5 m into seven parts.
             let parts = ((pair[1] - pair[0]) / spacing - 1e-6).ceil().max(1.0);
             lines.extend((0..parts as usize).map(|part| pair[0] + (pair[1] - pair[0]) * part as f64 / parts));
         }
@@ -155,7 +158,7 @@ impl Plan {
     }
 }
 
-/// A mesh that grows, and its vertices by grid point and side.
+/// A mesh under construction, with its vertices by grid point and side.
 #[derive(Default)]
 struct Piece {
     mesh: TriangleMesh,
@@ -163,9 +166,9 @@ struct Piece {
 }
 
 impl Piece {
-    /// The side of a cell, seen from inside the cell.
+    /// Adds one side of a cell, facing into the cell.
     fn rectangle(&mut self, lines: &[Vec<f64>; 3], cell: [usize; 3], axis: usize, positive: bool, tile: f64) {
-        // Inwards from a cell's positive side is negative.
+        // The normal points into the cell, so on its positive side it is negative.
         let normal = DVec3::AXES[axis] * if positive { -1.0 } else { 1.0 };
         let up = if axis == 1 { DVec3::NEG_Z * normal.y } else { DVec3::Y };
         let right = up.cross(normal);
@@ -187,7 +190,7 @@ impl Piece {
         };
         let [a, b, c, d] =
             [corner(false, false), corner(true, false), corner(true, true), corner(false, true)];
-        // The diagonal alternates, so that interpolation over the triangles favours no direction.
+        // The diagonals alternate, so that interpolation over the triangles has no preferred direction.
         let even = cell.iter().sum::<usize>().is_multiple_of(2);
         self.mesh.indices.extend(if even { [a, b, c, a, c, d] } else { [a, b, d, b, c, d] });
     }
@@ -217,7 +220,7 @@ mod tests {
         Plan { air, matter: vec![podium] }
     }
 
-    /// Twice the area and six times the volume of what a surface encloses, seen from inside.
+    /// Returns the area of a surface that is seen from inside, and the volume that it encloses.
     fn measure(surface: &BTreeMap<(&'static str, Paint), TriangleMesh>) -> (f64, f64) {
         let (mut area, mut volume) = (0.0, 0.0);
         for mesh in surface.values() {
@@ -233,18 +236,19 @@ mod tests {
     #[test]
     fn encloses_exactly_the_air() {
         let (area, volume) = measure(&two_rooms().surface(0.5));
-        // Two rooms and a doorway less the podium. Positions are f32, good to 10⁻⁶ of 50 m³.
+        // Two rooms and a doorway, without the podium. Positions are f32, accurate to 10⁻⁶ of 50 m³.
         let expected = 48.0 + 0.5 * 2.2 * 1.2 + 2.5 * 3.0 * 3.0 - 0.5;
         assert!((volume - expected).abs() < 1e-4, "{volume} for {expected}");
         let rooms = 2.0 * (16.0 + 12.0 + 12.0) + 2.0 * (7.5 + 7.5 + 9.0);
-        // The podium's two free sides and its top replace two walls and a floor of the same size.
+        // The podium's two visible sides and its top replace parts of two walls and of the floor of the same
+        // area.
         let doorway = 2.0 * 0.5 * (1.2 + 2.2) - 2.0 * 1.2 * 2.2;
         assert!((area - rooms - doorway).abs() < 1e-4, "{area}");
     }
 
     #[test]
     fn is_closed_and_without_vertices_inside_edges() {
-        // In a closed surface every edge is used once in each direction, by position.
+        // In a closed surface every edge occurs equally often in both directions, compared by position.
         let mut edges = BTreeMap::new();
         for mesh in two_rooms().surface(0.5).values() {
             for [a, b, c] in mesh.triangles() {

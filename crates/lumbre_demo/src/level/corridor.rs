@@ -1,4 +1,4 @@
-//! The corridor: brick, arched ribs, warm lamps on the walls, a grille before a lit niche.
+//! The corridor: brick walls, arched ribs, warm lamps on the walls, and a grille in front of a lit niche.
 
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_scene::Transform;
@@ -11,11 +11,11 @@ use crate::motion::{Bob, Flicker, Motion, Path, Swing};
 
 /// Name and extent.
 pub const ROOM: (&str, [f64; 3], [f64; 3]) = ("corridor", [12.5, 0.0, 3.5], [22.5, 3.0, 6.5]);
-/// Where the lamps hang: x, z, and the side of the room the wall is on.
+/// The lamps: x, z, and the side of the corridor that their wall is on.
 const LAMPS: [(f64, f64, f64); 4] =
     [(14.5, 3.5, -1.0), (14.5, 6.5, 1.0), (20.5, 3.5, -1.0), (20.5, 6.5, 1.0)];
 
-/// The air of the corridor, its niche, and the doorway to the gallery.
+/// Carves the corridor, its niche and the doorway to the gallery.
 pub fn carve(plan: &mut Plan) {
     let (room, min, max) = ROOM;
     let finish = Finish::new(Paint::Stone, Paint::White, Paint::Brick);
@@ -27,7 +27,7 @@ pub fn carve(plan: &mut Plan) {
     plan.air.push(Air { room, min, max, finish: Finish { floor: Paint::Stone, ..niche } });
 }
 
-/// Ribs, lamps, the grille, and three lanterns.
+/// Adds ribs, lamps, the grille, two lanterns, a candle and a wisp.
 pub fn furnish(builder: &mut Builder<'_>) {
     let rib = shape::arch(1.5, 1.05, 1.2, 0.35, 14);
     let along = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
@@ -44,7 +44,7 @@ pub fn furnish(builder: &mut Builder<'_>) {
     let brackets = LAMPS.map(|(x, _, side)| shape::at(&bracket, x, 1.83, from_wall(side, 0.16)));
     builder.fixed("lamp brackets", Transform::IDENTITY, shape::together(brackets), Paint::Iron);
     for (number, (x, _, side)) in LAMPS.into_iter().enumerate() {
-        // Before the shade, as nothing shines through it.
+        // In front of the shade, which is opaque.
         let place = Transform::from_xyz(x, 2.0, from_wall(side, 0.45));
         let light = wisp(Vec3::new(1.25, 0.72, 0.33), 7.0);
         builder.baked_light(&format!("wall lamp {}", number + 1), place, light);

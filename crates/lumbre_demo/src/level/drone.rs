@@ -1,4 +1,4 @@
-//! A drone that flies its round through all rooms with a lamp under it.
+//! A drone with a lamp that flies a circuit through all rooms.
 
 use glam::{DAffine3, DVec3, Vec3};
 use lumbre_scene::Transform;
@@ -8,8 +8,8 @@ use super::paint::Paint;
 use super::shape;
 use crate::motion::{Bob, Motion, Path};
 
-/// Where it flies: through the hall, the corridor, the gallery, down to the vault and up again. Two metres apart or so, closer
-/// before and behind doorways.
+/// The points of its circuit: through the hall, the corridor and the gallery, down to the vault and up again.
+/// They are about two metres apart, and closer near doorways.
 pub const ROUND: [[f64; 3]; 34] = [
     [6.0, 2.4, 5.0],
     [9.5, 2.1, 5.0],
@@ -47,7 +47,7 @@ pub const ROUND: [[f64; 3]; 34] = [
     [11.4, 1.7, 5.0],
 ];
 
-/// Launches it.
+/// Adds the drone.
 pub fn launch(builder: &mut Builder<'_>) {
     let points: Vec<DVec3> = ROUND.into_iter().map(DVec3::from_array).collect();
     let start = Transform::from_translation(points[0]);

@@ -1,5 +1,6 @@
-//! The gallery, half a workshop: spheres of three exponents on plinths, crates and barrels, a table, an arch, a podium with a
-//! ring of gold, under coloured lights that move.
+//! The gallery, which is half a workshop: spheres with three specular exponents on plinths, a crystal ball, a
+//! mirror, crates and barrels, a table, an arch, and a podium with a golden ring, under moving coloured
+//! lights.
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use lumbre_scene::Transform;
@@ -12,15 +13,15 @@ use crate::motion::{Bob, Motion, Orbit, Spin, Swing};
 
 /// Name and extent.
 pub const ROOM: (&str, [f64; 3], [f64; 3]) = ("gallery", [23.0, 0.0, -1.0], [35.0, 4.0, 11.0]);
-/// The spheres: x, z, and their paint.
+/// The spheres: x, z and paint.
 const SPHERES: [(f64, f64, Paint); 3] =
     [(26.0, 8.0, Paint::Broad), (28.5, 8.0, Paint::Medium), (31.0, 8.0, Paint::Narrow)];
 /// The crystal ball: x and z.
 const CRYSTAL: (f64, f64) = (33.5, 8.0);
-/// Where the panels of the ceiling begin, x and z; each is 1.5 m square.
+/// The smallest x and z of the ceiling panels; each is 1.5 m square.
 const PANELS: [(f64, f64); 4] = [(25.5, 1.5), (31.0, 1.5), (25.5, 7.0), (31.0, 7.0)];
 
-/// The air of the gallery, its ceiling panels, and the podium's steps.
+/// Carves the gallery, its ceiling panels and the steps of the podium.
 pub fn carve(plan: &mut Plan) {
     let (room, min, max) = ROOM;
     let finish = Finish {
@@ -40,7 +41,7 @@ pub fn carve(plan: &mut Plan) {
     }
 }
 
-/// Everything that stands here and flies about.
+/// Adds the exhibits, the workshop and the lights.
 pub fn furnish(builder: &mut Builder<'_>) {
     exhibits(builder);
     workshop(builder);
@@ -52,7 +53,7 @@ fn exhibits(builder: &mut Builder<'_>) {
     let places = SPHERES.map(|(x, z, _)| (x, z)).into_iter().chain([CRYSTAL]);
     let plinths = places.map(|(x, z)| shape::at(&plinth, x, 0.5, z));
     builder.fixed("plinths", Transform::IDENTITY, shape::together(plinths), Paint::Marble);
-    // Three looks share one sphere, coarse enough for its vertices to tell when shading happens there.
+    // The three spheres share one mesh, coarse enough for shading at its vertices to be visible.
     let sphere = std::sync::Arc::new(lumbre_mesh::shapes::tetrahedral_sphere(0.38, 4, false));
     for (x, z, paint) in SPHERES {
         let name = format!("sphere {}", paint.name());
@@ -61,7 +62,7 @@ fn exhibits(builder: &mut Builder<'_>) {
     let ball = lumbre_mesh::shapes::uv_sphere(0.38, 40, 20);
     builder.clear("crystal ball", Transform::from_xyz(CRYSTAL.0, 1.39, CRYSTAL.1), ball, Paint::Crystal);
 
-    // On the east wall.
+    // A mirror on the east wall.
     let frame = lumbre_mesh::shapes::cuboid(Vec3::new(0.06, 1.9, 2.6), 3);
     builder.fixed("mirror frame", Transform::from_xyz(34.97, 1.75, 6.0), frame, Paint::Timber);
     let mirror = lumbre_mesh::shapes::plane(1.7, 2.4, 1, 1);
@@ -92,7 +93,7 @@ fn exhibits(builder: &mut Builder<'_>) {
     );
     builder.fixed("foot of the ring", Transform::from_xyz(33.6, 0.6, 1.5), foot, Paint::Marble);
 
-    // An arch to walk through: two legs and what spans them.
+    // An arch to walk through: two legs and the span between them.
     let leg = lumbre_mesh::shapes::cuboid(Vec3::new(0.4, 2.0, 0.4), 4);
     let span = shape::arch(0.9, 0.7, 0.9, 0.4, 16);
     let cap = lumbre_mesh::shapes::cuboid(Vec3::new(0.4, 0.9, 0.4), 2);

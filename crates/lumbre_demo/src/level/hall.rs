@@ -1,4 +1,4 @@
-//! The entrance hall: tall windows to the west, pillars, a red wall facing a teal one.
+//! The entrance hall: tall windows to the west, pillars, and a red wall facing a teal one.
 
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_scene::Transform;
@@ -11,10 +11,10 @@ use crate::motion::{Bob, Flicker, Motion, Orbit, Swing};
 
 /// Name and extent.
 pub const ROOM: (&str, [f64; 3], [f64; 3]) = ("hall", [0.0, 0.0, 0.0], [12.0, 4.5, 10.0]);
-/// Where the pillars stand, x and z.
+/// The pillars: x and z.
 const PILLARS: [(f64, f64); 4] = [(4.0, 2.75), (4.0, 7.25), (8.0, 2.75), (8.0, 7.25)];
 
-/// The air of the hall, its windows and its doors.
+/// Carves the hall, its windows and its doors.
 pub fn carve(plan: &mut Plan) {
     let (room, min, max) = ROOM;
     let finish = Finish {
@@ -28,11 +28,11 @@ pub fn carve(plan: &mut Plan) {
         let (min, max) = (DVec3::new(-0.5, 1.0, z), DVec3::new(0.0, 3.8, z + 2.0));
         plan.air.push(Air { room, min, max, finish: window });
     }
-    // The door that one came in by, shut, in a niche of the south wall.
+    // The closed front door, in a niche of the south wall.
     let door = Finish { walls: [Paint::White, Paint::White, Paint::White, Paint::Timber], ..reveal };
     let (min, max) = (DVec3::new(9.0, 0.0, 10.0), DVec3::new(10.2, 2.2, 10.3));
     plan.air.push(Air { room, min, max, finish: Finish { floor: Paint::Tiles, ..door } });
-    // To the corridor.
+    // The doorway to the corridor.
     let doorway = Finish { floor: Paint::Stone, ..reveal };
     let (min, max) = (DVec3::new(12.0, 0.0, 4.4), DVec3::new(12.5, 2.2, 5.6));
     plan.air.push(Air { room: "corridor", min, max, finish: doorway });
@@ -42,7 +42,7 @@ pub fn carve(plan: &mut Plan) {
     }
 }
 
-/// Pillars, a banner, the light through the windows, and what flies about.
+/// Adds pillars, a banner, the light from the windows, and moving lights.
 pub fn furnish(builder: &mut Builder<'_>) {
     let pillar = pillar();
     let pillars = shape::together(PILLARS.map(|(x, z)| shape::at(&pillar, x, 0.0, z)));
@@ -107,7 +107,8 @@ pub fn furnish(builder: &mut Builder<'_>) {
     }
 }
 
-/// Base, shaft with a slight swelling, capital; from just under the floor into the beam.
+/// Returns a pillar: base, shaft with a slight entasis, and capital. It extends from just below the floor
+/// into the beam.
 fn pillar() -> lumbre_mesh::TriangleMesh {
     let shaft: Vec<(f64, f64)> = (0..=8)
         .map(|step| {

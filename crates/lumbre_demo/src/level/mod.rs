@@ -1,4 +1,5 @@
-//! The level: four rooms and what happens in them, built by rule. Not the file: `generate_level` writes that.
+//! The demo level: four rooms and their contents, built procedurally. The example `generate_level` writes it
+//! to a file.
 //!
 //! ```text
 //!        z  -1                                              ┌──────────────┐
@@ -38,19 +39,20 @@ use carve::Plan;
 
 use crate::game::START_CAMERA;
 
-/// Longest edge of the rectangles that walls and floors are made of, metres: long enough for Gouraud shading to show its error.
+/// Longest edge of the rectangles that walls and floors are made of, metres: coarse enough for Gouraud
+/// shading to show its error.
 const SPACING: f64 = 0.5;
 
 /// A room of the level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Room {
-    /// Its name.
+    /// The name of the room.
     pub name: &'static str,
-    /// The air in it, metres.
+    /// The extent of its air, metres.
     pub bounds: Bounds,
 }
 
-/// The rooms.
+/// Returns the rooms of the level.
 pub fn rooms() -> Vec<Room> {
     [hall::ROOM, corridor::ROOM, gallery::ROOM, vault::ROOM]
         .into_iter()
@@ -58,7 +60,7 @@ pub fn rooms() -> Vec<Room> {
         .collect()
 }
 
-/// Where the air is: rooms, doorways, stairs, niches.
+/// Returns the solid geometry: the air of rooms, doorways, stairs and niches, and the matter left in it.
 fn plan() -> Plan {
     let mut plan = Plan::default();
     hall::carve(&mut plan);
@@ -83,7 +85,7 @@ pub fn build(world: &mut World) {
     let start = Transform::from_xyz(7.2, 1.62, 8.9).looking_at(DVec3::new(3.0, 1.9, 1.0), DVec3::Y);
     let start = builder.camera(START_CAMERA, start);
     world.entity_mut(start).insert(ActiveCamera);
-    // What baked light does not reach: things that move. A little of the mean of the rooms.
+    // Ambient light for moving objects, which baked light does not reach: a fraction of the rooms' mean.
     world.insert_resource(SceneSettings {
         ambient: Vec3::new(0.030, 0.030, 0.034),
         ..SceneSettings::default()

@@ -1,6 +1,6 @@
-//! Noise that tiles: numbers that look random and are the same every time.
+//! Tileable, deterministic noise.
 
-/// A number in [0, 1) for a lattice point.
+/// Hashes a lattice point to a number in [0, 1).
 pub fn hash(x: u32, y: u32, seed: u32) -> f64 {
     // Murmur3's finalizer over a mix of the three.
     let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ seed.wrapping_mul(0xC2B2_AE3D);
@@ -12,7 +12,7 @@ pub fn hash(x: u32, y: u32, seed: u32) -> f64 {
     f64::from(h) / 4_294_967_296.0
 }
 
-/// Smooth noise in [0, 1] over the unit square, `cells` wide and high, that continues at its borders.
+/// Smooth noise in [0, 1] on a grid of `cells` by `cells` over the unit square, periodic at its borders.
 pub fn value_noise(u: f64, v: f64, cells: u32, seed: u32) -> f64 {
     let cells = cells.max(1);
     let (x, y) = (u.rem_euclid(1.0) * f64::from(cells), v.rem_euclid(1.0) * f64::from(cells));
@@ -45,7 +45,7 @@ mod tests {
             assert!((layered_noise(0.0, v, 4, 7) - layered_noise(1.0, v, 4, 7)).abs() < 1e-12);
             sum += value;
         }
-        // Uniform values have mean 1/2; 400 samples of slow noise come within 0.2 of it.
+        // Uniform values have a mean of 1/2; 400 samples of low-frequency noise come within 0.2 of it.
         assert!((sum / 400.0 - 0.5).abs() < 0.2);
         assert_ne!(hash(1, 2, 3), hash(2, 1, 3));
     }

@@ -1,4 +1,4 @@
-//! What surfaces of the level are made of. Not where they are.
+//! The materials of the level. Which surfaces have them is decided by the rooms.
 
 use glam::Vec3;
 use lumbre_optics::{AlphaMode, Material, Surface};
@@ -6,14 +6,14 @@ use lumbre_scene::Medium;
 
 use super::textures::Texture;
 
-/// A material of the level by name.
+/// A material of the level, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Paint {
     /// White plaster.
     White,
-    /// Red plaster: the wall whose colour bleeds.
+    /// Red plaster, on the wall whose colour bleeds.
     Red,
-    /// Teal plaster, facing the red.
+    /// Teal plaster, on the wall facing the red one.
     Teal,
     /// Warm plaster.
     Ochre,
@@ -29,21 +29,21 @@ pub enum Paint {
     Stone,
     /// Dark timber.
     Timber,
-    /// Polished stone of pillars and plinths.
+    /// Polished stone for pillars and plinths.
     Marble,
-    /// Sides of crates.
+    /// The sides of crates.
     Crate,
-    /// Iron with a dull shine.
+    /// Iron with a dull highlight.
     Iron,
     /// Shiny gold.
     Gold,
-    /// Red lacquer with a broad highlight, n = 10.
+    /// Red lacquer with a broad highlight, exponent 10.
     Broad,
-    /// Green lacquer, n = 100.
+    /// Green lacquer, exponent 100.
     Medium,
-    /// Blue lacquer with a narrow highlight, n = 500.
+    /// Blue lacquer with a narrow highlight, exponent 500.
     Narrow,
-    /// A cloth with a sun in front and a plain dark back.
+    /// Cloth with a sun on its front and a plain dark back.
     Banner,
     /// Iron bars, by alpha mask.
     Grille,
@@ -51,13 +51,13 @@ pub enum Paint {
     Glass,
     /// A mirror.
     Mirror,
-    /// Clear crystal, n = 1.5.
+    /// Clear crystal with the default index of refraction.
     Crystal,
     /// Water.
     Water,
     /// The daylight behind the windows of the hall.
     Daylight,
-    /// Panels in the gallery's ceiling.
+    /// The light panels in the gallery's ceiling.
     Panel,
     /// The shades of the corridor's lamps.
     Shade,
@@ -69,7 +69,7 @@ fn rgb(red: f32, green: f32, blue: f32) -> Vec3 {
     Vec3::new(red, green, blue)
 }
 
-/// A highlight on a matt colour.
+/// A diffuse colour with a highlight.
 fn polished(color: Vec3, specular: Vec3, shininess: f32) -> Material {
     let front = Surface { ambient: color, diffuse: color, specular, shininess, ..Surface::default() };
     Material { front, ..Material::default() }
@@ -81,12 +81,12 @@ fn luminous(emission: Vec3) -> Material {
 }
 
 impl Paint {
-    /// Its name in the file.
+    /// Returns the name of the material in the file.
     pub fn name(self) -> String {
         format!("{self:?}").to_lowercase()
     }
 
-    /// Its material; a texture and its tint multiply the diffuse colour.
+    /// Returns the material. If it has a texture, the texture and its tint multiply the diffuse colour.
     pub fn material(self) -> Material {
         match self {
             Self::White => Material::matt(rgb(0.74, 0.72, 0.68)),
@@ -138,12 +138,12 @@ impl Paint {
         }
     }
 
-    /// What light meets behind it, where it passes.
+    /// Returns the medium behind the surface, for transmissive materials.
     pub fn medium(self) -> Option<Medium> {
         let clear = Medium { fresnel: true, ..Medium::default() };
         match self {
             Self::Crystal => Some(clear),
-            // What a metre leaves.
+            // Transmittance over one metre.
             Self::Water => {
                 Some(Medium { attenuation_color: rgb(0.35, 0.70, 0.72), attenuation_distance: 1.0, ..clear })
             }
@@ -151,7 +151,7 @@ impl Paint {
         }
     }
 
-    /// What it wears.
+    /// Returns the texture of the material, if it has one.
     pub fn texture(self) -> Option<Texture> {
         match self {
             Self::Tiles => Some(Texture::Tiles),
@@ -165,7 +165,7 @@ impl Paint {
         }
     }
 
-    /// Metres that one copy of the texture covers on walls and floors.
+    /// Returns the length in metres that one copy of the texture covers on walls and floors.
     pub fn tile(self) -> f64 {
         match self {
             Self::Tiles => 2.0,

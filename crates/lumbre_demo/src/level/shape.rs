@@ -1,11 +1,12 @@
-//! Turned and arched shapes that the mesh crate does not have, and putting shapes together. Not what they are used for.
+//! Shapes that the mesh crate lacks, surfaces of revolution and arches, and functions that transform and
+//! merge meshes.
 
 use std::f64::consts::TAU;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use lumbre_mesh::TriangleMesh;
 
-/// A mesh moved by an affine map that does not mirror.
+/// Returns a mesh transformed by an affine map that does not mirror.
 pub fn moved(mesh: &TriangleMesh, by: DAffine3) -> TriangleMesh {
     let normals = DMat3::from_cols(
         by.matrix3.y_axis.cross(by.matrix3.z_axis),
@@ -23,12 +24,12 @@ pub fn moved(mesh: &TriangleMesh, by: DAffine3) -> TriangleMesh {
     }
 }
 
-/// A mesh moved to a place, metres.
+/// Returns a mesh translated by metres.
 pub fn at(mesh: &TriangleMesh, x: f64, y: f64, z: f64) -> TriangleMesh {
     moved(mesh, DAffine3::from_translation(DVec3::new(x, y, z)))
 }
 
-/// Several meshes as one; all have positions, normals and `uv0`.
+/// Merges meshes, all of which must have positions, normals and `uv0`.
 pub fn together(meshes: impl IntoIterator<Item = TriangleMesh>) -> TriangleMesh {
     let mut whole = TriangleMesh::default();
     for mesh in meshes {
@@ -41,8 +42,8 @@ pub fn together(meshes: impl IntoIterator<Item = TriangleMesh>) -> TriangleMesh 
     whole
 }
 
-/// A turned body about the y axis. Each run of `(radius, height)` points, metres, is smooth; edges are sharp between runs.
-/// Runs go from the bottom up on the outside.
+/// Returns a surface of revolution about the y axis. Each run of `(radius, height)` points, in metres, is
+/// smooth, with sharp edges between runs. On the outside, runs go from the bottom up.
 pub fn turned(runs: &[&[(f64, f64)]], segments: u32) -> TriangleMesh {
     together(runs.iter().map(|run| turned_run(run, segments)))
 }
@@ -53,7 +54,7 @@ fn turned_run(run: &[(f64, f64)], segments: u32) -> TriangleMesh {
     let mut length = 0.0;
     for (index, &(radius, height)) in run.iter().enumerate() {
         let (before, after) = (run[index.saturating_sub(1)], run[(index + 1).min(run.len() - 1)]);
-        // Upwards on the outside: the outward normal is the direction turned right.
+        // Runs go up on the outside, so the outward normal is their direction turned to the right.
         let normal = DVec2::new(after.1 - before.1, before.0 - after.0).normalize_or_zero();
         length += DVec2::new(radius - before.0, height - before.1).length();
         for step in 0..=segments {
@@ -79,13 +80,14 @@ fn turned_run(run: &[(f64, f64)], segments: u32) -> TriangleMesh {
     mesh
 }
 
-/// An arch over the x axis: the part of a wall `thickness` deep (in z) between a half ellipse, `half_width` to each side and `rise`
-/// high from y = 0, and the height `top`. Its ends at ±`half_width` have no sides: walls or legs stand there.
+/// Returns an arch across the x axis: the part of a wall, `thickness` deep in z, between a half ellipse from
+/// y = 0, with the half axes `half_width` and `rise`, and the height `top`. Its ends at ±`half_width` are
+/// open: walls or legs stand there.
 pub fn arch(half_width: f64, rise: f64, top: f64, thickness: f64, segments: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let point = |step: u32| {
         let part = f64::from(step) / f64::from(segments);
-        // Exact at the ends and in the middle, so that legs meet it.
+        // Exact at both ends, so that the arch meets its legs.
         let angle = std::f64::consts::PI * part;
         let x = if step == 0 {
             1.0
@@ -121,14 +123,14 @@ pub fn arch(half_width: f64, rise: f64, top: f64, thickness: f64, segments: u32)
             (position, facing, DVec2::new(position.x, -position.y))
         });
     }
-    // Underneath.
+    // The underside.
     strip(&|step, second| {
         let (inner, normal) = point(step);
         let z = if second { 0.5 } else { -0.5 } * thickness;
         let along = f64::from(step) / f64::from(segments) * std::f64::consts::PI * half_width;
         (inner.extend(z), normal.extend(0.0), DVec2::new(along, z))
     });
-    // On top.
+    // The top.
     strip(&|step, second| {
         let (inner, _) = point(step);
         let z = if second { -0.5 } else { 0.5 } * thickness;

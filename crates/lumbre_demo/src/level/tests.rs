@@ -1,4 +1,4 @@
-//! The level is closed, walkable and what is shipped.
+//! The level is sound and walkable, and `assets/demo.glb` is up to date.
 
 use std::collections::BTreeMap;
 
@@ -54,7 +54,7 @@ fn nothing_that_moves_goes_into_a_wall() {
         world.insert_resource(GameTime { seconds: f64::from(step) * 0.05 });
         schedule.run(&mut world);
         for (place, name) in moving.iter(&world) {
-            // A glowing ball has a radius of 6 cm.
+            // The emissive ball around a light has a radius of 6 cm.
             for axis in DVec3::AXES {
                 for side in [-0.06, 0.06] {
                     let point = place.translation() + axis * side;
@@ -87,7 +87,7 @@ fn the_level_shows_every_kind_of_material() {
     let textured = materials.iter(&world).filter(|(_, textures)| textures.is_some()).count();
     let plain = materials.iter(&world).filter(|(_, textures)| textures.is_none()).count();
     assert!(textured >= 8 && plain >= 8);
-    // No surface gives back more light than it gets.
+    // No surface reflects much more light than it receives.
     for (material, _) in materials.iter(&world) {
         material.validate("a material of the level").unwrap();
         assert!((material.front.diffuse + material.front.specular).max_element() <= 1.3);
@@ -134,7 +134,8 @@ fn built_twice_it_is_the_same() {
 
 #[test]
 fn the_file_in_assets_is_this_level() {
-    // Written by another machine, whose sine may round otherwise: names, counts and places to a micrometre.
+    // The file may have been written on another machine, whose sine rounds differently: names and counts must
+    // match, and places to 10 micrometres.
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/demo.glb");
     assert!(std::fs::metadata(path).unwrap().len() < 1 << 20, "the level outgrew its 1 MiB");
     let mut world = World::new();

@@ -1,4 +1,4 @@
-//! The textures of the level, drawn by rule. Not the materials that wear them: those are `paint`.
+//! The procedural textures of the level. The materials that use them are in `paint`.
 
 use std::sync::Arc;
 
@@ -7,20 +7,20 @@ use lumbre_scene::{Image, Sampler, TextureReference, Wrap};
 
 use super::noise::{hash, layered_noise, value_noise};
 
-/// A pattern that tiles over the unit square: linear colour and coverage at (u, v).
+/// A pattern that tiles over the unit square: returns linear colour and coverage at (u, v).
 type Pattern = fn(f64, f64) -> (DVec3, f64);
 
-/// A drawn texture, and the colour that it is to be multiplied by: what is brightest in it is 1 in each channel, so that a
-/// material's own reflectance stays that of a surface, and eight bits go further.
+/// A rendered texture, and the colour that multiplies it. The brightest value of each channel is stored as 1,
+/// so that all eight bits are used; the tint restores the reflectance.
 #[derive(Clone, Debug)]
 pub struct Drawn {
-    /// The image and how it repeats.
+    /// The image with its sampler.
     pub texture: TextureReference,
     /// The brightest reflectance of each channel, linear.
     pub tint: Vec3,
 }
 
-/// Renders a pattern into an image of `size` by `size` texels, sRGB-encoded, four samples per texel.
+/// Renders a pattern into an sRGB-encoded image of `size` by `size` texels, with four samples per texel.
 fn draw(name: &str, size: u32, pattern: Pattern) -> Drawn {
     let mut texels = Vec::with_capacity((size * size) as usize);
     let mut tint = DVec3::ZERO;
@@ -53,13 +53,14 @@ fn draw(name: &str, size: u32, pattern: Pattern) -> Drawn {
     Drawn { texture, tint: tint.as_vec3() }
 }
 
-/// Linear [0, 1] to a byte of sRGB.
+/// Encodes a linear value in [0, 1] as a byte of sRGB.
 fn srgb_byte(linear: f64) -> u8 {
     (lumbre_optics::encode_srgb(linear.clamp(0.0, 1.0)) * 255.0).round() as u8
 }
 
-/// Where a point is in a wall of stones laid in rows, every other row shifted by half: the stone's column and row, and the
-/// distance to the nearest joint as a part of the row's height.
+/// Locates a point in a wall of blocks laid in rows, every other row shifted by half a block if `shifted`.
+/// Returns the block's column and row, and the distance to the nearest joint as a fraction of the row's
+/// height.
 fn bond(u: f64, v: f64, columns: u32, rows: u32, shifted: bool) -> (u32, u32, f64) {
     let y = v * f64::from(rows);
     let row = y.floor() as u32 % rows;
@@ -149,7 +150,7 @@ fn banner_pattern(u: f64, v: f64) -> (DVec3, f64) {
 pub enum Texture {
     /// Eight rows of brick.
     Brick,
-    /// Four by four tiles, dark and light.
+    /// Four by four tiles, alternately dark and light.
     Tiles,
     /// Five planks.
     Planks,
@@ -157,14 +158,14 @@ pub enum Texture {
     Stone,
     /// One side of a crate.
     Crate,
-    /// Iron bars with holes between.
+    /// Iron bars with holes between them.
     Grille,
-    /// A sun on red.
+    /// A sun on red cloth.
     Banner,
 }
 
 impl Texture {
-    /// Draws it.
+    /// Renders the texture.
     pub fn draw(self) -> Drawn {
         match self {
             Self::Brick => draw("brick", 128, brick_pattern),
@@ -200,7 +201,7 @@ mod tests {
             let reds: Vec<u8> = image.rgba.chunks_exact(4).map(|texel| texel[0]).collect();
             let (least, most) = (*reds.iter().min().unwrap(), *reds.iter().max().unwrap());
             assert!(most == 255 && least < 235, "{texture:?}: {least} to {most}");
-            // Beyond 0.9 rooms would hardly get darker with the bounces.
+            // With reflectances above 0.9, light would hardly decrease over many bounces.
             assert!(tint.max_element() < 0.9 && tint.min_element() > 0.03, "{texture:?}: {tint}");
         }
     }
@@ -211,7 +212,7 @@ mod tests {
             let image = texture.draw().texture.image;
             let holes = image.rgba.chunks_exact(4).filter(|texel| texel[3] < 128).count();
             let part = holes as f64 / f64::from(image.width * image.height);
-            // Bars of 0.28 in each direction leave (1 - 0.28)² open.
+            // Bars that cover 0.28 in each direction leave (1 - 0.28)² open.
             let expected = if texture == Texture::Grille { 0.72 * 0.72 } else { 0.0 };
             assert!((part - expected).abs() < 0.06, "{texture:?}: {part}");
         }

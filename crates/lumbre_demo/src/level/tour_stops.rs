@@ -1,4 +1,4 @@
-//! The cameras that the headless tour flies past.
+//! The cameras of the headless tour.
 
 use glam::DVec3;
 use lumbre_scene::Transform;
@@ -6,7 +6,7 @@ use lumbre_scene::Transform;
 use super::builder::Builder;
 use crate::tour::TOUR_CAMERA;
 
-/// Eye and what it looks at, metres.
+/// Eye and target of each camera, metres.
 pub const STOPS: [([f64; 3], [f64; 3]); 12] = [
     ([7.6, 2.0, 9.2], [2.5, 1.7, 1.5]),
     ([6.2, 2.2, 5.6], [3.5, 1.4, 0.5]),
@@ -22,7 +22,7 @@ pub const STOPS: [([f64; 3], [f64; 3]); 12] = [
     ([19.8, 0.5, 14.6], [13.6, -0.4, 13.2]),
 ];
 
-/// Puts them up.
+/// Adds the cameras.
 pub fn place(builder: &mut Builder<'_>) {
     for (number, (eye, target)) in STOPS.into_iter().enumerate() {
         let place = Transform::from_translation(eye.into()).looking_at(target.into(), DVec3::Y);

@@ -1,4 +1,5 @@
-//! The vault: 1.2 m below the rest, stone, lit by embers and candles; here the torch matters. Two stairs lead to it.
+//! The vault: a stone room 1.2 m below the others, lit by embers and candles, where the torch is of use. Two
+//! stairs lead to it.
 
 use glam::{DQuat, DVec3, Vec3};
 use lumbre_scene::Transform;
@@ -12,10 +13,10 @@ use crate::motion::{Bob, Flicker, Motion, Orbit};
 /// Name and extent.
 pub const ROOM: (&str, [f64; 3], [f64; 3]) = ("vault", [13.5, -1.2, 10.5], [21.5, 2.2, 16.5]);
 
-/// The basin: from and to, x and z.
+/// The basin: smallest and largest x, then smallest and largest z.
 const BASIN: [[f64; 2]; 2] = [[16.0, 18.5], [13.0, 15.0]];
 
-/// The air of the vault, its two stairs, and the hearth.
+/// Carves the vault, its two stairs, the basin and the hearth.
 pub fn carve(plan: &mut Plan) {
     let (room, min, max) = ROOM;
     let finish = Finish::new(Paint::Stone, Paint::Stone, Paint::Stone);
@@ -23,14 +24,14 @@ pub fn carve(plan: &mut Plan) {
     let mut air = |min: [f64; 3], max: [f64; 3], finish: Finish| {
         plan.air.push(Air { room, min: min.into(), max: max.into(), finish });
     };
-    // Down from the corridor: a doorway, six steps of 0.2 m, a doorway.
+    // Down from the corridor: a doorway, six steps of 0.2 m, and another doorway.
     air([17.0, 0.0, 6.5], [18.2, 2.2, 7.0], finish);
     for step in 1..=6 {
         let (floor, z) = (-0.2 * f64::from(step), 7.0 + 0.5 * f64::from(step));
         air([17.0, floor, z - 0.5], [18.2, 2.2, z], finish);
     }
     air([17.0, -1.2, 10.0], [18.2, 1.0, 10.5], finish);
-    // And up to the gallery: a passage, six steps northwards.
+    // Up to the gallery: a passage, and six steps towards -z.
     air([21.5, -1.2, 14.0], [25.2, 1.0, 15.2], finish);
     for step in 1..=6 {
         let (floor, z) = (-1.2 + 0.2 * f64::from(step), 14.0 - 0.5 * f64::from(step));
@@ -44,7 +45,7 @@ pub fn carve(plan: &mut Plan) {
     air([12.9, -0.8, 12.9], [13.5, 0.4, 14.1], hearth);
 }
 
-/// Ribs, a few things that somebody left, candles, and a wisp.
+/// Adds ribs, a pool, a chest, candles, a wisp and a lantern.
 pub fn furnish(builder: &mut Builder<'_>) {
     let rib = shape::arch(3.0, 1.9, 2.4, 0.5, 20);
     let along = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);

@@ -1,4 +1,4 @@
-//! An upright capsule against a triangle: where they are closest. Not what follows from a contact: that is `collide`.
+//! The closest points of an upright capsule and a triangle. The response to a contact is in `collide`.
 
 use glam::DVec3;
 
@@ -7,20 +7,20 @@ use glam::DVec3;
 pub struct Capsule {
     /// Lower end of the segment, metres.
     pub bottom: DVec3,
-    /// Length of the segment in metres, at least 0: the capsule is two radii higher.
+    /// Length of the segment in metres, at least 0; the capsule is taller by two radii.
     pub height: f64,
     /// Metres, greater than 0.
     pub radius: f64,
 }
 
 impl Capsule {
-    /// Upper end of the segment.
+    /// Returns the upper end of the segment.
     pub fn top(&self) -> DVec3 {
         self.bottom + DVec3::Y * self.height
     }
 
-    /// Where the segment and a triangle are closest: the point of the segment and the point of the triangle.
-    /// Where they cross both are the crossing.
+    /// Returns the closest points of the segment and a triangle: the one on the segment and the one on the
+    /// triangle. If they intersect, both are the intersection.
     pub fn closest(&self, triangle: &[DVec3; 3]) -> (DVec3, DVec3) {
         let (bottom, top) = (self.bottom, self.top());
         if let Some(crossing) = segment_crosses(bottom, top, triangle) {
@@ -40,7 +40,7 @@ impl Capsule {
     }
 }
 
-/// Where a segment goes through a triangle, if it does.
+/// Returns the point where a segment passes through a triangle, if it does.
 fn segment_crosses(from: DVec3, to: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<DVec3> {
     let normal = (b - a).cross(c - a);
     let (start, end) = (normal.dot(from - a), normal.dot(to - a));
@@ -52,7 +52,8 @@ fn segment_crosses(from: DVec3, to: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<DV
     (inside(a, b) && inside(b, c) && inside(c, a)).then_some(point)
 }
 
-/// The point of a triangle that is closest to a point (Ericson, "Real-Time Collision Detection", 5.1.5).
+/// Returns the point of a triangle that is closest to a point (Ericson, "Real-Time Collision Detection",
+/// 5.1.5).
 pub fn closest_on_triangle(point: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
     let (ab, ac) = (b - a, c - a);
     let (ap, bp, cp) = (point - a, point - b, point - c);
@@ -84,7 +85,7 @@ pub fn closest_on_triangle(point: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
     a + ab * ratio(vb, sum) + ac * ratio(vc, sum)
 }
 
-/// The closest points of two segments (Ericson, 5.1.9).
+/// Returns the closest points of two segments (Ericson, 5.1.9).
 fn closest_of_segments(p: DVec3, p_end: DVec3, q: DVec3, q_end: DVec3) -> (DVec3, DVec3) {
     let (d, e, r) = (p_end - p, q_end - q, p - q);
     let (a, b, c) = (d.dot(d), d.dot(e), d.dot(r));
@@ -96,7 +97,7 @@ fn closest_of_segments(p: DVec3, p_end: DVec3, q: DVec3, q_end: DVec3) -> (DVec3
     (p + d * s, q + e * t)
 }
 
-/// A quotient, 0 where it has no value.
+/// Returns a quotient, or 0 if it is not finite.
 fn ratio(numerator: f64, denominator: f64) -> f64 {
     let quotient = numerator / denominator;
     if quotient.is_finite() { quotient } else { 0.0 }
@@ -143,8 +144,8 @@ mod tests {
 
     #[test]
     fn closest_agrees_with_a_dense_search() {
-        // A search over 60 x 60 barycentric points and 60 heights finds no pair closer than ours, and one nearly as close
-        // (half a grid step, 4/60 m).
+        // A search over 60 x 60 barycentric points and 60 heights finds no pair closer than `closest` does,
+        // and one that is nearly as close (within a grid step, 4/60 m).
         let triangle = [DVec3::new(0.3, -0.2, 1.0), DVec3::new(2.0, 1.4, -0.5), DVec3::new(-1.0, 0.7, -2.0)];
         for place in
             [(0.0, 0.0, 0.0), (1.5, 0.3, 1.5), (-2.0, -1.0, -1.0), (0.4, 0.9, -0.6), (3.0, -2.0, 0.0)]

@@ -1,18 +1,19 @@
-//! A capsule out of the walls: what it touches pushes it away. Not the ground: that is `ground`.
+//! Pushes a capsule out of the walls that it penetrates. The ground is handled in `ground`.
 
 use glam::DVec3;
 
 use super::{Capsule, TriangleTree};
 
-/// Contacts resolved in one go; a corner of three walls needs three, and what is left is resolved in the next step.
+/// Largest number of contacts resolved in one call. A corner of three walls needs three; the rest is resolved
+/// in the next step.
 const ITERATIONS: usize = 12;
-/// Penetration that is let be, metres: well under what an eye or a near plane notices.
+/// Penetration that is tolerated, metres; far below what is visible or a near plane reveals.
 const SKIN: f64 = 1e-6;
 
-/// Moves a capsule sideways (or down, from a ceiling) out of the triangles that it penetrates, the deepest first, and tells
-/// `contact` the unit direction of every push.
+/// Moves a capsule sideways (or down, from a ceiling) out of the triangles that it penetrates, the deepest
+/// first, and calls `contact` with the unit direction of every push.
 ///
-/// `came_from` is where the segment's lower end was before, on the side of the wall that it has to stay on.
+/// `came_from` is the previous lower end of the segment, on the side of the wall where it has to stay.
 pub fn push_out(
     capsule: &mut Capsule,
     came_from: DVec3,
@@ -26,12 +27,12 @@ pub fn push_out(
     }
 }
 
-/// Whether a capsule penetrates anything.
+/// Returns true if a capsule penetrates any triangle.
 pub fn overlaps(capsule: &Capsule, level: &TriangleTree) -> bool {
     deepest(capsule, capsule.bottom, level).is_some()
 }
 
-/// How far to move to leave the deepest triangle, and where to.
+/// Returns how far to move out of the deepest penetration, and the unit direction to move in.
 fn deepest(capsule: &Capsule, came_from: DVec3, level: &TriangleTree) -> Option<(f64, DVec3)> {
     let reach = DVec3::splat(capsule.radius);
     let mut deepest: Option<(f64, DVec3)> = None;
@@ -46,7 +47,8 @@ fn deepest(capsule: &Capsule, came_from: DVec3, level: &TriangleTree) -> Option<
         deepest = Some((depth, normal));
     });
     let (depth, normal) = deepest?;
-    // The rays below look after floors. A ledge pushes sideways only, or it would lift who walks against it.
+    // Floors are handled by the rays of `ground`. A ledge pushes sideways only, or it would lift a body that
+    // walks against it.
     let sideways = normal.with_y(0.0);
     let along = sideways.length();
     if normal.y < -0.7 || along < 1e-3 {
@@ -56,7 +58,7 @@ fn deepest(capsule: &Capsule, came_from: DVec3, level: &TriangleTree) -> Option<
     }
 }
 
-/// The normal of a triangle on the side of a point.
+/// Returns the normal of a triangle on the side of a point.
 fn face_normal(&[a, b, c]: &[DVec3; 3], side: DVec3) -> DVec3 {
     let normal = (b - a).cross(c - a).normalize_or(DVec3::Y);
     if normal.dot(side - a) < 0.0 { -normal } else { normal }

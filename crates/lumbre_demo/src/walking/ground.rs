@@ -1,19 +1,21 @@
-//! The ground under somebody's feet: the highest surface to stand on within a step. Not walls: those are `collide`.
+//! Finds the ground under a body's feet: the highest surface to stand on within reach of a step. Walls are
+//! handled in `collide`.
 
 use glam::{DVec2, DVec3};
 
 use super::{Stature, TriangleTree};
 
-/// Cosine of the steepest slope to stand on: 50 degrees.
+/// Cosine of the steepest slope to stand on, 50 degrees.
 const STEEPEST: f64 = 0.642_787_609_686_539_3;
-/// How far the outer rays are from the middle, in radii.
+/// Distance of the outer rays from the middle, in radii of the body.
 const SPREAD: f64 = 0.65;
 
-/// The height of the ground between a step above the feet and `down` metres below them, if there is any.
+/// Returns the height of the highest ground between a step above the feet and `down` metres below them, if
+/// there is any.
 pub fn ground_below(feet: DVec3, down: f64, stature: &Stature, level: &TriangleTree) -> Option<f64> {
     let reach = SPREAD * stature.radius;
     let (lowest, highest) = (feet.y - down, feet.y + stature.step);
-    // Half a millimetre more on each side, so that standing exactly on a surface counts.
+    // Half a millimetre of tolerance on each side, so that standing exactly on a surface counts.
     let (lowest, highest) = (lowest - 5e-4, highest + 5e-4);
     let min = DVec3::new(feet.x - reach, lowest, feet.z - reach);
     let max = DVec3::new(feet.x + reach, highest, feet.z + reach);
@@ -29,14 +31,14 @@ pub fn ground_below(feet: DVec3, down: f64, stature: &Stature, level: &TriangleT
     ground
 }
 
-/// The middle and eight places around it.
+/// Returns the offsets of the rays: the middle, and eight around it.
 fn rays(reach: f64) -> impl Iterator<Item = DVec2> {
     let around =
         (0..8).map(move |eighth| DVec2::from_angle(f64::from(eighth) * std::f64::consts::FRAC_PI_4) * reach);
     std::iter::once(DVec2::ZERO).chain(around)
 }
 
-/// The height of a triangle above (x, z), if it lies there and is flat enough to stand on. Either side will do.
+/// Returns the height of a triangle at (x, z) if it is there and flat enough to stand on, from either side.
 fn height_at(&[a, b, c]: &[DVec3; 3], at: DVec2) -> Option<f64> {
     let normal = (b - a).cross(c - a);
     if normal.y.abs() < STEEPEST * normal.length() {

@@ -1,11 +1,11 @@
-//! How a body moves through a level: gravity, walls, steps. Not who moves it (`input`) nor what they see (`player`).
+//! How a body moves through a level: gravity, walls and steps. The player that it belongs to is in `player`.
 //!
 //! ```text
 //!        ┌───┐  ─ feet + 1.75 m
 //!        │   │
 //!        │ o │    capsule against walls: pushed out sideways, so it slides
 //!        │   │
-//!        └───┘  ─ feet + 0.35 m: what is lower is stepped upon
+//!        └───┘  ─ feet + 0.35 m: lower obstacles are stepped onto
 //!         |||     nine rays find the ground
 //!         feet
 //! ```
@@ -22,22 +22,22 @@ pub use triangle_tree::TriangleTree;
 
 use glam::{DVec2, DVec3};
 
-/// The size of a body and what it can do.
+/// The size and abilities of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stature {
-    /// Metres.
+    /// Radius, metres.
     pub radius: f64,
     /// From the feet to the top of the head, metres.
     pub height: f64,
     /// Height of the eyes above the feet, metres.
     pub eyes: f64,
-    /// The highest step that is climbed, metres.
+    /// Highest step that is climbed, metres.
     pub step: f64,
     /// Speed of walking, m/s.
     pub walk: f64,
     /// Speed of running, m/s.
     pub run: f64,
-    /// Speed with which a jump leaves the ground, m/s.
+    /// Vertical speed at the start of a jump, m/s.
     pub jump: f64,
 }
 
@@ -48,7 +48,7 @@ impl Default for Stature {
 }
 
 impl Stature {
-    /// The capsule of somebody whose feet are at `feet`. It ends a step above the ground.
+    /// Returns the collision capsule of a body with its feet at `feet`. It ends one step above the ground.
     pub fn capsule(&self, feet: DVec3) -> Capsule {
         let bottom = feet + DVec3::Y * (self.step + self.radius);
         Capsule {
@@ -59,36 +59,37 @@ impl Stature {
     }
 }
 
-/// Where a body is and how it moves.
+/// Position and motion of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Body {
     /// Lowest point, metres in the world.
     pub feet: DVec3,
     /// Metres per second.
     pub velocity: DVec3,
-    /// Standing, rather than falling or flying.
+    /// Whether it stands, rather than falls or flies.
     pub on_ground: bool,
 }
 
-/// What a body is asked to do during a step.
+/// The motion that a body is asked to make in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wish {
     /// Horizontal velocity in the world's x and z, m/s.
     pub velocity: DVec2,
-    /// Leave the ground.
+    /// Whether to jump.
     pub jump: bool,
 }
 
-/// Acceleration of falling, m/s².
+/// Gravitational acceleration, m/s².
 pub const GRAVITY: f64 = 9.81;
-/// Nobody falls faster, m/s.
+/// Largest speed of a body, m/s.
 const TERMINAL: f64 = 50.0;
-/// How quickly feet on the ground reach the wished velocity, 1/s.
+/// Rate at which a body on the ground approaches the wished velocity, 1/s.
 const GRIP: f64 = 14.0;
-/// The same in the air.
+/// Rate at which a body in the air approaches it, 1/s.
 const AIR_CONTROL: f64 = 1.5;
 
-/// Moves a body for `seconds`. However long that is, it goes through no wall: it moves by at most half its radius at a time.
+/// Moves a body for `seconds`, clamped to [0, 1], in sub-steps of at most half its radius, so that it never
+/// tunnels through a wall.
 pub fn move_body(body: &mut Body, wish: Wish, stature: &Stature, level: &TriangleTree, seconds: f64) {
     let seconds = seconds.clamp(0.0, 1.0);
     if wish.jump && body.on_ground {
@@ -104,7 +105,8 @@ pub fn move_body(body: &mut Body, wish: Wish, stature: &Stature, level: &Triangl
     }
     body.velocity = body.velocity.clamp_length_max(TERMINAL);
     let distance = body.velocity.length() * seconds;
-    // At most 50 m in steps of a few centimetres; a body without a size cannot ask for more.
+    // At most 50 m in sub-steps of some centimetres. The lower bound limits their number for a body without a
+    // size.
     let steps = (distance / (0.5 * stature.radius).max(0.01)).ceil().max(1.0);
     for _ in 0..steps as usize {
         advance(body, stature, level, seconds / steps);
@@ -121,7 +123,8 @@ fn advance(body: &mut Body, stature: &Stature, level: &TriangleTree, seconds: f6
     });
     body.feet += capsule.bottom - bottom;
 
-    // Who stands goes down steps as well; who falls lands on what the feet went through; who rises does neither.
+    // A standing body also follows steps down, a falling body lands on what its feet passed through, and a
+    // rising body does neither.
     let down = if body.on_ground { stature.step } else { 0.0 };
     let ground = (body.velocity.y <= 0.0).then(|| ground_below(body.feet, down, stature, level)).flatten();
     let Some(height) = ground else {
@@ -130,7 +133,7 @@ fn advance(body: &mut Body, stature: &Stature, level: &TriangleTree, seconds: f6
     };
     let raised = body.feet.with_y(height);
     if height > body.feet.y && overlaps(&stature.capsule(raised), level) {
-        // No room for the head above that step: it is a wall.
+        // There is no headroom above that step, so it acts as a wall.
         body.feet = before.with_y(body.feet.y);
         body.velocity = DVec3::new(0.0, body.velocity.y, 0.0);
         return;

@@ -1,10 +1,10 @@
-//! Walls stop, steps lift, nothing tunnels.
+//! Walls stop the body, steps lift it, and nothing tunnels.
 
 use super::*;
 
 const STEP: f64 = 1.0 / 120.0;
 
-/// The twelve triangles of a box.
+/// Returns the twelve triangles of a box.
 fn block(min: [f64; 3], max: [f64; 3]) -> Vec<[DVec3; 3]> {
     let corner = |i: usize| {
         let pick = |axis: usize| if i >> axis & 1 == 1 { max[axis] } else { min[axis] };
@@ -40,7 +40,7 @@ fn walks_on_a_floor_at_the_wished_speed() {
     let mut body = standing(0.0, 0.0);
     walk(&mut body, DVec2::new(0.0, -2.0), &level, 3.0, STEP);
     assert!(body.on_ground && body.feet.y == 0.0, "{body:?}");
-    // 6 m less what starting costs, 2 m/s / GRIP = 0.143 m (the discrete sum is one step shorter).
+    // 6 m minus the loss while starting, 2 m/s / GRIP = 0.143 m (the discrete sum is one step shorter).
     assert!((body.feet.z + 6.0 - 2.0 / GRIP).abs() < 2.0 * STEP, "{body:?}");
 }
 
@@ -66,7 +66,7 @@ fn corners_hold() {
 
 #[test]
 fn no_step_length_and_no_speed_tunnels() {
-    // A wall of one sheet of triangles, thinner than anything.
+    // A wall of zero thickness.
     let sheet = block([-20.0, 0.0, -5.0], [20.0, 40.0, -5.0]);
     let level = level(&[floor(), sheet]);
     for step in [0.001, 0.01, 0.1, 0.25, 1.0, 60.0] {
@@ -120,7 +120,7 @@ fn climbs_steps_up_to_the_limit_and_no_higher() {
 
 #[test]
 fn a_step_without_headroom_is_a_wall() {
-    // A step of 0.3 m under a ceiling of 1.9 m: 1.6 m are left for 1.75 m.
+    // A step of 0.3 m below a ceiling of 1.9 m leaves 1.6 m for a body of 1.75 m.
     let low = [block([-20.0, 0.0, -8.0], [20.0, 0.3, -2.0]), block([-20.0, 1.9, -8.0], [20.0, 3.0, 8.0])];
     let level = level(&[floor(), low.concat()]);
     let mut body = standing(0.0, 0.0);
@@ -139,7 +139,7 @@ fn a_jump_rises_by_its_height_and_a_ceiling_ends_it() {
         move_body(&mut body, wish, &stature, &open, STEP);
         top = top.max(body.feet.y);
     }
-    // v²/2g, less the half step by which an explicit integration is late.
+    // v²/2g, minus the half step by which explicit integration lags.
     let expected = stature.jump.powi(2) / (2.0 * GRAVITY);
     assert!((top - expected).abs() < stature.jump * STEP, "{top} for {expected}");
     assert!(body.on_ground && body.feet.y == 0.0);

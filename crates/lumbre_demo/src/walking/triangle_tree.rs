@@ -1,18 +1,18 @@
-//! Which triangles may touch a box: a bounding volume hierarchy in f64. Not ray casting: that is `lumbre_rays`.
+//! A bounding volume hierarchy in f64 for box queries on triangles. Ray casting is in `lumbre_rays`.
 
 use glam::DVec3;
 
 /// Triangles per leaf.
 const LEAF: usize = 4;
 
-/// Triangles of a level, to be asked by box.
+/// The triangles of a level, for queries by box.
 #[derive(Clone, Debug, Default)]
 pub struct TriangleTree {
     triangles: Vec<[DVec3; 3]>,
     nodes: Vec<Node>,
 }
 
-/// A box over a range of triangles; an inner node's first child follows it at once.
+/// The bounding box of a range of triangles. The first child of an inner node directly follows it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     min: DVec3,
@@ -24,7 +24,8 @@ struct Node {
 }
 
 impl TriangleTree {
-    /// Builds over triangles in metres. Those with a non-finite corner or without area stop nobody and are left out.
+    /// Builds the hierarchy over triangles in metres. Triangles with a corner that is not finite or without
+    /// area are left out.
     pub fn build(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Self {
         let solid = |t: &[DVec3; 3]| {
             t.iter().all(|corner| corner.is_finite())
@@ -37,22 +38,22 @@ impl TriangleTree {
         tree
     }
 
-    /// Number of triangles that can stop somebody.
+    /// Returns the number of triangles.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no triangles.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    /// The corners of the box around everything, if there is anything.
+    /// Returns the corners of the bounding box of all triangles, if there are any.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.nodes.first().map(|node| (node.min, node.max))
     }
 
-    /// Calls `visit` for every triangle whose own box touches the box, in a fixed order.
+    /// Calls `visit` for every triangle whose bounding box touches the box, in a fixed order.
     pub fn for_each_in_box(&self, min: DVec3, max: DVec3, mut visit: impl FnMut(&[DVec3; 3])) {
         let touches = |low: DVec3, high: DVec3| low.cmple(max).all() && high.cmpge(min).all();
         let mut index = 0;
@@ -78,8 +79,8 @@ impl TriangleTree {
         }
     }
 
-    /// Splits at the median of the longest axis; half of the triangles go down each side, so the depth is logarithmic
-    /// whatever the triangles are.
+    /// Splits at the median of the longest axis. Half of the triangles go to each side, so that the depth is
+    /// logarithmic whatever the triangles are.
     fn split(&mut self, first: usize, count: usize) {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for triangle in &self.triangles[first..first + count] {
@@ -112,7 +113,7 @@ mod tests {
 
     #[test]
     fn finds_what_a_search_through_all_finds() {
-        // A fixed scatter of triangles, from a multiplicative sequence.
+        // A deterministic scatter of triangles, from a linear congruential generator.
         let mut state = 1u32;
         let mut next = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -1,5 +1,6 @@
-//! What the window measures of the view that it shows: its error against the most accurate way to draw it, what its lights cost, and the settings that no others beat.
-//! Not how that is laid out: that is `overlay_accuracy`. The measuring itself is `lumbre_cost`'s.
+//! The measurements of the view that the window shows: its error against the most accurate rendering, the
+//! cost of its lights, and the Pareto-optimal settings. They are laid out in `overlay_accuracy`; the
+//! measuring itself is in `lumbre_cost`.
 
 use std::time::{Duration, Instant};
 
@@ -12,10 +13,10 @@ use lumbre_scene::{ActiveCamera, GlobalTransform, SceneSettings};
 
 use crate::{Game, ViewSettings};
 
-/// Measured frames between two that are shown go on for so long: the window still follows the mouse.
+/// Time for measured frames between two shown frames; short enough for the window to follow the mouse.
 const BETWEEN_FRAMES: Duration = Duration::from_millis(40);
 
-/// What is measured, and what is known.
+/// The measurements and their results.
 #[derive(Default)]
 pub struct Accuracy {
     /// Whether the reference is shown beside the frame.
@@ -26,95 +27,95 @@ pub struct Accuracy {
     work: Work,
     lights: Vec<LightCost>,
     front: Option<ViewFront>,
-    /// Where the camera was when the front was measured.
+    /// The camera's transform when the front was measured.
     measured_from: Option<GlobalTransform>,
 }
 
-/// What is measured at the moment.
+/// What is being measured.
 #[derive(Default)]
 enum Work {
     #[default]
     Nothing,
-    /// Asked for, and begun with the next frame.
+    /// Requested; starts with the next frame.
     Asked,
     Lights(LightCosts),
     Settings(Box<ViewWalk>),
 }
 
-/// What there is to say of it.
+/// The results, for the overlay.
 #[derive(Clone, Debug, Default)]
 pub struct AccuracyFacts {
     /// Whether the reference is shown beside the frame.
     pub is_shown: bool,
     /// Relative RMSE and FLIP of the frame against the reference, once they are known.
     pub error: Option<(f64, Option<f64>)>,
-    /// What is measured, and how much of that is done, 0 to 1.
+    /// What is being measured, and the fraction of it that is done, 0 to 1.
     pub progress: Option<(&'static str, f64)>,
-    /// What lights cost, the dearest first.
+    /// The cost of the lights, the most expensive first.
     pub lights: Vec<LightCost>,
-    /// The settings that no others beat.
+    /// The Pareto-optimal settings.
     pub front: Option<ViewFront>,
-    /// The settings that are in force.
+    /// The current settings.
     pub settings: Option<DrawSettings>,
-    /// Whether the camera has moved since they were measured.
+    /// Whether the camera has moved since the front was measured.
     pub is_elsewhere: bool,
 }
 
 impl Accuracy {
-    /// Shows the reference beside the frame, or no longer.
+    /// Shows or hides the reference beside the frame.
     pub fn toggle(&mut self) {
         self.is_shown = !self.is_shown;
         self.beside = None;
         self.reference.hurry();
     }
 
-    /// Whether the reference is shown beside the frame.
+    /// Returns true if the reference is shown beside the frame.
     pub fn is_shown(&self) -> bool {
         self.is_shown
     }
 
-    /// Begins to measure what lights and settings cost.
+    /// Starts to measure what lights and settings cost.
     pub fn measure(&mut self) {
         self.is_shown = true;
         self.work = Work::Asked;
     }
 
-    /// Whether it is measured, so that nothing may move.
+    /// Returns true while a measurement runs, during which nothing may move.
     pub fn is_measuring(&self) -> bool {
         !matches!(self.work, Work::Nothing)
     }
 
-    /// Whether all that was asked for is there, of a frame of these options.
+    /// Returns true if everything that was requested is available for a frame with these options.
     pub fn is_at_rest(&self, game: &Game, options: &FrameOptions) -> bool {
         let is_compared = || self.compared(&DrawSettings::current(&game.world, options)).is_some();
         !self.is_measuring() && (!self.is_shown || is_compared())
     }
 
-    /// The reference, if it was compared with a frame of these settings.
+    /// Returns the reference, if it was compared with a frame of these settings.
     fn compared(&self, settings: &DrawSettings) -> Option<&Beside> {
         self.beside.as_ref().filter(|beside| beside.settings == *settings)
     }
 
-    /// Ends what is measured; whether there was anything.
+    /// Cancels the measurement; returns false if there is none.
     pub fn cancel(&mut self) -> bool {
         let was_measuring = self.is_measuring();
         self.work = Work::Nothing;
         was_measuring
     }
 
-    /// Forgets what was drawn on a device that is gone.
+    /// Drops what was drawn on a device that is lost.
     pub fn forget_device(&mut self) {
         self.cancel();
         (self.side, self.beside) = (None, None);
         self.reference = BesideReference::default();
     }
 
-    /// Forgets what was measured of a file that is no longer shown.
+    /// Drops the results for a file that is no longer shown.
     pub fn forget_file(&mut self) {
         *self = Self { is_shown: self.is_shown, ..Self::default() };
     }
 
-    /// The settings on the front that are the next better or cheaper ones than those in force, if there are any.
+    /// Returns the next better or next cheaper settings on the front, if there are any.
     pub fn next(&self, game: &Game, options: &FrameOptions, better: bool) -> Option<DrawSettings> {
         let front = self.front.as_ref()?;
         let settings = DrawSettings::current(&game.world, options);
@@ -123,10 +124,11 @@ impl Accuracy {
         next.and_then(|place| front.ways.get(place)).map(|way| way.settings)
     }
 
-    /// Draws what is due beside the frame of these options, into pictures of its size. Another reference that is there to be shown is handed out once.
+    /// Draws what is due for a frame with these options, into pictures of its size. Returns each new
+    /// reference picture once.
     ///
     /// # Errors
-    /// As drawing a frame.
+    /// As for drawing a frame.
     pub fn update(
         &mut self,
         gpu: &Gpu,
@@ -145,7 +147,7 @@ impl Accuracy {
             Some(side) => side,
             None => {
                 self.reference.hurry();
-                // What was measured at another size is as far away as what was measured from elsewhere.
+                // A measurement at another size is as invalid as one from another place, so it starts again.
                 if self.is_measuring() {
                     self.work = Work::Asked;
                 }
@@ -178,7 +180,7 @@ impl Accuracy {
             }
             return Ok(None);
         }
-        // Settings are chosen by what they do: that is not waited for.
+        // When the settings change, the comparison does not wait for its next turn.
         if self.beside.is_some() && self.compared(&DrawSettings::current(world, options)).is_none() {
             self.reference.hurry();
         }
@@ -191,7 +193,7 @@ impl Accuracy {
         Ok(self.beside.as_ref().filter(|_| is_new))
     }
 
-    /// What there is to say, of a frame of these options.
+    /// Returns the results for a frame with these options.
     pub fn facts(&self, game: &mut Game, options: &FrameOptions) -> AccuracyFacts {
         let settings = DrawSettings::current(&game.world, options);
         AccuracyFacts {
@@ -212,14 +214,14 @@ impl Accuracy {
 }
 
 impl AccuracyFacts {
-    /// What is known of settings: as a way of the front, or as how it was drawn when that was measured.
+    /// Returns the price of settings, if they are on the front or were in use when it was measured.
     pub fn priced<'a>(front: &'a ViewFront, settings: &DrawSettings) -> Option<&'a lumbre_cost::Priced> {
         let ways = front.ways.iter().chain([&front.now]);
         ways.into_iter().find(|way| way.settings == *settings)
     }
 }
 
-/// Draws a game by settings from now on: the keys' choices become theirs.
+/// Applies settings to a game; they replace the choices made by keys.
 pub fn choose(game: &mut Game, settings: &DrawSettings) {
     game.view = ViewSettings {
         shading: Some(settings.shading),
@@ -231,7 +233,7 @@ pub fn choose(game: &mut Game, settings: &DrawSettings) {
     scene.frame = settings.frame();
 }
 
-/// Where the camera is that the picture is taken from.
+/// Returns the transform of the active camera.
 fn camera_place(world: &mut World) -> Option<GlobalTransform> {
     world.query_filtered::<&GlobalTransform, With<ActiveCamera>>().iter(world).next().copied()
 }

@@ -1,4 +1,4 @@
-//! The application: winit's events on one side, the file that is viewed and the stage on the other.
+//! The application: connects winit's events to the file that is viewed and to the stage that draws it.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -25,13 +25,14 @@ use crate::picture::write_png;
 use crate::recording::STEPS_PER_SECOND;
 use crate::{Action, Input, Opened, Recording, Viewpoint};
 
-/// Devices that may be lost before the first frame of the next one is shown.
+/// Largest number of devices that may be lost in a row without a frame being shown.
 const MOST_LOSSES: u32 = 3;
-/// How long to wait before the next look at a window that shows nothing.
+/// Delay before the next attempt while the window shows nothing.
 const IDLE: Duration = Duration::from_millis(50);
-/// Frames after the end of what is waited for: the overlay lays a new text out in the first and shows it in the second.
+/// Frames to draw after all work has ended: the overlay lays out new text in the first and shows it in the
+/// second.
 const FRAMES_AT_REST: u32 = 2;
-/// Steps of a recording that are played per frame: 60 frames per second of game time.
+/// Steps of a recording per frame, for 60 frames per second of game time.
 const STEPS_PER_FRAME: u32 = STEPS_PER_SECOND / 60;
 
 /// A file in a window.
@@ -48,23 +49,23 @@ pub struct App {
     input: Input,
     grab: Grab,
     drag: Drag,
-    /// A file that is held over the window.
+    /// Whether a file is being dragged over the window.
     hovered: bool,
     last: Option<Instant>,
     frames: u64,
-    /// Frames since the end of what was being opened, baked, written or measured.
+    /// Frames since everything that was being opened, baked, written or measured ended.
     frames_at_rest: u32,
     losses: u32,
-    /// Why the event loop ends, if not because the player wants it.
+    /// The error that ends the event loop, if any.
     pub outcome: Result<()>,
 }
 
 impl App {
-    /// A file that will have a window once the event loop runs.
+    /// Creates the application. Its window opens when the event loop runs.
     pub fn new(opened: Opened, options: PlayOptions, replay: Option<&Recording>) -> Self {
         let overlay = Overlay::default();
         if options.screenshot.is_some() {
-            // A text that fades in over a twelfth of a second may be missing in the last frame.
+            // A text that fades in over a twelfth of a second might be missing in the last frame.
             overlay.context.all_styles_mut(|style| style.animation_time = 0.0);
         }
         let replay = replay.map(|recording| recording.player().collect::<Vec<_>>().into_iter());
@@ -93,7 +94,7 @@ impl App {
         }
     }
 
-    /// The recording of what was played, if one was asked for.
+    /// Returns the recording of what was played, if it was requested.
     pub fn take_recording(&mut self) -> Option<Recording> {
         self.viewing.take_recording()
     }
@@ -111,7 +112,8 @@ impl App {
             .as_ref()
             .is_some_and(|stage| stage.gpu().adapter.get_info().device_type == wgpu::DeviceType::Cpu);
         if software {
-            // Four samples cost a software rasterizer dearly, unless the level asks for them; M turns them on.
+            // Four samples are expensive on a software rasterizer, so they are off unless the level asks for
+            // them; M turns them on.
             let game = &mut self.viewing.opened.game;
             let asked =
                 game.world.get_resource::<SceneSettings>().and_then(|settings| settings.frame.multisample);
@@ -119,7 +121,7 @@ impl App {
         }
         self.follow_size();
         if !self.viewing.opened.game.has_a_start() {
-            // Framed again, now that the window's shape is known.
+            // Framed again with the window's aspect ratio.
             self.viewing.opened.game.orbit_everything();
         }
         Ok(())
@@ -129,14 +131,15 @@ impl App {
         format!("Lumbre: {}", self.viewing.opened.path.file_name().unwrap_or_default().to_string_lossy())
     }
 
-    /// Tells the game how wide the picture is for its height.
+    /// Passes the picture's aspect ratio to the game.
     fn follow_size(&mut self) {
         if let Some((width, height)) = self.stage.as_ref().map(Stage::size) {
             self.viewing.opened.game.set_aspect(f64::from(width) / f64::from(height));
         }
     }
 
-    /// A new device for the window, and a new overlay context, whose fonts have to be uploaded to it.
+    /// Creates a device for the window, and a new overlay context, because the fonts have to be uploaded
+    /// again.
     fn build_stage(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
         let Some(window) = self.window.clone() else { return Ok(()) };
         self.stage = None;
@@ -158,7 +161,7 @@ impl App {
         Ok(())
     }
 
-    /// Lets the time since the last frame pass.
+    /// Advances by the time since the last frame.
     fn advance(&mut self) {
         let now = Instant::now();
         let passed = self.last.replace(now).map_or(Duration::ZERO, |last| now - last);
@@ -173,7 +176,7 @@ impl App {
             self.input = self.input.held();
         }
         for _ in 0..STEPS_PER_FRAME {
-            // What is measured side by side has to show the same.
+            // The frames of one measurement must show the same state.
             if self.accuracy.is_measuring() {
                 break;
             }
@@ -202,13 +205,13 @@ impl App {
                 }
             }
             Action::ToggleOverlay | Action::Quit => {}
-            // What changes the picture ends the measuring of it.
+            // Other commands change the picture, which ends a measurement of it.
             _ => drop(self.accuracy.cancel()),
         }
         self.viewing.apply(action);
     }
 
-    /// Another file has taken the place of the old one.
+    /// Adapts the window to a file that has replaced the previous one.
     fn show_new_file(&mut self) {
         self.release();
         self.input = Input::default();
@@ -230,7 +233,7 @@ impl App {
             shading: view.shading,
             reflection: view.reflection,
             lightmaps: view.lightmaps,
-            // What moves is lit as what stands still is: by the bake, or without it.
+            // Without lightmaps, moving objects are not lit by baked light either.
             irradiance_volumes: view.lightmaps,
             shadows: view.shadows,
             multisample: Some(view.multisample),
@@ -260,7 +263,7 @@ impl App {
         let input = egui.take_egui_input(window);
         let LaidOut { mut output, wishes } = self.overlay.lay_out(input, &facts, self.report.as_deref());
         if !self.grab.is_held() {
-            // It sets the pointer's shape, and with that shows it: not while it is hidden.
+            // Applying the cursor shape would show the pointer, which has to stay hidden while grabbed.
             egui.handle_platform_output(window, std::mem::take(&mut output.platform_output));
         }
         let scale = output.pixels_per_point;
@@ -287,21 +290,21 @@ impl App {
         self.after_frame(event_loop, &options)
     }
 
-    /// Draws what is measured beside the frames.
+    /// Draws the pictures of the accuracy measurements that are due.
     fn measure_accuracy(&mut self, options: &FrameOptions) -> Result<()> {
         let Some(stage) = &self.stage else { return Ok(()) };
         let world = &mut self.viewing.opened.game.world;
         match self.accuracy.update(stage.gpu(), stage.size(), world, options) {
             Ok(Some(beside)) => self.overlay.show_reference(beside.size, &beside.rgba),
             Ok(None) => {}
-            // The next frame makes another device.
+            // The next frame creates another device.
             Err(_) if stage.gpu().is_lost() => {}
             Err(error) => return Err(error.into()),
         }
         Ok(())
     }
 
-    /// Makes a new device in place of one that is gone.
+    /// Creates a new device after one was lost.
     fn recover(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
         self.losses += 1;
         if self.losses > MOST_LOSSES {
@@ -312,7 +315,7 @@ impl App {
         self.build_stage(event_loop)
     }
 
-    /// What was asked to happen after so many frames.
+    /// Applies simulated events, and ends the event loop when it is due.
     fn after_frame(&mut self, event_loop: &ActiveEventLoop, options: &FrameOptions) -> Result<()> {
         self.undergo_trials();
         let played = self.replay.as_ref().is_some_and(|replay| replay.len() == 0);
@@ -401,7 +404,7 @@ impl App {
         }
     }
 
-    /// Frees the mouse, or ends what is measured, or the bake that runs.
+    /// Releases the mouse, or else cancels a measurement, or else the running bake.
     fn escape(&mut self) {
         if self.grab.is_held() {
             self.release();
@@ -410,7 +413,8 @@ impl App {
         }
     }
 
-    /// A button goes down over the picture: who walks looks around from now on, who looks on drags.
+    /// Handles a button press over the picture: it grabs the mouse for a walking player and starts a drag
+    /// otherwise.
     fn press(&mut self, button: MouseButton) {
         let walks = *self.viewing.opened.game.viewpoint() == Viewpoint::Player;
         match &self.window {
@@ -428,7 +432,7 @@ impl App {
         }
     }
 
-    /// Ends the event loop with an error.
+    /// Ends the event loop if the result is an error.
     fn fail(&mut self, event_loop: &ActiveEventLoop, result: Result<()>) {
         if result.is_err() {
             self.outcome = result;
@@ -465,12 +469,12 @@ impl ApplicationHandler for App {
                 self.follow_size();
             }
             WindowEvent::Focused(false) => {
-                // Keys that are released elsewhere are not heard of.
+                // Releases of keys are not reported while the window has no focus.
                 self.input = Input::default();
                 self.drag = Drag::default();
                 self.release();
             }
-            // A recording plays undisturbed; Q still quits.
+            // A recording is not disturbed by keys, but Q still quits.
             WindowEvent::KeyboardInput { event, .. } if self.replay.is_none() || is_quit(&event) => {
                 self.key(&event)
             }
@@ -530,7 +534,7 @@ impl ApplicationHandler for App {
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
         self.release();
-        // The surface before the window.
+        // The surface must be dropped before the window.
         self.stage = None;
     }
 }

@@ -1,10 +1,11 @@
-//! Which key does what. Keys are where they lie, not what is printed on them: WASD is in one place on every layout.
+//! Key bindings. Keys are identified by position and not by label, so that WASD is in the same place on every
+//! layout.
 
 use winit::keyboard::KeyCode;
 
 use crate::input::{Action, Input};
 
-/// The command of a key that goes down, if it has one.
+/// Returns the command of a key that is pressed, if it has one.
 pub fn action(key: KeyCode) -> Option<Action> {
     Some(match key {
         KeyCode::Digit1 | KeyCode::Numpad1 => Action::ShadeFlat,
@@ -32,7 +33,7 @@ pub fn action(key: KeyCode) -> Option<Action> {
     })
 }
 
-/// Holds or releases what a key stands for.
+/// Sets or clears what a key stands for while it is held.
 pub fn hold(input: &mut Input, key: KeyCode, down: bool) {
     let held = match key {
         KeyCode::KeyW | KeyCode::ArrowUp => &mut input.forward,

@@ -1,4 +1,5 @@
-//! A level or any other glTF file in a window: events in, frames out. Not the rules of the game: those know no window.
+//! Shows a level or any other glTF file in a window: receives events and draws frames. The rules of the game
+//! are in `game` and do not depend on it.
 
 mod accuracy;
 mod app;
@@ -19,43 +20,44 @@ use winit::event_loop::EventLoop;
 
 use crate::{Action, OpenOptions, Opened, Recording};
 
-/// How a level is played.
+/// Options of the window and of what is played in it.
 #[derive(Clone, Debug)]
 pub struct PlayOptions {
-    /// Width and height of the window in points.
+    /// Width and height of the window in logical pixels.
     pub size: (u32, u32),
-    /// How the file, and those that are dropped on the window, are opened.
+    /// How the file, and files that are dropped on the window, are opened.
     pub open: OpenOptions,
-    /// Bakes the file at once, beside the frames, and writes the baked file when that has ended.
+    /// Whether the file is baked in the background from the start, and written when the bake is complete.
     pub bake: bool,
-    /// Plays this recording instead of listening to the keyboard; the window closes at its end.
+    /// A recording to play instead of keyboard and mouse input; the window closes at its end.
     pub input: Option<PathBuf>,
-    /// Records what is played to this file.
+    /// A file to record the input to.
     pub record: Option<PathBuf>,
-    /// Writes the last frame, with its overlay, to a PNG.
+    /// A PNG file for the last frame, with its overlay.
     pub screenshot: Option<PathBuf>,
-    /// Closes the window after so many frames.
+    /// Number of frames after which the window closes.
     pub quit_after: Option<u32>,
-    /// Closes it only when nothing is being opened, baked or written any more, and what there is to say of it is shown.
+    /// Whether the window closes only once nothing is being opened, baked, written or measured any more and
+    /// the overlay shows the result.
     pub wait_for_work: bool,
-    /// What befalls the window after so many frames, to see whether the game survives it.
+    /// Events to simulate, each after a number of frames, for tests.
     pub trials: Vec<(u64, Trial)>,
 }
 
-/// A mishap, or what a hand would do, for tests.
+/// A simulated failure or user action, for tests.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trial {
-    /// The device is destroyed, as if the driver had reset it.
+    /// Destroys the device, as if the driver had reset it.
     LoseDevice,
-    /// The window gets another size, in points.
+    /// Resizes the window, in logical pixels.
     Resize(u32, u32),
-    /// The surface has no size for a frame, as a minimised window's on some systems.
+    /// Gives the surface no size, as for a minimised window on some systems.
     Vanish,
-    /// A file is dropped on it.
+    /// Drops a file on the window.
     Drop(PathBuf),
-    /// The key of a command is pressed.
+    /// Presses the key of a command.
     Act(Action),
-    /// The key Esc is pressed.
+    /// Presses Esc.
     Escape,
 }
 
@@ -75,10 +77,10 @@ impl Default for PlayOptions {
     }
 }
 
-/// Whether there is a display to open a window on.
+/// Returns true if there is a display to open a window on.
 pub fn has_display() -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    // On other systems there always is one, as far as a program can tell.
+    // On other systems a program has to assume that there is one.
     !cfg!(all(unix, not(target_os = "macos")))
         || set("WAYLAND_DISPLAY")
         || set("WAYLAND_SOCKET")
@@ -88,15 +90,16 @@ pub fn has_display() -> bool {
 /// Plays a level, or shows any other glTF file, in a window until it is closed.
 ///
 /// # Errors
-/// The file or the recording cannot be loaded, there is no display or no device, or drawing fails; the message says what to do.
+/// The file or the recording cannot be loaded, there is no display or no device, or drawing fails; the
+/// message says what to do.
 pub fn run(file: &Path, options: PlayOptions) -> Result<()> {
     run_opened(Opened::open(file, &options.open)?, options)
 }
 
-/// [`run`] of a file that is open already.
+/// Does what [`run`] does for a file that is already open.
 ///
 /// # Errors
-/// As [`run`], the file aside.
+/// As [`run`], except for opening the file.
 pub fn run_opened(mut opened: Opened, options: PlayOptions) -> Result<()> {
     let recording = options.input.as_deref().map(Recording::load).transpose()?;
     if options.record.is_some() {

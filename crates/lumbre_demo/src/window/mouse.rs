@@ -1,4 +1,4 @@
-//! The mouse: grabbed it turns the head; released it points, and drags what it is pressed on.
+//! The mouse: while grabbed it turns the view; otherwise it points, and drags what it is pressed on.
 
 use glam::DVec2;
 use winit::dpi::PhysicalPosition;
@@ -7,28 +7,28 @@ use winit::window::{CursorGrabMode, Window};
 
 use crate::input::Input;
 
-/// Radians per unit of the mouse.
+/// Rotation of the view in radians per unit of mouse motion.
 const SENSITIVITY: f64 = 0.0022;
 
-/// Who has the mouse.
+/// Whether the game has grabbed the mouse, and how.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Grab {
-    /// The desktop.
+    /// Not grabbed.
     #[default]
     Released,
-    /// The game; the pointer stands still.
+    /// Grabbed, with a pointer that does not move.
     Locked,
-    /// The game; the pointer is kept in the window and put back to its middle.
+    /// Grabbed, with a pointer that is confined to the window and moved back to its centre.
     Confined,
 }
 
 impl Grab {
-    /// Whether the game has it.
+    /// Returns true if the game has grabbed the mouse.
     pub fn is_held(self) -> bool {
         self != Self::Released
     }
 
-    /// Takes the mouse, in the best way that the system offers.
+    /// Grabs the mouse in the best way that the system offers.
     pub fn take(window: &Window) -> Self {
         let ways = [(CursorGrabMode::Locked, Self::Locked), (CursorGrabMode::Confined, Self::Confined)];
         for (mode, grab) in ways {
@@ -43,7 +43,7 @@ impl Grab {
         Self::Released
     }
 
-    /// Gives it back.
+    /// Releases the mouse.
     pub fn release(&mut self, window: &Window) {
         if let Err(error) = window.set_cursor_grab(CursorGrabMode::None) {
             tracing::debug!("the mouse cannot be released: {error}");
@@ -52,29 +52,29 @@ impl Grab {
         *self = Self::Released;
     }
 
-    /// Keeps a confined pointer from the window's edge, where it would stop turning the view.
+    /// Keeps a confined pointer away from the window's edge, where it would stop turning the view.
     pub fn recentre(self, window: &Window) {
         if self == Self::Confined {
             let size = window.inner_size();
             let middle = PhysicalPosition::new(size.width / 2, size.height / 2);
-            // Where the pointer cannot be moved it only stops at the edge.
+            // If this fails, the pointer merely stops at the edge.
             let _ = window.set_cursor_position(middle);
         }
     }
 
-    /// How far the view turns for a motion of the mouse.
+    /// Returns the rotation of the view for a motion of the mouse.
     pub fn look(self, delta: (f64, f64)) -> DVec2 {
         let motion = DVec2::new(delta.0, delta.1);
         if self.is_held() && motion.is_finite() { motion * SENSITIVITY } else { DVec2::ZERO }
     }
 }
 
-/// Radians that a view turns by while the mouse is dragged over the height of the window.
+/// Rotation of the view in radians for a drag over the whole height of the window.
 const TURN_PER_HEIGHT: f64 = std::f64::consts::PI;
-/// Pixels of a touchpad that count as one notch of a wheel.
+/// Touchpad pixels that count as one notch of a mouse wheel.
 const PIXELS_PER_NOTCH: f64 = 50.0;
 
-/// A released mouse: where it is, and what it drags.
+/// The state of a mouse that is not grabbed: its position and the pressed button.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drag {
     at: Option<DVec2>,
@@ -82,19 +82,20 @@ pub struct Drag {
 }
 
 impl Drag {
-    /// A button goes down over the picture.
+    /// Notes that a button is pressed over the picture.
     pub fn press(&mut self, button: MouseButton) {
         self.button = Some(button);
     }
 
-    /// A button goes up.
+    /// Notes that a button is released.
     pub fn release(&mut self, button: MouseButton) {
         if self.button == Some(button) {
             self.button = None;
         }
     }
 
-    /// The mouse moves to a place in pixels, over a window that is `height` pixels high. The left button turns, the others shift.
+    /// Moves the mouse to a position in pixels in a window that is `height` pixels high, and returns the
+    /// gesture: the left button turns, the others shift.
     pub fn motion(&mut self, to: (f64, f64), height: u32) -> Input {
         let to = DVec2::new(to.0, to.1);
         let moved = self.at.replace(to).map_or(DVec2::ZERO, |at| to - at) / f64::from(height.max(1));
@@ -105,7 +106,7 @@ impl Drag {
         }
     }
 
-    /// The wheel turns.
+    /// Returns the gesture of a turn of the wheel.
     pub fn wheel(delta: MouseScrollDelta) -> Input {
         let zoom = match delta {
             MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),

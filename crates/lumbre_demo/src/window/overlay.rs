@@ -1,5 +1,5 @@
-//! What the overlay says: frame times, passes, counts, choices. Not what it says of the file (that is `overlay_file`), nor how it is painted
-//! (`overlay_painter`).
+//! The contents of the overlay: frame times, passes, counts and settings. The section on the file is in
+//! `overlay_file`, and the painting in `overlay_painter`.
 
 use std::collections::VecDeque;
 
@@ -14,50 +14,50 @@ use super::overlay_file::{DIM, GOOD, WARM};
 use super::{overlay_accounting, overlay_accuracy, overlay_file};
 use crate::ViewSettings;
 
-/// Frames in the graph: two seconds at 60 per second.
+/// Frames in the graph: two seconds at 60 frames per second.
 const GRAPH_FRAMES: usize = 120;
-/// Size of the graph in points.
+/// Size of the graph in logical pixels.
 const GRAPH_SIZE: egui::Vec2 = vec2(330.0, 56.0);
 
-/// What the overlay is about, beside the frame itself.
+/// The state that the overlay shows, apart from the report on the frame.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// The adapter and its driver.
+    /// The names of the adapter and its driver.
     pub device: String,
-    /// Width and height of the frame in pixels.
+    /// Size of the frame in pixels.
     pub size: (u32, u32),
-    /// What the keys chose.
+    /// The choices made by keys.
     pub view: ViewSettings,
-    /// Whether the torch is lit.
+    /// Whether the torch is on.
     pub torch: bool,
-    /// Whether the picture is what the player sees.
+    /// Whether the picture is taken from the player's eyes.
     pub is_player: bool,
     /// Whether the player flies.
     pub flying: bool,
-    /// Whether the mouse turns the view.
+    /// Whether the mouse is grabbed and turns the view.
     pub grabbed: bool,
-    /// The player's feet, metres.
+    /// Position of the player's feet, metres.
     pub feet: glam::DVec3,
-    /// Whether it is a level to walk through, and not a file to look at.
+    /// Whether the file is a level to walk through.
     pub is_level: bool,
-    /// Factor on radiance, if it is not the camera's.
+    /// The factor on radiance, if it differs from the camera's.
     pub exposure: Option<f32>,
     /// Whether the exposure adapts.
     pub adapts: bool,
     /// The file.
     pub file: FileFacts,
-    /// What is known of accuracy and its price.
+    /// The results of the accuracy measurements.
     pub accuracy: AccuracyFacts,
 }
 
-/// The overlay and what it remembers.
+/// The overlay and its state.
 pub struct Overlay {
-    /// Its own state; made anew with every device, as the fonts live there.
+    /// egui's context; created again with every device, because it tracks which fonts were uploaded.
     pub context: egui::Context,
     frame_ms: VecDeque<f32>,
-    /// The most accurate picture of the view.
+    /// The reference picture of the view.
     reference: Option<egui::TextureHandle>,
-    /// Where the frame ends and the reference begins, 0 to 1 from the left.
+    /// Where the frame ends and the reference begins, as a fraction of the width from the left.
     split: f32,
 }
 
@@ -67,16 +67,16 @@ impl Default for Overlay {
     }
 }
 
-/// A frame of the overlay, and what was asked for in it.
+/// The layout of one frame of the overlay, and the user's requests in it.
 pub struct LaidOut {
-    /// What is to be painted. Whoever takes it applies its textures.
+    /// What is to be painted; its texture changes have to be applied.
     pub output: egui::FullOutput,
-    /// What was asked for.
+    /// The user's requests.
     pub wishes: Wishes,
 }
 
 impl Overlay {
-    /// Notes how long a frame took, milliseconds.
+    /// Adds the duration of a frame, milliseconds.
     pub fn note_frame(&mut self, milliseconds: f32) {
         self.frame_ms.push_back(milliseconds);
         while self.frame_ms.len() > GRAPH_FRAMES {
@@ -84,14 +84,14 @@ impl Overlay {
         }
     }
 
-    /// Forgets the fonts that were uploaded to a device that is gone.
+    /// Starts with a new context for a new device, to which the fonts have to be uploaded.
     pub fn forget_device(&mut self) {
-        // The texture lives in the context.
+        // The texture belongs to the old context.
         self.reference = None;
         self.context = egui::Context::default();
     }
 
-    /// Shows this reference from now on, of `size` pixels, each red, green, blue and alpha.
+    /// Shows this reference from now on: `size` in pixels, and RGBA bytes.
     pub fn show_reference(&mut self, size: (u32, u32), rgba: &[u8]) {
         let image = egui::ColorImage::from_rgba_unmultiplied([size.0 as usize, size.1 as usize], rgba);
         let options = egui::TextureOptions::NEAREST;
@@ -101,12 +101,12 @@ impl Overlay {
         }
     }
 
-    /// Shows none any more.
+    /// Removes the reference.
     pub fn forget_reference(&mut self) {
         self.reference = None;
     }
 
-    /// Lays out one frame.
+    /// Lays out the overlay of one frame.
     #[must_use]
     pub fn lay_out(&mut self, input: egui::RawInput, facts: &Facts, report: Option<&FrameReport>) -> LaidOut {
         let (context, mut split, mut wishes) = (self.context.clone(), self.split, Wishes::default());
@@ -117,7 +117,7 @@ impl Overlay {
             overlay_file::status(root, &facts.file);
             if facts.accuracy.is_shown {
                 let accounting = report.and_then(|report| report.accounting.as_deref());
-                // A frame may be laid out twice; what was asked for first stands.
+                // egui may lay out a frame twice; the first request counts.
                 let asked = overlay_accuracy::panel(root, &facts.accuracy, accounting);
                 wishes = Wishes { settings: wishes.settings.or(asked.settings) };
             }
@@ -167,7 +167,7 @@ impl Overlay {
     }
 }
 
-/// The last frames as a line, with the lines of 60 and 30 frames per second where they fit.
+/// Draws the durations of the last frames as a graph, with lines at 60 and 30 frames per second if they fit.
 fn graph(ui: &mut Ui, frame_ms: &VecDeque<f32>, mean: f32) {
     let (response, painter) = ui.allocate_painter(GRAPH_SIZE, Sense::hover());
     let area = response.rect;
@@ -186,7 +186,7 @@ fn graph(ui: &mut Ui, frame_ms: &VecDeque<f32>, mean: f32) {
     painter.line(line, Stroke::new(1.5, GOOD));
 }
 
-/// Every pass of the plan: how long it took, or why it does not run.
+/// Lists every pass of the frame's plan: how long it took, or why it does not run.
 fn passes(ui: &mut Ui, report: &FrameReport, counts_lights: bool) {
     let explanation = report.plan.explain();
     let measured = report.measured.as_ref();
@@ -256,7 +256,7 @@ fn counts(ui: &mut Ui, report: &FrameReport) {
     ui.label(RichText::new(format!("the scene calls for {}", called_for.join(", "))).color(DIM).small());
 }
 
-/// What can be changed, with its key.
+/// Lists what can be changed, with the keys.
 fn choices(ui: &mut Ui, facts: &Facts) {
     let view = &facts.view;
     let shading = view.shading.map_or("as the file asks".to_owned(), |shading| shading.to_string());
@@ -308,7 +308,7 @@ fn choices(ui: &mut Ui, facts: &Facts) {
     }
 }
 
-/// The exposure value at ISO 100 of a factor on radiance.
+/// Returns the exposure value at ISO 100 of a factor on radiance.
 fn exposure_value(factor: f32) -> f64 {
     -(1.2 * f64::from(factor)).log2()
 }
@@ -332,7 +332,7 @@ mod tests {
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, vec2(1280.0, 900.0))),
             ..egui::RawInput::default()
         };
-        // A window is laid out on its first frame and shown on its second.
+        // egui lays out a window in its first frame and shows it in its second.
         overlay.lay_out(input(), facts, None).output.drop_without_applying_deltas();
         let mut text = String::new();
         let output = overlay.lay_out(input(), facts, None).output;

@@ -1,16 +1,17 @@
-//! The overlay's account of a frame: what its effects cost, and what the CPU did stage by stage. The passes and their reasons are `overlay`'s.
+//! The overlay's account of a frame: the cost of its effects, and the time of the CPU's stages. The passes
+//! are listed in `overlay`.
 
 use egui::{RichText, Ui};
 use lumbre_render::{Accounting, EffectAccount, PassAccount, StageAccount};
 
 use super::overlay_file::{DIM, WARM};
 
-/// Stages shorter than this are shown as one, in milliseconds.
+/// Stages shorter than this are summed up, in milliseconds.
 const SHORT: f64 = 0.02;
 
-/// The account of the newest frame whose numbers have arrived.
+/// Lays out the account of the latest frame whose measurements have arrived.
 pub fn account(ui: &mut Ui, accounting: &Accounting) {
-    // Folded, so that the keys below stay in a small window.
+    // Collapsed, so that the keys below stay visible in a small window.
     let gpu = accounting.gpu_ms.map_or_else(String::new, |ms| format!(", {ms:.1} ms on the GPU"));
     let by_effect = format!("by effect: {:.1} ms on the CPU{gpu}", accounting.cpu_ms);
     let heading = |text: String, name| egui::CollapsingHeader::new(text).id_salt(name).default_open(false);
@@ -21,7 +22,8 @@ pub fn account(ui: &mut Ui, accounting: &Accounting) {
     }
 }
 
-/// Lights that a pass tested and that contributed, where they are counted.
+/// Formats the number of lights that a pass tested, and the percentage that contributed, if they were
+/// counted.
 pub fn lights(pass: Option<&PassAccount>) -> String {
     let counts = pass.and_then(|pass| pass.lights);
     counts.map_or_else(String::new, |counts| {
@@ -69,7 +71,7 @@ fn stages(ui: &mut Ui, accounting: &Accounting) {
     });
 }
 
-/// A number of up to three figures and a word.
+/// Formats a count in short form.
 fn short_count(count: u64) -> String {
     match count {
         0..10_000 => count.to_string(),
@@ -84,7 +86,7 @@ mod tests {
 
     use super::*;
 
-    /// All that is written in the overlay.
+    /// Collects all text of the overlay.
     fn texts(shape: &egui::Shape, text: &mut String) {
         match shape {
             egui::Shape::Text(one) => *text += &(one.galley.text().to_owned() + "\n"),
@@ -126,7 +128,7 @@ mod tests {
         };
         let context = egui::Context::default();
         let mut text = String::new();
-        // What is laid out on the first frame is shown on the second.
+        // egui shows in the second frame what it lays out in the first.
         for _ in 0..2 {
             text.clear();
             let output = context.run_ui(egui::RawInput::default(), |ui| {

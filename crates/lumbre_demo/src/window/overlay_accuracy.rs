@@ -1,5 +1,5 @@
-//! The panel of what accuracy costs here: the reference beside the frame, the error in figures, bars of what passes and lights take, and two sliders, milliseconds and error,
-//! each of which follows the other. Not the measuring: that is `accuracy`.
+//! The panel on the cost of accuracy: the reference beside the frame, its error, bars for the time of passes
+//! and lights, and two coupled sliders for milliseconds and error. The measuring is in `accuracy`.
 
 use egui::{
     Align2, Color32, CornerRadius, CursorIcon, LayerId, ProgressBar, Rect, RichText, ScrollArea, Sense,
@@ -11,22 +11,23 @@ use lumbre_render::Accounting;
 use super::accuracy::AccuracyFacts;
 use super::overlay_file::{DIM, GOOD, WARM};
 
-/// Width of the panel in points, and of its bars.
+/// Width of the panel and of its bars in logical pixels.
 const WIDTH: f32 = 290.0;
 const BAR_WIDTH: f32 = 110.0;
-/// Half of the width in which the line between the two pictures is caught, in points.
+/// Half of the width in which the dividing line can be grabbed, in logical pixels.
 const GRIP: f32 = 6.0;
-/// The smallest error that a slider tells from none, per cent.
+/// The smallest error on a slider that differs from none, per cent.
 const SMALLEST_PERCENT: f64 = 1e-3;
 
-/// What was asked for in the overlay.
+/// The user's requests in the overlay.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wishes {
-    /// Settings by their place on the front.
+    /// Settings, by their index on the front.
     pub settings: Option<usize>,
 }
 
-/// The reference over the part of the frame that lies right of a line, which can be dragged: `split` is its place, 0 to 1.
+/// Shows the reference over the part of the frame to the right of a dividing line that can be dragged.
+/// `split` is its place, 0 to 1.
 pub fn reference_beside(root: &Ui, reference: &egui::TextureHandle, split: &mut f32) {
     let screen = root.ctx().content_rect();
     let line = screen.left() + *split * screen.width();
@@ -57,7 +58,7 @@ pub fn reference_beside(root: &Ui, reference: &egui::TextureHandle, split: &mut 
     );
 }
 
-/// The panel; what was asked for in it.
+/// Lays out the panel and returns the user's requests.
 pub fn panel(root: &Ui, facts: &AccuracyFacts, accounting: Option<&Accounting>) -> Wishes {
     let mut wishes = Wishes::default();
     let frame = egui::Frame::window(root.style()).fill(Color32::from_black_alpha(190));
@@ -110,7 +111,7 @@ fn contents(ui: &mut Ui, facts: &AccuracyFacts, accounting: Option<&Accounting>)
     settings(ui, front, facts)
 }
 
-/// What passes take on the device, those together that it cannot tell apart.
+/// Lists the GPU time of the passes; those that cannot be measured separately share a row.
 fn passes(ui: &mut Ui, accounting: &Accounting) {
     let mut groups: Vec<(usize, String, f64)> = Vec::new();
     for pass in &accounting.passes {
@@ -145,7 +146,7 @@ fn lights(ui: &mut Ui, lights: &[LightCost]) {
     });
 }
 
-/// A name, a bar of milliseconds with its quartiles as a thin line, and a remark.
+/// Adds a row with a name, a bar of milliseconds with its quartiles as a thin line, and a remark.
 fn row(ui: &mut Ui, name: &str, [lower, ms, upper]: [f64; 3], most: f64, remark: &str) {
     ui.label(RichText::new(name).small());
     let (response, painter) = ui.allocate_painter(vec2(BAR_WIDTH, 10.0), Sense::hover());
@@ -164,7 +165,7 @@ fn row(ui: &mut Ui, name: &str, [lower, ms, upper]: [f64; 3], most: f64, remark:
     ui.end_row();
 }
 
-/// The two sliders, and the next settings in both directions.
+/// Lays out the two sliders, and the next settings in both directions.
 fn settings(ui: &mut Ui, front: &ViewFront, facts: &AccuracyFacts) -> Wishes {
     let mut wishes = Wishes::default();
     let (Some(first), Some(last)) = (front.ways.first(), front.ways.last()) else { return wishes };
@@ -178,7 +179,7 @@ fn settings(ui: &mut Ui, front: &ViewFront, facts: &AccuracyFacts) -> Wishes {
         ui.label(RichText::new("measured from another place; P measures again").color(WARM).small());
     }
     if front.ways.len() > 1 {
-        // What a slider shows is the way's own price: it follows the other one.
+        // Each slider shows the price of the current settings, so that moving one also moves the other.
         let mut ms = now.milliseconds.median;
         let range = first.milliseconds.median.min(ms)..=last.milliseconds.median.max(ms);
         let slider = Slider::new(&mut ms, range)
@@ -221,13 +222,14 @@ fn prices(way: &Priced) -> String {
     format!("{:.1} ms, {} % off", way.milliseconds.median, percent(way.error))
 }
 
-/// A number with so many decimals at most. `Slider::max_decimals` would round the value too, which reads as a change that nobody made.
+/// Formats a number with at most `most` decimals. `Slider::max_decimals` would also round the value, which
+/// counts as a change that the user did not make.
 fn decimals(value: f64, most: i32) -> String {
     let scale = 10f64.powi(most);
     ((value * scale).round() / scale).to_string()
 }
 
-/// A share as per cent, with some three figures.
+/// Formats a fraction as a percentage with about three digits.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
@@ -263,7 +265,7 @@ mod tests {
         Priced { label: label.to_owned(), settings, milliseconds, error }
     }
 
-    /// Three ways, of which the middle one is in force.
+    /// Three settings, of which the middle one is current.
     fn facts() -> AccuracyFacts {
         let ways = vec![
             way("the cheapest", Shading::Flat, 10.0, 0.4),
@@ -290,7 +292,7 @@ mod tests {
         }
     }
 
-    /// All that is written, with its place; and what was asked for.
+    /// Lays out the panel; returns all its text with positions, and the request.
     fn laid_out(
         context: &egui::Context,
         facts: &AccuracyFacts,
@@ -318,7 +320,8 @@ mod tests {
         vec![Event::PointerMoved(at), Event::PointerButton { pos: at, button, pressed: true, modifiers }]
     }
 
-    /// What is asked for where a slider is pressed so far from the left end of its rail, in points.
+    /// Returns the request after pressing a slider at a distance from the left end of its rail, in logical
+    /// pixels.
     fn pressed(slider: &str, along: f32) -> Option<usize> {
         let (context, facts) = (egui::Context::default(), facts());
         laid_out(&context, &facts, Vec::new());
@@ -328,20 +331,20 @@ mod tests {
         let left = place("the middle: 20.0 ms").expect("it is said what is drawn").x;
         let row = place(slider).expect("the slider has its name").y + 6.0;
         let at = pos2(left + along, row);
-        // The pointer is over it in one frame and pressed in the next.
+        // The pointer hovers in one frame and presses in the next.
         laid_out(&context, &facts, vec![Event::PointerMoved(at)]);
         laid_out(&context, &facts, press(at)).1.settings
     }
 
     #[test]
     fn each_slider_chooses_what_keeps_it_and_the_other_follows() {
-        // A rail is 100 points long: 10 to 80 ms, and no error to 40 %.
+        // A rail is 100 logical pixels long: 10 to 80 ms, and no error to 40 %.
         assert_eq!(pressed("ms a frame", 3.0), Some(0));
         assert_eq!(pressed("ms a frame", 60.0), Some(1), "some 35 ms: the best takes 80");
         assert_eq!(pressed("ms a frame", 95.0), Some(2));
         assert_eq!(pressed("% of error", 4.0), Some(2));
         assert_eq!(pressed("% of error", 95.0), Some(0));
-        // Whatever is chosen, both show its prices.
+        // Whatever is chosen, both sliders show its price.
         for (place, [ms, error]) in [["10", "40"], ["20", "5"], ["80", "0"]].into_iter().enumerate() {
             let mut facts = facts();
             let settings = |front: &ViewFront| front.ways[place].settings;
@@ -360,7 +363,7 @@ mod tests {
         for place in 0..3 {
             let mut facts = facts();
             let front = facts.front.as_mut().expect("it was measured");
-            // No price is a round number.
+            // Prices that are not round numbers.
             for way in &mut front.ways {
                 way.milliseconds.median *= 1.000_123_4;
                 way.error *= 0.999_123_4;

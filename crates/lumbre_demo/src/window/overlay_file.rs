@@ -1,44 +1,45 @@
-//! What the overlay says of the file: its name, cameras and notes, the bake that runs, what went wrong. Not of its frames: that is `overlay`.
+//! The overlay's information on the file: its name, cameras and notes, the running bake, and errors. Frame
+//! times and settings are in `overlay`.
 
 use egui::{Align2, Color32, ProgressBar, RichText, ScrollArea, Ui, vec2};
 
 use super::viewing::{LightFacts, Message};
 use crate::BakeStatus;
 
-/// Height of the list of notes in points; more are scrolled.
+/// Height of the list of notes in logical pixels; longer lists scroll.
 const NOTES_HEIGHT: f32 = 90.0;
-/// Width of the bar of a bake in points.
+/// Width of the bake's progress bar in logical pixels.
 const BAR_WIDTH: f32 = 420.0;
-/// Colours of the overlay's text: of what is by the way, of what is well, of what is to be noted, of what went wrong.
+/// Text colours of the overlay: secondary text, success, attention, and errors.
 pub const DIM: Color32 = Color32::from_gray(150);
 pub const GOOD: Color32 = Color32::from_rgb(140, 210, 120);
 pub const WARM: Color32 = Color32::from_rgb(235, 180, 90);
 const BAD: Color32 = Color32::from_rgb(255, 120, 100);
 
-/// What is known of the file.
+/// The state of the file for the overlay.
 #[derive(Clone, Debug, Default)]
 pub struct FileFacts {
-    /// Its name, without the folder.
+    /// The file's name, without its folder.
     pub name: String,
     /// What was repaired, left out or added.
     pub notes: Vec<String>,
-    /// Where the picture is taken from.
+    /// A description of where the picture is taken from.
     pub viewpoint: String,
-    /// The names of its cameras.
+    /// The names of the cameras.
     pub cameras: Vec<String>,
-    /// Whether another file is held over the window.
+    /// Whether another file is being dragged over the window.
     pub hovered: bool,
-    /// What there is to say.
+    /// The latest message.
     pub message: Option<Message>,
-    /// How far its bake is, if one runs.
+    /// Progress of the bake, if one runs.
     pub bake: Option<BakeStatus>,
-    /// The light that was baked here, if it is shown.
+    /// The light baked in this session, if it is shown.
     pub light: Option<LightFacts>,
-    /// Whether the bake can be written.
+    /// Whether the bake can be saved.
     pub can_save: bool,
 }
 
-/// The file's part of the overlay.
+/// Lays out the section on the file.
 pub fn about(ui: &mut Ui, file: &FileFacts) {
     ui.label(RichText::new(&file.name).strong());
     if !file.cameras.is_empty() {
@@ -63,7 +64,8 @@ pub fn about(ui: &mut Ui, file: &FileFacts) {
     }
 }
 
-/// The line at the foot of the window, also where the overlay is off: what runs, and what went wrong.
+/// Lays out the status line at the foot of the window, which is shown even if the overlay is off: what runs,
+/// and what went wrong.
 pub fn status(root: &Ui, file: &FileFacts) {
     if file.message.is_none() && file.bake.is_none() && !file.hovered {
         return;

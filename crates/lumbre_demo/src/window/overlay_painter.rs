@@ -1,4 +1,4 @@
-//! The overlay's triangles and textures on the GPU. Not what it says: that is `overlay`.
+//! Uploads the overlay's triangles and textures to the GPU and draws them. Its contents are in `overlay`.
 
 use lumbre_render::Gpu;
 
@@ -10,7 +10,7 @@ pub struct OverlayPainter {
 }
 
 impl OverlayPainter {
-    /// For targets of one format.
+    /// Creates a painter for targets of one format.
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Self {
         let options = egui_wgpu::RendererOptions { dithering: false, ..Default::default() };
         let renderer = egui_wgpu::Renderer::new(&gpu.device, format, options);
@@ -18,7 +18,8 @@ impl OverlayPainter {
         Self { renderer, triangles: Vec::new(), screen }
     }
 
-    /// Uploads a frame of the overlay for a target of `size` pixels. `textures` is what changed since the last call.
+    /// Uploads the overlay of one frame for a target of `size` pixels. `textures` holds what changed since
+    /// the last call.
     pub fn prepare(
         &mut self,
         gpu: &Gpu,
@@ -51,7 +52,7 @@ impl OverlayPainter {
         gpu.queue.submit(more.into_iter().chain([encoder.finish()]));
     }
 
-    /// Paints what was prepared.
+    /// Paints what was prepared last.
     pub fn paint(&self, pass: &mut wgpu::RenderPass<'static>) {
         self.renderer.render(pass, &self.triangles, &self.screen);
     }

@@ -1,5 +1,5 @@
-//! Everything that lives and dies with a device: the surface, the renderer, the overlay's painter. Not the window, which outlives
-//! devices.
+//! Everything that belongs to a device: the surface, the renderer and the overlay's painter. The window is in
+//! `app` and outlives devices.
 
 use std::sync::Arc;
 
@@ -14,51 +14,51 @@ use winit::window::Window;
 
 use super::overlay_painter::OverlayPainter;
 
-/// A device and what is on it.
+/// A device and what was created on it.
 pub struct Stage {
     window: Arc<Window>,
     gpu: Gpu,
     surface: WindowSurface,
     renderer: Renderer,
     painter: OverlayPainter,
-    /// Paints into pictures that are kept, which have another format than the window.
+    /// Paints into pictures that are saved, whose format differs from the window's.
     picture_painter: Option<OverlayPainter>,
-    /// Written to see whether the device is there.
+    /// Written to test whether the device still works.
     probe: wgpu::Buffer,
-    /// Made when it is first asked, and for the size of the window then.
+    /// Created when first used, with the size of the window at that time.
     meter: Option<((u32, u32), LightMeter)>,
 }
 
-/// Texels in a row of the picture that is metered: enough for a mean.
+/// Width of the picture that is metered, in texels; enough for a mean.
 const METER_WIDTH: u32 = 64;
-/// Bytes of the probe: the least that may be written.
+/// Size of the probe in bytes: the smallest write that is allowed.
 const PROBE_BYTES: wgpu::BufferSize = match wgpu::BufferSize::new(wgpu::COPY_BUFFER_ALIGNMENT) {
     Some(bytes) => bytes,
     None => wgpu::BufferSize::MIN,
 };
 
-/// A frame of the overlay, ready to paint.
+/// The overlay of one frame, ready to paint.
 pub struct OverlayFrame {
     /// What to paint.
     pub triangles: Vec<egui::ClippedPrimitive>,
-    /// What changed since the last one.
+    /// The textures that changed since the last frame.
     pub textures: egui::TexturesDelta,
-    /// Pixels per point.
+    /// Physical pixels per logical pixel.
     pub scale: f32,
 }
 
-/// What became of a frame.
+/// The result of showing a frame.
 pub enum Shown {
-    /// It is on its way to the screen.
+    /// The frame was submitted for presentation.
     Frame(Box<FrameReport>),
-    /// The window has no place for one at the moment.
+    /// The window cannot take a frame at the moment.
     Nothing,
-    /// The device is gone; all of the stage has to be made anew.
+    /// The device is lost; the whole stage has to be created again.
     DeviceLost,
 }
 
 impl Stage {
-    /// Opens a device for a window. `pictures` says whether pictures will be taken.
+    /// Opens a device for a window. `pictures` says whether [`picture`](Self::picture) will be used.
     ///
     /// # Errors
     /// There is no device that can present to the window; the message says what to install.
@@ -84,25 +84,25 @@ impl Stage {
         Ok(Self { window, gpu, surface, renderer, painter, picture_painter, probe, meter: None })
     }
 
-    /// The device.
+    /// Returns the device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// Width and height of the surface in pixels; zero while minimised.
+    /// Returns the size of the surface in pixels; zero while minimised.
     pub fn size(&self) -> (u32, u32) {
         self.surface.size()
     }
 
-    /// Follows the window's size.
+    /// Resizes the surface to the window's size.
     pub fn resize(&mut self, width: u32, height: u32) {
         self.surface.resize(&self.gpu, width, height);
     }
 
-    /// Draws a frame and shows it.
+    /// Draws a frame with its overlay and presents it.
     ///
     /// # Errors
-    /// What the renderer cannot draw.
+    /// The renderer cannot draw the World.
     pub fn show(
         &mut self,
         world: &mut World,
@@ -144,10 +144,11 @@ impl Stage {
         }
     }
 
-    /// Meters the World as these options show it; nothing if no light is seen, or there is no device or no window to show it on.
+    /// Meters the World as it is drawn with these options. Returns `None` if no light is visible, the device
+    /// is lost or the window has no size.
     ///
     /// # Errors
-    /// What the renderer cannot draw or read back.
+    /// The renderer cannot draw the World, or the result cannot be read back.
     pub fn measure(&mut self, world: &mut World, options: &FrameOptions) -> Result<Option<Metering>> {
         let (width, height) = self.size();
         if width == 0 || height == 0 || !self.is_alive() {
@@ -166,15 +167,15 @@ impl Stage {
         }
     }
 
-    /// The frame as it was shown last, drawn once more into memory: width, height, RGBA bytes.
+    /// Draws the last frame again into memory, and returns its width, height and RGBA bytes.
     ///
     /// # Errors
-    /// What the renderer cannot draw or read back.
+    /// The renderer cannot draw the World, or the result cannot be read back.
     pub fn picture(&mut self, world: &mut World, options: &FrameOptions) -> Result<(u32, u32, Vec<u8>)> {
         let (width, height) = self.size();
         let offscreen = Offscreen::new(&self.gpu, width, height, OffscreenFormat::Rgba8)?;
         let target = offscreen.target();
-        // It shows all that the frame should.
+        // The picture is complete: it waits for pipelines that a frame would skip while they are compiled.
         let options = &FrameOptions { missing_pipelines: MissingPipelines::Wait, ..options.clone() };
         match &self.picture_painter {
             Some(painter) => {
@@ -185,9 +186,10 @@ impl Stage {
         Ok((width, height, offscreen.read_rgba8(&self.gpu)?))
     }
 
-    /// Whether the device still takes data. egui's upload ends the program where it does not, so it is asked first.
+    /// Returns true if the device still accepts data. It is tested before egui uploads its own, which would
+    /// abort the program otherwise.
     fn is_alive(&self) -> bool {
-        // A lost device tells its callback when it is polled; an error of polling says the same.
+        // Polling runs the callback of a lost device; an error of polling means the same.
         let polled = self.gpu.device.poll(wgpu::PollType::Poll).is_ok();
         polled
             && !self.gpu.is_lost()

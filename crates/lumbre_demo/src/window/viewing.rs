@@ -1,5 +1,5 @@
-//! What the window shows and does beside its frames: the file that is open, the one that is being opened, the bake that runs, the exposure
-//! that adapts. No events and no drawing: those are `app` and `stage`.
+//! The state of the window's file apart from drawing: the file that is open, one that is being opened, the
+//! running bake, and the exposure. Events are handled in `app`, and drawing in `stage`.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -17,26 +17,26 @@ use crate::{
     Recording, Viewpoint,
 };
 
-/// Between two looks at the meter.
+/// Time between two measurements of the exposure.
 const METER_EVERY: Duration = Duration::from_millis(250);
 
-/// Something to say, until something else is.
+/// A message that is shown until the next one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// In words.
+    /// The text.
     pub text: String,
-    /// Whether something went wrong.
+    /// Whether it reports an error.
     pub is_error: bool,
 }
 
-/// Who says how bright the picture is.
+/// How the exposure is chosen.
 #[derive(Clone, Copy, Debug)]
 enum Metered {
-    /// The camera, or a factor that was asked for.
+    /// By the camera, or by a given factor.
     Not(Option<f32>),
-    /// The camera, unless the first look at the meter says that it cannot be so.
+    /// By the camera, unless the first measurement clips too much.
     IfNeeded,
-    /// The meter.
+    /// By metering.
     Always(Adaptation),
 }
 
@@ -51,40 +51,40 @@ impl Metered {
     }
 }
 
-/// What is known of the light that was baked here.
+/// Facts about the light that was baked in this session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightFacts {
-    /// Which of the bakes it is from.
+    /// The name of the pass that it comes from.
     pub pass: &'static str,
-    /// Its estimated relative error.
+    /// Estimated relative error.
     pub error: f64,
-    /// Whether an even sky was put over the file.
+    /// Whether a uniform sky was added to the file.
     pub under_a_sky: bool,
-    /// Whether nothing better follows.
+    /// Whether it comes from the last pass.
     pub is_final: bool,
-    /// Surfaces that have a lightmap.
+    /// Number of surfaces with a lightmap.
     pub surfaces: usize,
 }
 
-/// A file in the window, and what is done with it.
+/// A file in the window, and the work on it.
 pub struct Viewing {
     /// The file.
     pub opened: Opened,
     options: OpenOptions,
     opening: Option<(PathBuf, Receiver<Result<Opened, GameError>>)>,
     bake: Option<BackgroundBake>,
-    /// Whether it is written as soon as it has ended.
+    /// Whether the bake is written as soon as it is complete.
     keeps_bake: bool,
     light: Option<LightFacts>,
     metered: Metered,
     since_metered: Option<Duration>,
     message: Option<Message>,
-    /// What was played in a file that another has taken the place of.
+    /// The recording of a file that has since been replaced.
     recording: Option<Recording>,
 }
 
 impl Viewing {
-    /// A file that is open; others are opened by these options.
+    /// Creates the state of an open file; `options` apply to files that are opened later.
     pub fn new(opened: Opened, options: OpenOptions) -> Self {
         let metered = Metered::of(&opened);
         Self {
@@ -101,7 +101,7 @@ impl Viewing {
         }
     }
 
-    /// [`Viewing::new`], and the file is baked at once and written when that has ended.
+    /// Does what [`Viewing::new`] does, and bakes the file at once and writes it when the bake is complete.
     pub fn baking(opened: Opened, options: OpenOptions) -> Self {
         let mut viewing = Self::new(opened, options);
         viewing.toggle_bake();
@@ -109,17 +109,17 @@ impl Viewing {
         viewing
     }
 
-    /// What was played in the first file that was recorded.
+    /// Returns the recording of the first file that was played.
     pub fn take_recording(&mut self) -> Option<Recording> {
         self.recording.take().or_else(|| self.opened.game.take_recording())
     }
 
-    /// Begins to open another file. The old one stands until the new one is there.
+    /// Starts to open another file. The current one stays until the new one is ready.
     pub fn open(&mut self, path: &Path) {
         let (sender, receiver) = channel();
         let (file, options) = (path.to_owned(), self.options.clone());
         let started = thread::Builder::new().name("open".to_owned()).spawn(move || {
-            // The window may be gone, or have been given another file.
+            // The window may be closed, or may be opening another file.
             let _ = sender.send(Opened::open(&file, &options));
         });
         match started {
@@ -146,18 +146,18 @@ impl Viewing {
         self.sync_default_lights();
     }
 
-    /// Ends what runs, as Esc asks for; whether there was anything.
+    /// Cancels the running bake; returns false if there is none.
     pub fn cancel(&mut self) -> bool {
         let baking = self.bake.as_ref().filter(|bake| bake.is_baking());
         baking.inspect(|bake| bake.cancel()).is_some()
     }
 
-    /// Whether nothing is being opened, baked or written.
+    /// Returns true if nothing is being opened, baked or written.
     pub fn is_at_rest(&self) -> bool {
         self.opening.is_none() && !self.bake.as_ref().is_some_and(BackgroundBake::is_running)
     }
 
-    /// Takes over what other threads have done. Whether another file is shown now.
+    /// Takes over the results of other threads. Returns true if another file is shown now.
     pub fn update(&mut self, passed: Duration) -> bool {
         self.take_bake();
         if let Metered::Always(adaptation) = &mut self.metered {
@@ -169,10 +169,10 @@ impl Viewing {
         self.take_opened()
     }
 
-    /// Looks at the meter, if it is time.
+    /// Measures the exposure if it is due.
     ///
     /// # Errors
-    /// What the renderer cannot draw.
+    /// The renderer cannot draw the World.
     pub fn measure(&mut self, stage: &mut Stage, options: &FrameOptions) -> Result<()> {
         let is_due = self.since_metered.is_none_or(|since| since >= METER_EVERY);
         if matches!(self.metered, Metered::Not(_)) || !is_due {
@@ -193,7 +193,7 @@ impl Viewing {
         Ok(())
     }
 
-    /// The exposure of the next frame, if it is not the camera's.
+    /// Returns the exposure of the next frame, or `None` for the camera's.
     pub fn exposure(&self) -> Option<f32> {
         match &self.metered {
             Metered::Not(factor) => *factor,
@@ -202,32 +202,32 @@ impl Viewing {
         }
     }
 
-    /// Whether the exposure adapts.
+    /// Returns true if the exposure adapts.
     pub fn adapts(&self) -> bool {
         matches!(self.metered, Metered::Always(_))
     }
 
-    /// How far the bake is, if one runs.
+    /// Returns the progress of the bake, if one runs.
     pub fn bake_status(&self) -> Option<&BakeStatus> {
         self.bake.as_ref()?.status()
     }
 
-    /// The light that was baked here, if it is shown.
+    /// Returns the light baked in this session, if it is shown.
     pub fn light(&self) -> Option<LightFacts> {
         self.light
     }
 
-    /// Whether there is a bake that can be written.
+    /// Returns true if there is a bake that can be saved.
     pub fn can_save(&self) -> bool {
         self.bake.as_ref().is_some_and(BackgroundBake::can_be_saved)
     }
 
-    /// What there is to say.
+    /// Returns the latest message.
     pub fn message(&self) -> Option<&Message> {
         self.message.as_ref()
     }
 
-    /// Says why nothing can be measured now.
+    /// Shows a message that nothing can be measured while the bake runs.
     pub fn say_that_it_works(&mut self) {
         self.say("what settings cost can be measured when the bake has ended".to_owned());
     }
@@ -254,7 +254,7 @@ impl Viewing {
         self.opening = None;
         match outcome {
             Ok(mut opened) => {
-                // What the keys chose stays chosen.
+                // The choices made by keys persist.
                 opened.game.view = self.opened.game.view;
                 let recording = self.take_recording();
                 *self = Self { recording, ..Self::new(opened, self.options.clone()) };
@@ -330,7 +330,7 @@ impl Viewing {
         }
     }
 
-    /// Lights from the camera stand in where there is no other light: not while baked light is shown.
+    /// Default lights from the camera replace missing light, so they are off while baked light is shown.
     fn sync_default_lights(&mut self) {
         let game = &mut self.opened.game;
         let lit = self.light.is_some_and(|light| light.surfaces > 0) && game.view.lightmaps;
@@ -354,7 +354,7 @@ impl Viewing {
         self.since_metered = None;
     }
 
-    /// Where the picture is taken from, in words.
+    /// Describes where the picture is taken from.
     pub fn viewpoint(&self) -> String {
         let game = &self.opened.game;
         match game.viewpoint() {

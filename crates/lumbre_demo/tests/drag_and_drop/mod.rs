@@ -1,5 +1,5 @@
-//! The other side of drag and drop on X11: a program, such as a file manager, that drops a file on a window (freedesktop's XDND protocol,
-//! version 5). Not what our window does with it.
+//! The source side of drag and drop on X11: simulates a program, such as a file manager, that drops a file on
+//! a window (freedesktop's XDND protocol, version 5).
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -15,19 +15,20 @@ use x11rb::protocol::xproto::{
 use x11rb::rust_connection::RustConnection;
 use x11rb::wrapper::ConnectionExt as _;
 
-/// Far more than a window needs to open and to answer.
+/// Far more time than a window needs to open and to answer.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// Between two looks at a server that does not say when a window appears.
+/// Interval of polling: the server does not report new windows.
 const PAUSE: Duration = Duration::from_millis(20);
 const VERSION: u32 = 5;
 
-/// Drops a file on the first window of a display that takes files, and returns when that window has taken it.
+/// Drops a file on the first window of a display that accepts files, and returns when the window has accepted
+/// it.
 pub fn drop_file(display: &str, file: &Path) -> anyhow::Result<()> {
     let dragging = Dragging::begin(display)?;
     let target = dragging.wait_for_a_window()?;
     dragging.enter(target)?;
     dragging.move_over(target)?;
-    // The window asks for the data while the pointer is above it, and says whether it takes them.
+    // While the pointer is over the window, it may request the data, and it answers whether it accepts them.
     dragging.serve_until(dragging.atoms.status, file)?;
     dragging.let_go(target)?;
     dragging.serve_until(dragging.atoms.finished, file)
@@ -92,7 +93,7 @@ impl Dragging {
         while begun.elapsed() < PATIENCE {
             for window in self.server.query_tree(self.root)?.reply()?.children {
                 let aware = self.server.get_property(false, window, self.atoms.aware, AtomEnum::ANY, 0, 1)?;
-                // A window may vanish between the two questions.
+                // The window may disappear between the two requests.
                 if aware.reply().is_ok_and(|property| property.value_len > 0) {
                     return Ok(window);
                 }
@@ -125,7 +126,8 @@ impl Dragging {
         Ok(())
     }
 
-    /// Hands out the file's address whenever it is asked for, until the window answers with `answer` and says that it accepts.
+    /// Sends the file's URI whenever it is requested, until the window sends the message `answer` and
+    /// accepts.
     fn serve_until(&self, answer: Atom, file: &Path) -> anyhow::Result<()> {
         let begun = Instant::now();
         while begun.elapsed() < PATIENCE {
@@ -165,7 +167,7 @@ impl Dragging {
     }
 }
 
-/// A path as it stands in an address: what is not plain is written as `%20`.
+/// Encodes a path for a URI: special characters become `%20` and the like.
 fn percent_encoded(path: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"/-._~".contains(&byte);
     path.bytes()

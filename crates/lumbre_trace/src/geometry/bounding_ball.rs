@@ -1,29 +1,32 @@
-//! Balls around exact surfaces, which tell most rays that they pass by before anything is divided. Does not intersect the surfaces: see `quadric`.
+//! Bounding spheres of exact surfaces, by which most rays are rejected early, before any division. The
+//! intersection itself is in `quadric`.
 
 use glam::{DAffine3, DVec3};
 use lumbre_scene::{Quadric, QuadricShape};
 
-/// A ball that holds all points of a surface.
+/// A sphere that contains all points of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundingBall {
     middle: DVec3,
     squared_radius: f64,
 }
 
-/// The ball is larger by this part of its squared radius, for points that lie outside of the surface by rounding.
+/// Enlargement of the squared radius, as a fraction of it, for points that lie outside of the surface by
+/// rounding.
 const ROOM: f64 = 1e-6;
-/// Rounding of squared distances, relative to the squared distance of the ball, with room.
+/// Rounding error of squared distances, relative to the squared distance of the sphere's centre, with a
+/// margin.
 const ROUNDING: f64 = 1e-12;
 
 impl BoundingBall {
-    /// Returns the ball around a quadric at a place, or nothing where the quadric has no end.
+    /// Returns the bounding sphere of a quadric with a transform, or `None` if the quadric is infinite.
     pub fn of(quadric: &Quadric, place: &DAffine3) -> Option<Self> {
         let (middle, radius) = match (quadric.shape, quadric.trim) {
             (QuadricShape::Sphere { radius }, None) => (DVec3::ZERO, radius * largest_stretch(place)),
             _ => {
                 let [low, high] = quadric.bounds();
                 let half = 0.5 * (high - low);
-                // Half of the corners: the others lie opposite to them.
+                // Half of the corners: the others are opposite to them.
                 let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
                 let length =
                     |(x, y): (f64, f64)| place.transform_vector3(half * DVec3::new(x, y, 1.0)).length();
@@ -34,7 +37,8 @@ impl BoundingBall {
         (middle.is_finite() && squared_radius.is_finite()).then_some(Self { middle, squared_radius })
     }
 
-    /// Returns whether a ray has no point in the ball up to a distance, in units of its direction, which may have any length.
+    /// Returns true if no point of a ray up to `farthest` is inside the sphere. `farthest` is in units of
+    /// `direction`, which may have any length.
     pub fn is_missed(&self, origin: DVec3, direction: DVec3, farthest: f64) -> bool {
         let apart = self.middle - origin;
         let squared_distance = apart.length_squared();
@@ -42,14 +46,14 @@ impl BoundingBall {
         let (along, squared) = (apart.dot(direction), direction.length_squared());
         let beside = squared_distance * squared - along * along > room * squared;
         let behind = along < 0.0 && squared_distance > room;
-        // Metres from the ray's end to the middle's projection, times the direction's length.
+        // From the ray's end to the projection of the centre, in metres, times the length of `direction`.
         let beyond = along - farthest * squared;
         beside || behind || (beyond > 0.0 && beyond * beyond > room * squared)
     }
 }
 
-/// Returns an upper bound of the factor by which a map stretches vectors; exact where its axes stay perpendicular. By Gershgorin's circles around the eigenvalues of
-/// its squared matrix.
+/// Returns an upper bound of the factor by which a transform stretches vectors, exact where its axes stay
+/// perpendicular: Gershgorin's circles around the eigenvalues of its squared matrix.
 fn largest_stretch(place: &DAffine3) -> f64 {
     let squared = place.matrix3.transpose() * place.matrix3;
     let row = |axis: usize| squared.row(axis).abs().element_sum();
@@ -81,7 +85,7 @@ mod tests {
         let (mut met, mut missed, mut passing) = (0, 0, 0);
         for number in 0..40_000u32 {
             let mut numbers = Numbers::new(3, number >> 12, number & 0xfff);
-            // Far from the origin, and with sheared and mirrored axes.
+            // Far from the origin, with sheared and mirrored axes.
             let size = 10f64.powf(8.0 * numbers.next() - 2.0);
             let shear =
                 DMat3::from_cols(DVec3::X, DVec3::new(numbers.next(), -1.0, 0.2), DVec3::Z * numbers.next());
@@ -92,7 +96,7 @@ mod tests {
             let place = DAffine3::from_mat3_translation(turn * shear, vector(&mut numbers) * size);
             let quadric = &shapes[number as usize % shapes.len()];
             let Some(ball) = BoundingBall::of(quadric, &place) else { panic!("{quadric:?} has an end") };
-            // Towards the surface's surroundings, from near by or far away.
+            // The rays start near or far away and point towards the surroundings of the surface.
             let origin = place.translation + vector(&mut numbers) * 10f64.powf(4.0 * numbers.next() - 0.5);
             let direction =
                 (place.translation + 2.0 * vector(&mut numbers) - origin) * (0.1 + numbers.next());

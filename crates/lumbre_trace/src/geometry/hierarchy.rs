@@ -1,4 +1,5 @@
-//! All surfaces of a scene, and the questions that rays ask of them: what is met first, and whether anything is. Not what happens there.
+//! All surfaces of a scene, triangles and quadrics, with the queries for the nearest hit and for any hit.
+//! What happens at a hit is decided elsewhere.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use lumbre_rays::{Bvh, Ray};
@@ -8,7 +9,7 @@ use super::bounding_ball::BoundingBall;
 use super::quadric::{QuadricHit, QuadricSurface};
 use super::ray::SpaceRay;
 
-/// The surfaces.
+/// All surfaces of a scene.
 #[derive(Debug)]
 pub(crate) struct Geometry {
     bvh: Bvh,
@@ -16,13 +17,13 @@ pub(crate) struct Geometry {
     quadrics: Vec<PlacedQuadric>,
 }
 
-/// What there is to know of a triangle that a ray meets, together in memory.
+/// The data of a triangle that is hit, together in memory.
 #[derive(Debug)]
 struct Facet {
     object: u32,
-    /// In its object.
+    /// Index in its object.
     number: u32,
-    /// To its front, unit.
+    /// Unit vector to its front.
     front: Vec3,
 }
 
@@ -30,47 +31,48 @@ struct Facet {
 struct PlacedQuadric {
     object: u32,
     surface: QuadricSurface,
-    /// A ball in the tracer's space that holds all of it, if it has an end.
+    /// A bounding sphere in the tracer's space; `None` if the surface is infinite.
     ball: Option<BoundingBall>,
-    /// From the tracer's space to its own.
+    /// From the tracer's space to the surface's own.
     to_own: DAffine3,
     from_own: DAffine3,
     normals: DMat3,
 }
 
-/// A surface that a ray may meet, before it is known whether it counts.
+/// A surface that a ray crosses, before it is decided whether it counts as a hit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crossing {
     pub object: usize,
-    /// The ray comes to the front.
+    /// Whether the ray comes from the front.
     pub front: bool,
     pub place: Place,
 }
 
-/// Where on its object.
+/// A place on an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Place {
-    /// In a triangle: its number in the object, the weights of its second and third corner.
+    /// In a triangle: its index in the object, and the weights of its second and third corner.
     Triangle { triangle: u32, weights: [f64; 2] },
-    /// On the exact surface: the point, and its unit normal to the front.
+    /// On an exact surface: the point, and its unit normal to the front.
     Exact { point: DVec3, normal: DVec3 },
 }
 
-/// The surface that a ray meets.
+/// The hit of a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meeting {
     pub crossing: Crossing,
-    /// Metres.
+    /// Metres along the ray.
     pub distance: f64,
-    /// Number of the triangle in the scene, if it is one.
+    /// Index of the triangle in the scene; `None` for exact surfaces.
     pub triangle: Option<u32>,
 }
 
-/// Rays end before the exact surface that their end lies on by this part of their length.
+/// Factor on the length of a ray that keeps its end off the exact surface that the end lies on.
 const EXACTLY_SHORT: f64 = 1.0 - 1e-9;
 
 impl Geometry {
-    /// `triangles` lists the corners of each, counter-clockwise seen from its front, with its object and its number there.
+    /// Builds the hierarchy. `triangles` lists the corners of each, counter-clockwise seen from its front,
+    /// with its object and its index there.
     pub fn build(
         triangles: Vec<([Vec3; 3], (u32, u32))>,
         quadrics: &[(usize, Quadric, DAffine3, DMat3)],
@@ -102,7 +104,7 @@ impl Geometry {
         }
     }
 
-    /// The nearest surface up to a distance for which `accept` holds.
+    /// Returns the nearest hit up to a distance that `accept` takes.
     pub fn closest(
         &self,
         ray: &SpaceRay,
@@ -111,7 +113,8 @@ impl Geometry {
     ) -> Option<Meeting> {
         let short = ray.for_triangles(farthest);
         let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
-        // The nearest of all is nearly always accepted: only then the others are asked too.
+        // The nearest hit of all is nearly always accepted; the slower filtered query is needed only if it is
+        // not.
         let found = self.bvh.closest_hit(&short).and_then(|hit| {
             let (u, v) = hit.barycentric;
             if accepted(hit.triangle, u, v) {
@@ -134,14 +137,16 @@ impl Geometry {
         nearest
     }
 
-    /// Whether a surface for which `accept` holds lies between the ray's start and the point at a distance, which may be infinite.
+    /// Returns true if a surface that `accept` takes lies between the ray's start and the point at a
+    /// distance, which may be infinite.
     pub fn any_between(&self, ray: &SpaceRay, distance: f64, accept: impl Fn(&Crossing) -> bool) -> bool {
         let short = short_of_end(ray, distance);
         let accepted = |triangle, u, v| accept(&self.crossing(short.direction, triangle, u, v));
         self.bvh.any_hit_filtered(&short, accepted) || self.any_exact_between(ray, distance, &accept)
     }
 
-    /// The same where every surface counts.
+    /// Returns true if any surface lies between the ray's start and the point at a distance, which may be
+    /// infinite.
     pub fn anything_between(&self, ray: &SpaceRay, distance: f64) -> bool {
         self.bvh.any_hit(&short_of_end(ray, distance)) || self.any_exact_between(ray, distance, &|_| true)
     }
@@ -151,23 +156,23 @@ impl Geometry {
         self.quadrics.iter().any(|quadric| quadric.closest(ray, farthest, accept).is_some())
     }
 
-    /// The object and the number there of a triangle of the scene.
+    /// Returns the object of a triangle, and the triangle's index there.
     pub fn owner(&self, triangle: u32) -> (usize, u32) {
         let facet = &self.triangles[triangle as usize];
         (facet.object as usize, facet.number)
     }
 
-    /// What there is beside triangles, as it says of itself.
+    /// Returns the exact surfaces, to be hashed by their `Debug` output.
     pub fn exact_surfaces(&self) -> &impl std::fmt::Debug {
         &self.quadrics
     }
 
-    /// The triangles alone.
+    /// Returns the hierarchy of the triangles alone.
     pub fn hierarchy(&self) -> &Bvh {
         &self.bvh
     }
 
-    /// How many triangles there are.
+    /// Returns the number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
     }
@@ -183,7 +188,7 @@ impl Geometry {
     }
 }
 
-/// Not as far as the surface that a ray's end lies on.
+/// Ends the ray short of a surface that its end point lies on.
 fn short_of_end(ray: &SpaceRay, distance: f64) -> Ray {
     if distance.is_finite() { ray.between_triangles(distance) } else { ray.for_triangles(distance) }
 }
@@ -194,7 +199,7 @@ impl PlacedQuadric {
         if self.ball.is_some_and(|ball| ball.is_missed(origin, ray.direction, farthest)) {
             return None;
         }
-        // Distances are in units of the direction, which is not made unit, so that they are the same in both spaces.
+        // The transformed direction is not normalized, so that distances are the same in both spaces.
         let origin = self.to_own.transform_point3(origin);
         let direction = self.to_own.transform_vector3(ray.direction);
         let crossing = |hit: &QuadricHit| {

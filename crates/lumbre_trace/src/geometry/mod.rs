@@ -1,4 +1,5 @@
-//! Where rays meet surfaces: triangles by `lumbre_rays`, quadrics by their equations. No light and no materials.
+//! Intersection of rays with surfaces: triangles by `lumbre_rays`, quadrics by their equations. Nothing here
+//! knows materials or light.
 
 mod bounding_ball;
 mod hierarchy;

@@ -1,16 +1,18 @@
-//! Rays against quadrics, in f64: planes, spheres, cylinders, cones and whatever else has an equation of the second degree. Not triangles.
+//! Ray intersection with quadrics in f64: planes, spheres, cylinders, cones and all other surfaces of the
+//! second degree. Triangles are in `lumbre_rays`.
 //!
 //! # Stability
-//! The textbook's discriminant b² - 4ac loses all its digits where the ray starts far away: at 10⁶ radii both terms are 10¹² times their
-//! difference. Here the ray's start is moved to where it passes the surface's middle, and then to the vertex of the parabola Q(o + t d), where
-//! b all but vanishes and the discriminant is -4ac, a product (after Haines, Günther, Akenine-Möller, "Precision Improvements for Ray/Sphere
-//! Intersection", Ray Tracing Gems, chapter 7, who do it for spheres). The roots are q/a and c/q, without cancellation, and the point is
-//! moved onto the surface by one step of Newton's along the gradient.
+//! The textbook's discriminant b² - 4ac loses all its digits where the ray starts far away: at 10⁶ radii both
+//! terms are 10¹² times their difference. Here the ray's origin is moved to its closest point to the
+//! surface's centre, and then to the vertex of the parabola Q(o + t d), where b all but vanishes and the
+//! discriminant is -4ac, a product (after Haines, Günther, Akenine-Möller, "Precision Improvements for
+//! Ray/Sphere Intersection", Ray Tracing Gems, chapter 7, who do it for spheres). The roots are q/a and c/q,
+//! without cancellation, and the point is moved onto the surface by one Newton step along the gradient.
 
 use glam::{DMat3, DVec3};
 use lumbre_scene::{Quadric, QuadricShape};
 
-/// A surface p·A p + b·p + c = 0 within a box, with the discs that close it.
+/// A surface p·A p + b·p + c = 0, clipped by a box, with the discs that close it.
 #[derive(Clone, Debug)]
 pub(crate) struct QuadricSurface {
     second: DMat3,
@@ -20,34 +22,34 @@ pub(crate) struct QuadricSurface {
     caps: Vec<Cap>,
 }
 
-/// A disc at a height, facing away from the origin.
+/// A disc at a height on the y axis, facing away from the origin.
 #[derive(Clone, Copy, Debug)]
 struct Cap {
     height: f64,
     radius: f64,
 }
 
-/// Where a ray meets a surface.
+/// The hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct QuadricHit {
     /// In units of the direction.
     pub distance: f64,
     pub point: DVec3,
-    /// To the front, of any length but 0.
+    /// Towards the front, of any length but 0.
     pub normal: DVec3,
 }
 
-/// How far outside of its box a point may lie by rounding, as a part of the box.
+/// Tolerance of the box for rounding, as a fraction of its size.
 const BOX_ERROR: f64 = 1e-9;
 
 impl QuadricSurface {
-    /// Of a shape that is valid.
+    /// Prepares a shape that was validated.
     pub fn new(quadric: &Quadric) -> Self {
         let (mut second, mut first, mut constant) = (DMat3::ZERO, DVec3::ZERO, 0.0);
         let mut caps = Vec::new();
         match quadric.shape {
             QuadricShape::Plane => first = DVec3::Y,
-            // Divided by the radius, so that the gradient is of one size whatever the radius.
+            // Divided by the radius, so that the gradient's length does not depend on it.
             QuadricShape::Sphere { radius } => {
                 second = DMat3::from_diagonal(DVec3::splat(1.0 / radius));
                 constant = -radius;
@@ -78,7 +80,8 @@ impl QuadricSurface {
         Self { second, first, constant, bounds: quadric.bounds(), caps }
     }
 
-    /// The nearest point of a ray in the surface's own space at a distance in [0, `farthest`] that `accept` takes.
+    /// Returns the nearest hit of a ray in the surface's own space at a distance in [0, `farthest`] that
+    /// `accept` takes.
     pub fn closest(
         &self,
         origin: DVec3,
@@ -118,14 +121,15 @@ impl QuadricSurface {
         2.0 * (self.second * point) + self.first
     }
 
-    /// Distances along the ray of the two points of the equation, in no order, each with its point to within rounding.
+    /// Returns the distances along the ray of the two roots of the equation, in no order, each with its point
+    /// to within rounding.
     fn roots(&self, origin: DVec3, direction: DVec3) -> [Option<(f64, DVec3)>; 2] {
         let squared = direction.length_squared();
         if !(squared > 0.0 && squared.is_finite() && origin.is_finite()) {
             return [None, None];
         }
         let a = direction.dot(self.second * direction);
-        // To where the ray passes the middle, then to the vertex of its parabola.
+        // First to the ray's closest point to the centre, then to the vertex of its parabola.
         let mut moved = -origin.dot(direction) / squared;
         let mut start = origin + direction * moved;
         let slope = |start: DVec3| direction.dot(self.gradient(start));
@@ -147,12 +151,12 @@ impl QuadricSurface {
             distance.is_finite().then(|| (distance, start + direction * step))
         };
         let near = if a != 0.0 { root(q / a) } else { None };
-        // A double root is one point, and q is 0 only there.
+        // A double root is one point; q is 0 only there.
         let far = if q != 0.0 { root(c / q) } else { None };
         [near, far]
     }
 
-    /// One step of Newton's along the gradient.
+    /// Takes one Newton step along the gradient.
     fn onto_surface(&self, point: DVec3) -> DVec3 {
         let gradient = self.gradient(point);
         let squared = gradient.length_squared();
@@ -166,7 +170,7 @@ impl QuadricSurface {
         point.cmpge(low - room).all() && point.cmple(high + room).all()
     }
 
-    /// Whether the ray meets the box, a little widened.
+    /// Returns true if the ray crosses the slightly enlarged box.
     fn may_meet(&self, origin: DVec3, direction: DVec3, farthest: f64) -> bool {
         let (mut enter, mut leave) = (0.0_f64, farthest);
         for axis in 0..3 {

@@ -1,4 +1,4 @@
-//! From a World to what the tracer reads of it: the same components as a frame, in the tracer's space. Not the rays.
+//! Reads the components of a World that a frame is drawn from, and places them in the tracer's space.
 
 use std::sync::Arc;
 
@@ -16,15 +16,15 @@ use super::emissive_polygons::{EmissivePolygon, emissive_polygons};
 use super::object::Object;
 use crate::TraceError;
 
-/// A light and where it stands in the tracer's space.
+/// A light and its position in the tracer's space.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedLight {
     pub light: Light,
     pub position: DVec3,
-    /// Unit: where it shines.
+    /// Unit vector in which it shines.
     pub axis: DVec3,
     pub name: String,
-    /// Objects that do not hide it: what glows and has the light inside of its box is the lamp's bulb.
+    /// Objects that do not block it: an emissive object whose box contains the light is the lamp's bulb.
     pub bulbs: Vec<usize>,
 }
 
@@ -38,12 +38,12 @@ impl PlacedLight {
     }
 }
 
-/// What was found in a World.
+/// Everything that was read from a World.
 #[derive(Debug)]
 pub(crate) struct Collected {
     pub settings: SceneSettings,
     pub objects: Vec<Object>,
-    /// The exact surface of an object, in its own space.
+    /// Exact surfaces, each with the index of its object, in the object's own space.
     pub quadrics: Vec<(usize, Quadric)>,
     pub lights: Vec<PlacedLight>,
     pub polygons: Vec<EmissivePolygon>,
@@ -61,7 +61,9 @@ type Found<'a> = (
 type PlacedVolume = (Arc<IrradianceVolume>, VolumePlace);
 type FoundLight<'a> = (Entity, &'a Light, &'a GlobalTransform, Option<&'a Name>);
 
-/// Everything that is shown, with `origin` as the tracer's origin. `reflection` in place of the scene's model, if it is given.
+/// Reads everything that is visible, with `origin` as the tracer's origin. `reflection` replaces every
+/// object's reflection model if it is given; the array says whether lightmaps and irradiance volumes are
+/// read.
 pub(crate) fn collect(
     world: &mut World,
     origin: DVec3,
@@ -100,7 +102,7 @@ pub(crate) fn collect(
         let textures = textures.cloned().unwrap_or_default();
         let normals = GlobalTransform(place).normal_matrix();
         let largest = normals.to_cols_array().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        // One that has a lightmap takes no other, whether it is read or not.
+        // An object with a lightmap is never lit by a volume, whether the lightmap is read or not.
         let mapped = lightmap.is_some() && !mesh.0.uv1.is_empty();
         let volume =
             nearest_volume(&volumes, |(_, place)| place, middle(&mesh.0, &place)).filter(|_| !mapped);
@@ -142,7 +144,7 @@ fn relative(place: &GlobalTransform, origin: DVec3) -> DAffine3 {
     DAffine3 { translation: place.0.translation - origin, ..place.0 }
 }
 
-/// The volumes that can be used, in the tracer's space.
+/// Returns the valid irradiance volumes, placed in the tracer's space.
 fn placed_volumes(world: &mut World, origin: DVec3, notes: &mut Vec<String>) -> Vec<PlacedVolume> {
     let mut query = world.query::<(Entity, &IrradianceVolume, Option<&GlobalTransform>)>();
     let mut found: Vec<_> = query.iter(world).collect();
@@ -158,7 +160,8 @@ fn placed_volumes(world: &mut World, origin: DVec3, notes: &mut Vec<String>) -> 
     volumes
 }
 
-/// The middle of the box around a mesh in its place, as a frame has it.
+/// Returns the centre of a mesh's bounding box in the tracer's space, by which a frame too chooses the
+/// volume.
 fn middle(mesh: &TriangleMesh, place: &DAffine3) -> DVec3 {
     let positions = || mesh.positions.iter().map(|position| position.as_dvec3());
     let low = positions().fold(DVec3::INFINITY, DVec3::min);
@@ -166,7 +169,7 @@ fn middle(mesh: &TriangleMesh, place: &DAffine3) -> DVec3 {
     place.transform_point3(0.5 * (low + high))
 }
 
-/// The lights that are on, in the order of their entities.
+/// Returns the enabled lights, in the order of their entities.
 fn lights(
     world: &World,
     lamps: &QueryState<FoundLight<'static>>,
@@ -191,7 +194,7 @@ fn lights(
     lights
 }
 
-/// The mesh as its normal map needs it.
+/// Returns the mesh with the tangents that its normal map needs.
 fn with_tangents(mesh: &Arc<TriangleMesh>, textures: &MaterialTextures) -> Arc<TriangleMesh> {
     let Some(map) = textures.normal.as_ref().filter(|_| mesh.tangents.is_empty()) else {
         return Arc::clone(mesh);
@@ -203,13 +206,13 @@ fn with_tangents(mesh: &Arc<TriangleMesh>, textures: &MaterialTextures) -> Arc<T
     mesh.with_tangents(set).map_or_else(|_| Arc::clone(mesh), Arc::new)
 }
 
-/// Whether the entity or what it hangs from moves: the baker leaves it out then.
+/// Returns true if the entity or one of its ancestors moves; the baker leaves such emitters out.
 fn moves(world: &World, entity: Entity) -> bool {
     let above = |entity: &Entity| world.get::<ChildOf>(*entity).map(ChildOf::parent);
     std::iter::successors(Some(entity), above).any(|entity| world.get::<DynamicObject>(entity).is_some())
 }
 
-/// What a person calls it: its own name, its node's, or its mesh's.
+/// Returns the name shown to the user: the entity's own, its node's, or its mesh's.
 fn name(world: &World, entity: Entity, primitive: Option<&Primitive>) -> String {
     let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
     let named = [Some(entity), parent].into_iter().flatten().find_map(|entity| world.get::<Name>(entity));

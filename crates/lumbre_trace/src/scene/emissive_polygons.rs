@@ -1,5 +1,6 @@
-//! The faces of objects that light others in a frame, as few evenly shining polygons: two triangles of one colour that make a parallelogram
-//! become one. Not the emissive triangles that paths meet.
+//! The emissive faces that light other objects in a frame, as few uniform polygons as possible: two triangles
+//! of one colour that form a parallelogram become one. Paths sample the emissive triangles themselves, in
+//! `light_sampling`.
 
 use std::collections::HashMap;
 
@@ -11,22 +12,22 @@ use lumbre_scene::EmissiveLight;
 use super::object::Object;
 use super::texture::sample_color;
 
-/// How far, as a part of its diagonal, the fourth corner of a parallelogram may lie from where it should.
+/// Tolerance for the fourth corner of a parallelogram, as a fraction of its diagonal.
 const TOLERANCE: f64 = 1e-6;
-/// Points along an edge at which an emissive texture is read.
+/// Number of points along an edge at which an emissive texture is read.
 const TEXTURE_POINTS: u32 = 8;
 
-/// A polygon that shines.
+/// An emissive polygon.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EmissivePolygon {
     pub light: PolygonLight,
-    /// Index of the object whose face it is: no object lights itself.
+    /// Index of the object that it is a face of. No object lights itself.
     pub emitter: usize,
-    /// A lightmap has its diffuse light.
+    /// Whether lightmaps already contain its diffuse light.
     pub baked: bool,
 }
 
-/// Those of one object, in the tracer's space.
+/// Returns the emissive polygons of one object, in the tracer's space.
 pub(crate) fn emissive_polygons(index: usize, object: &Object, baked: bool) -> Vec<EmissivePolygon> {
     let [front, back] = EmissiveLight::radiance(&object.material).map(|color| color.as_dvec3());
     let mut polygons = Vec::new();
@@ -46,7 +47,7 @@ pub(crate) fn emissive_polygons(index: usize, object: &Object, baked: bool) -> V
     polygons
 }
 
-/// Its faces without radiance, each with the mean of the emissive texture.
+/// Returns the faces of an object without radiance, each with the mean colour of its emissive texture.
 fn faces(object: &Object) -> Vec<(PolygonLight, DVec3)> {
     let mesh = &object.shape;
     let corner = |vertex: u32| object.place.transform_point3(mesh.positions[vertex as usize].as_dvec3());
@@ -77,7 +78,7 @@ fn faces(object: &Object) -> Vec<(PolygonLight, DVec3)> {
                 let [a, b, c] = [0, 1, 2].map(|next| triangle[(apex + next) % 3]);
                 faces[other] = None;
                 faces.push(Some((face([a, b, c], false), DVec3::ONE)));
-                // It is half of a polygon now, and of no other.
+                // It is now half of a parallelogram and cannot be part of another.
                 left.retain(|_, (half, _)| *half != other);
             }
             None => {
@@ -91,7 +92,7 @@ fn faces(object: &Object) -> Vec<(PolygonLight, DVec3)> {
     faces.into_iter().flatten().collect()
 }
 
-/// Mean of the emissive texture over a triangle: the texels at the middles of 64 equal pieces.
+/// Returns the mean of the emissive texture over a triangle, read at the centroids of 64 equal pieces.
 fn mean_texel(object: &Object, triangle: [u32; 3]) -> DVec3 {
     let Some(texture) = &object.textures.emissive else { return DVec3::ONE };
     let coordinates = if texture.tex_coord == 0 { &object.shape.uv0 } else { &object.shape.uv1 };
@@ -100,7 +101,8 @@ fn mean_texel(object: &Object, triangle: [u32; 3]) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for row in 0..TEXTURE_POINTS {
         for column in 0..TEXTURE_POINTS {
-            // The upright triangle of the cell, or beyond the diagonal the other one of the cell across it.
+            // The upright triangle of the cell or, beyond the diagonal, the inverted triangle of the mirrored
+            // cell.
             let (i, j, third) = match row + column < TEXTURE_POINTS {
                 true => (row, column, 1.0),
                 false => (TEXTURE_POINTS - 1 - row, TEXTURE_POINTS - 1 - column, 2.0),

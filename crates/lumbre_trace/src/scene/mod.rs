@@ -1,4 +1,5 @@
-//! The World as the tracer reads it, once: objects, lights, settings, and the surfaces that rays meet. Not the light.
+//! The World as the tracer reads it, once: objects, lights, settings and the surfaces that rays hit. Light
+//! transport is not here.
 
 mod collect;
 mod emissive_polygons;
@@ -19,30 +20,30 @@ pub(crate) use emissive_polygons::EmissivePolygon;
 pub(crate) use object::{Object, Passage};
 pub(crate) use texture::{sample_color, sample_lightmap, sample_linear};
 
-/// The scene.
+/// The scene of a picture.
 #[derive(Debug)]
 pub(crate) struct Scene {
     pub settings: SceneSettings,
-    /// Where the tracer's origin stands in the world, metres.
+    /// Position of the tracer's origin in the world, metres.
     pub origin: DVec3,
     pub objects: Vec<Object>,
     pub lights: Vec<PlacedLight>,
-    /// Faces that light others in a frame.
+    /// Faces that light other objects in a frame.
     pub polygons: Vec<EmissivePolygon>,
     pub geometry: Geometry,
-    /// Of every object, what rays ask of all that they meet.
+    /// For every object, what rays need to know of it.
     passable: Vec<Passable>,
-    /// Some objects let light past in part.
+    /// Whether any object lets part of the light pass, by transmission or alpha blending.
     pub see_through: bool,
-    /// Some objects have holes by their texture.
+    /// Whether any object has holes, by an alpha mask.
     pub holes: bool,
-    /// Some objects have an inside that light is refracted into.
+    /// Whether any object is a refracting solid.
     pub solids: bool,
     /// What was left out, and why.
     pub notes: Vec<String>,
 }
 
-/// What becomes of a ray at an object, in few bytes: rays ask it of thousands of triangles a pixel.
+/// How an object affects rays, in few bytes, since it is read for thousands of triangles per pixel.
 #[derive(Clone, Copy, Debug)]
 struct Passable {
     passage: Passage,
@@ -51,13 +52,15 @@ struct Passable {
     solid: bool,
 }
 
-/// From so many metres off the world's origin on, the tracer has an origin of its own, as a frame has.
+/// Beyond this distance of the eye from the world's origin, in metres, the eye becomes the tracer's origin,
+/// as in a frame.
 const FAR: f64 = 512.0;
-/// As many triangles as the hierarchy numbers.
+/// Largest number of triangles that the hierarchy can index.
 const MOST_TRIANGLES: usize = 1 << 29;
 
 impl Scene {
-    /// Reads a World whose global transforms are up to date, seen from an eye, with its lightmaps and its irradiance volumes or without.
+    /// Reads a World whose global transforms are up to date, for an eye. `baked_light` says whether lightmaps
+    /// and irradiance volumes are read.
     pub fn new(
         world: &mut World,
         eye: DVec3,
@@ -103,27 +106,30 @@ impl Scene {
         })
     }
 
-    /// Whether a ray that looks sees a surface there: not the back of what has none, nor a hole in a texture.
+    /// Returns true if a viewing ray sees the surface there: it is neither a culled back nor a hole in an
+    /// alpha mask.
     pub fn is_seen(&self, crossing: &Crossing) -> bool {
         (crossing.front || self.passable[crossing.object].shows_back) && self.blocks(crossing)
     }
 
-    /// Whether a surface stands in the light's way there, wholly or in part: both sides do.
+    /// Returns true if the surface blocks light there, wholly or in part. Both sides do, but not the holes in
+    /// an alpha mask.
     pub fn blocks(&self, crossing: &Crossing) -> bool {
         self.passable[crossing.object].passage != Passage::Cut || !self.is_hole(crossing)
     }
 
-    /// How rays get past an object.
+    /// Returns how rays pass an object.
     pub fn passage(&self, object: usize) -> Passage {
         self.passable[object].passage
     }
 
-    /// Whether an object has an inside that light is refracted into.
+    /// Returns true if an object is a refracting solid.
     pub fn is_solid(&self, object: usize) -> bool {
         self.passable[object].solid
     }
 
-    /// Whether light gets past an object there in part, straight on, and solids that refract count too or not.
+    /// Returns true if light passes an object in part, in a straight line; refracting solids count only if
+    /// `with_solids`.
     pub fn is_open(&self, object: usize, with_solids: bool) -> bool {
         let object = self.passable[object];
         match object.passage {
@@ -133,12 +139,12 @@ impl Scene {
         }
     }
 
-    /// A hash of all that rays can tell of it.
+    /// Returns a hash of everything that affects rays.
     pub fn fingerprint(&self) -> Fingerprint {
         of_debug(&(&self.settings, self.origin, &self.objects, &self.lights, self.geometry.exact_surfaces()))
     }
 
-    /// Whether some objects are lit by lightmaps or irradiance volumes.
+    /// Returns true if any object is lit by a lightmap or an irradiance volume.
     pub fn has_baked_light(&self) -> bool {
         self.objects.iter().any(|object| object.lightmap.is_some() || object.volume.is_some())
     }
@@ -164,14 +170,14 @@ impl Passable {
 }
 
 impl Object {
-    /// The corners of a triangle in the tracer's space, counter-clockwise seen from its front.
+    /// Returns the corners of a triangle in the tracer's space, counter-clockwise seen from its front.
     pub fn corners(&self, triangle: [u32; 3]) -> [DVec3; 3] {
         let [a, b, c] = triangle
             .map(|vertex| self.place.transform_point3(self.shape.positions[vertex as usize].as_dvec3()));
         if self.mirrored { [a, c, b] } else { [a, b, c] }
     }
 
-    /// The vertices of a triangle in the same order, and the weights of a place in it.
+    /// Returns the vertices of a triangle in the same order, and their weights at a place in it.
     pub fn vertices(&self, triangle: u32, [second, third]: [f64; 2]) -> ([usize; 3], [f64; 3]) {
         let first = 3 * triangle as usize;
         let at = |next: usize| self.shape.indices.get(first + next).map_or(0, |vertex| *vertex as usize);
@@ -179,14 +185,14 @@ impl Object {
         (order, [1.0 - second - third, second, third])
     }
 
-    /// Texture coordinates of a set; 0 on exact surfaces and in meshes without them.
+    /// Returns the texture coordinates of a set; 0 in meshes without them.
     pub fn coordinates(&self, set: u32, vertices: [usize; 3], weights: [f64; 3]) -> DVec2 {
         let list = if set == 0 { &self.shape.uv0 } else { &self.shape.uv1 };
         let uv = |corner: usize| list.get(vertices[corner]).map_or(DVec2::ZERO, |uv| uv.as_dvec2());
         (0..3).map(|corner| uv(corner) * weights[corner]).sum()
     }
 
-    /// Opacity at a place, whatever is done with it: factor, texture and vertex colour.
+    /// Returns the opacity at a place, from factor, texture and vertex colour, whatever the alpha mode.
     pub fn alpha(&self, place: &Place) -> f64 {
         let mut alpha = f64::from(self.material.alpha);
         let Place::Triangle { triangle, weights } = *place else { return alpha };

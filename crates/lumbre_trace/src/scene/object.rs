@@ -1,4 +1,5 @@
-//! What a ray can meet, as the World has it: an object's shape, material and place. Not which ray meets it.
+//! An object that rays can hit: its shape, material and transform, as the World has them. Intersections are
+//! in `geometry`.
 
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use lumbre_scene::{IrradianceVolume, LightmapImage, MaterialTextures, Medium, Vo
 /// One object of the scene.
 #[derive(Debug)]
 pub(crate) struct Object {
-    /// What people call it.
+    /// The name shown to the user.
     pub name: String,
     pub shape: Arc<TriangleMesh>,
     pub material: Material,
@@ -18,33 +19,35 @@ pub(crate) struct Object {
     pub medium: Medium,
     pub model: ReflectionModel,
     pub lightmap: Option<Arc<LightmapImage>>,
-    /// What lights it, if it has no lightmap, and where that stands in the tracer's space.
+    /// The irradiance volume that lights it if it has no lightmap, and the volume's place in the tracer's
+    /// space.
     pub volume: Option<(Arc<IrradianceVolume>, VolumePlace)>,
     /// From the object's space to the tracer's.
     pub place: DAffine3,
-    /// Of unit size, so that what counts as no normal does not depend on the scale.
+    /// Transform of normals, scaled to a largest element of 1, so that the test for a zero normal does not
+    /// depend on the object's scale.
     pub normals: DMat3,
-    /// Its transform mirrors: the second and third corner of every triangle have changed places.
+    /// Whether the transform mirrors; the second and third corner of every triangle are swapped then.
     pub mirrored: bool,
-    /// The scene lights backs as backs.
+    /// Whether the scene lights the backs of double-sided materials with their own normal.
     pub two_sided: bool,
 }
 
-/// How a ray gets past a surface without being reflected.
+/// How a ray passes a surface without being reflected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Passage {
-    /// Not at all.
+    /// Not at all: the surface is opaque.
     Closed,
-    /// Where its texture has a hole.
+    /// Through the holes of its alpha mask.
     Cut,
-    /// In part, straight on: it covers what is behind in part.
+    /// In part and in a straight line, by its opacity.
     Covering,
-    /// In part, through its matter.
+    /// In part, through transmissive material.
     Clear,
 }
 
 impl Object {
-    /// How rays get past it.
+    /// Returns how rays pass the object.
     pub fn passage(&self) -> Passage {
         match self.material.alpha_mode {
             AlphaMode::Mask { .. } => Passage::Cut,
@@ -54,43 +57,43 @@ impl Object {
         }
     }
 
-    /// k_t, 0 for what shows its colour whatever the light.
+    /// Returns k_t; 0 for unlit materials.
     pub fn transmission(&self) -> DVec3 {
         if self.material.unlit { DVec3::ZERO } else { self.material.transmission.as_dvec3() }
     }
 
-    /// k_r.
+    /// Returns k_r; 0 for unlit materials.
     pub fn mirror(&self) -> DVec3 {
         if self.material.unlit { DVec3::ZERO } else { self.material.mirror.as_dvec3() }
     }
 
-    /// It sends light by itself, on either side.
+    /// Returns true if its front or its back is emissive.
     pub fn glows(&self) -> bool {
         let back = self.material.back.as_ref().map_or(Vec3::ZERO, |back| back.emission);
         self.material.front.emission.max(back).max_element() > 0.0
     }
 
-    /// Whether a point lies within the box around its mesh, in its own space.
+    /// Returns true if a point is inside the bounding box of the mesh, in the object's own space.
     pub fn box_holds(&self, point: DVec3) -> bool {
         let own = self.place.inverse().transform_point3(point);
         let positions = || self.shape.positions.iter().map(|position| position.as_dvec3());
         let low = positions().fold(DVec3::INFINITY, DVec3::min);
         let high = positions().fold(DVec3::NEG_INFINITY, DVec3::max);
-        // A sheet has no inside.
+        // A flat mesh has no inside.
         low.cmplt(high).all() && own.cmpge(low).all() && own.cmple(high).all()
     }
 
-    /// k_d E/π of the irradiance volume that lights it.
+    /// Returns k_d E/π of the irradiance volume that lights it, if there is one.
     pub fn volume_light(&self, point: DVec3, normal: DVec3, diffuse: DVec3) -> Option<DVec3> {
         self.volume.as_ref().map(|(volume, place)| diffuse * volume.light(place, point, normal))
     }
 
-    /// It has an inside that light is refracted into.
+    /// Returns true if it is a refracting solid: transmissive and not thin.
     pub fn is_solid(&self) -> bool {
         self.passage() == Passage::Clear && !self.medium.thin
     }
 
-    /// Its back is seen: of what is not, the rasterizer draws none.
+    /// Returns true if its back is visible. Other backs are culled, as in the rasterizer.
     pub fn shows_back(&self) -> bool {
         self.material.double_sided || self.passage() == Passage::Clear
     }

@@ -1,15 +1,16 @@
-//! Textures as a ray meets them: the first level, filtered as magnified, in f64. Not mip levels: pixels are sampled more than once instead.
+//! Texture lookup in f64 on the finest mip level, with the magnification filter. Instead of reading coarser
+//! levels, pixels take several samples.
 
 use glam::{DVec2, DVec3, DVec4};
 use lumbre_optics::decode_srgb_byte;
 use lumbre_scene::{LightmapImage, TextureReference, Wrap};
 
-/// The four channels at coordinates of the texture's own set, as they are stored.
+/// Returns the four channels as stored, in [0, 1], at coordinates of the texture's own set.
 pub(crate) fn sample_linear(texture: &TextureReference, uv: DVec2) -> DVec4 {
     sample(texture, uv, |byte| f64::from(byte) / 255.0)
 }
 
-/// The same of a picture of colours, which is stored with sRGB's curve; alpha has none.
+/// Returns a colour, decoded from sRGB, with linear alpha.
 pub(crate) fn sample_color(texture: &TextureReference, uv: DVec2) -> DVec4 {
     sample(texture, uv, decode_srgb_byte)
 }
@@ -28,7 +29,7 @@ fn sample(texture: &TextureReference, uv: DVec2, decode: impl Fn(u8) -> f64) -> 
         let [red, green, blue, alpha] = [0, 1, 2, 3].map(|channel| image.rgba[at + channel]);
         DVec4::new(decode(red), decode(green), decode(blue), f64::from(alpha) / 255.0)
     };
-    // Coordinates without a number, or beyond what i64 counts, are the first texel's.
+    // Coordinates that are not finite read the first texel; larger ones than i64 can hold are clamped.
     let at = DVec2::new(u, v) * DVec2::new(width as f64, height as f64);
     let at = if at.is_finite() { at.clamp(DVec2::splat(-1e15), DVec2::splat(1e15)) } else { DVec2::ZERO };
     if !texture.sampler.magnify_linear {
@@ -53,7 +54,7 @@ fn wrapped(at: i64, size: i64, wrap: Wrap) -> i64 {
     }
 }
 
-/// A lightmap: E/π, bilinear, clamped to its edge.
+/// Reads a lightmap, which holds E/π, bilinearly and clamped to its edges.
 pub(crate) fn sample_lightmap(image: &LightmapImage, uv: DVec2) -> DVec3 {
     let (width, height) = (i64::from(image.width), i64::from(image.height));
     if image.texels.is_empty() || !uv.is_finite() {

@@ -1,4 +1,4 @@
-//! Small worlds of one subject, and pictures of them.
+//! Small worlds for the tests, and functions that trace them.
 
 #![allow(dead_code, reason = "every test uses its own part of this module")]
 
@@ -12,12 +12,12 @@ use lumbre_optics::{Material, Surface};
 use lumbre_scene::{Camera, Medium, Mesh, Projection, Quadric, SceneSettings, Transform};
 use lumbre_trace::{Branch, Integrator, Kind, Picture, TraceOptions, TraceReport, Tracer, trace};
 
-/// Reflects and sends nothing by itself.
+/// A material that reflects and emits nothing.
 pub fn black() -> Material {
     Material::matt(Vec3::ZERO)
 }
 
-/// A mirror of one weight.
+/// A mirror that reflects this fraction of the light.
 pub fn mirror(weight: f32) -> Material {
     Material { mirror: Vec3::splat(weight), ..black() }
 }
@@ -27,12 +27,12 @@ pub fn glass(ior: f32) -> Material {
     Material { transmission: Vec3::ONE, ior, ..black() }
 }
 
-/// Glass that Fresnel's equations hold for.
+/// Makes glass follow Fresnel's equations.
 pub fn fresnel() -> Medium {
     Medium { fresnel: true, ..Medium::default() }
 }
 
-/// Shines, and reflects a part.
+/// An emissive material that also reflects diffusely.
 pub fn glowing(emission: f32, reflectance: f32) -> Material {
     let front = Surface {
         diffuse: Vec3::splat(reflectance),
@@ -43,12 +43,13 @@ pub fn glowing(emission: f32, reflectance: f32) -> Material {
     Material { front, ..Material::default() }
 }
 
-/// An exact surface at a place. The mesh is what a rasterizer would draw; rays do not read it.
+/// Spawns an exact surface with a transform. Its mesh would be drawn by the rasterizer, and rays do not read
+/// it.
 pub fn exact(world: &mut World, quadric: Quadric, material: Material, place: Transform) -> Entity {
     world.spawn((Mesh(Arc::new(TriangleMesh::default())), quadric, material, place)).id()
 }
 
-/// A camera at `eye` that looks at `target`, of a vertical angle.
+/// Spawns a camera at `eye` that looks at `target`, with a vertical field of view in radians.
 pub fn camera(world: &mut World, eye: DVec3, target: DVec3, vertical_fov: f64) {
     let up = if (target - eye).cross(DVec3::Y).length() < 1e-9 { DVec3::Z } else { DVec3::Y };
     let projection = Projection::Perspective { vertical_fov, aspect: None, near: 1e-6, far: None };
@@ -56,7 +57,7 @@ pub fn camera(world: &mut World, eye: DVec3, target: DVec3, vertical_fov: f64) {
     world.spawn((Camera { projection, exposure: 1.0 }, place));
 }
 
-/// The same in place of the cameras that there are.
+/// Replaces all cameras by a new one.
 pub fn look_from(world: &mut World, eye: DVec3, target: DVec3, vertical_fov: f64) {
     let mut cameras = world.query_filtered::<Entity, With<Camera>>();
     let old: Vec<Entity> = cameras.iter(world).collect();
@@ -66,38 +67,38 @@ pub fn look_from(world: &mut World, eye: DVec3, target: DVec3, vertical_fov: f64
     camera(world, eye, target, vertical_fov);
 }
 
-/// Light from everywhere.
+/// Sets a uniform sky.
 pub fn furnace(world: &mut World, radiance: f32) {
     world.insert_resource(SceneSettings { sky: Vec3::splat(radiance), ..SceneSettings::default() });
 }
 
-/// Options for a small picture.
+/// Options for a small square picture.
 pub fn options(side: u32) -> TraceOptions {
     TraceOptions { size: (side, side), ..TraceOptions::default() }
 }
 
-/// Options for paths.
+/// Options for path tracing a small square picture.
 pub fn paths(side: u32, samples: u32) -> TraceOptions {
     TraceOptions { integrator: Integrator::Path, samples: Some(samples), ..options(side) }
 }
 
-/// The whole picture.
+/// Traces a whole picture.
 pub fn draw(world: &mut World, options: &TraceOptions) -> (Picture, TraceReport) {
     trace(world, options, &|_| ControlFlow::Continue(())).expect("the world can be traced")
 }
 
-/// The ray tree through the middle of a picture: along the line of sight.
+/// Traces the ray tree through the centre of the picture.
 pub fn tree(world: &mut World, options: &TraceOptions) -> Branch {
     let tracer = Tracer::new(world, options).expect("the world can be traced");
     tracer.tree(0.5 * DVec2::new(f64::from(options.size.0), f64::from(options.size.1)))
 }
 
-/// The branch of a kind, if there is one.
+/// Returns the branch of a kind that was not cut off, if there is one.
 pub fn next(branch: &Branch, kind: Kind) -> Option<&Branch> {
     branch.branches.iter().find(|branch| branch.kind == kind && !branch.cut)
 }
 
-/// The last of the transmitted rays.
+/// Follows the transmitted rays and returns the last of them.
 pub fn through(branch: &Branch) -> &Branch {
     let mut last = branch;
     while let Some(branch) = next(last, Kind::Transmitted) {

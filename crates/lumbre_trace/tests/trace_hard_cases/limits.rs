@@ -1,4 +1,4 @@
-//! Deep trees and little weights: what they bring, and what is said of what they leave out.
+//! Deep trees and small weights: what they contribute, and what is reported of what they leave out.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ crate::cases! {
     }
 }
 
-/// The share of light that each mirror leaves.
+/// Fraction of light that each mirror reflects.
 const MIRRORED: f64 = 0.75;
 
 fn series(terms: i32) -> f64 {
@@ -53,7 +53,7 @@ fn what_lies_behind_them_is_within_the_bound() -> Outcome {
     )
 }
 
-/// Sheets behind each other that pass on a part, before a sky of 1.
+/// Transmissive sheets or slabs behind each other, in front of a sky of 1.
 fn sheets(count: u32, passing: f32, thin: bool) -> World {
     let mut world = World::new();
     let material = Material { transmission: Vec3::splat(passing), ior: 1.5, ..black() };
@@ -144,7 +144,8 @@ fn a_weight_below_zero() -> Outcome {
 }
 
 fn trees_of_glass_that_divide() -> Outcome {
-    // Every face divides the light: a tree, not a chain. Together the branches have all of it.
+    // Every face divides the light, so that the rays form a tree and not a chain. Its branches together have
+    // all the light.
     let mut world = sheets(3, 1.0, false);
     let mut media = world.query::<&mut Medium>();
     media.iter_mut(&mut world).for_each(|mut medium| medium.fresnel = true);

@@ -1,5 +1,5 @@
-//! The hard cases of tracing, each with the value that it must give and the bound that it must keep.
-//! `cargo test --workspace --test trace_hard_cases -- --nocapture table` prints them all; each is a test of its own too.
+//! The hard cases of tracing, each with its expected value and the bound that it must keep. `cargo test
+//! --workspace --test trace_hard_cases -- --nocapture table` prints them all; each is also a test of its own.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
@@ -16,7 +16,7 @@ mod table;
 
 use table::Table;
 
-/// The rows, each with what is done about it and the tests that it has elsewhere.
+/// The rows of the table, each with how the tracer deals with the case and which other tests cover it.
 const ROWS: [(&str, &str); 7] = [
     (
         "rays that start on a surface",
@@ -50,7 +50,8 @@ fn whole() -> Table {
     Table::new("Hard cases of tracing", &ROWS, cases)
 }
 
-/// Runs all and prints the table. With LUMBRE_WRITE_TABLES=1 it becomes its part of docs/hard-cases.md too.
+/// Runs all cases and prints the table. With LUMBRE_WRITE_TABLES=1 it also writes the table into
+/// docs/hard-cases.md.
 #[test]
 fn table() {
     let command = "cargo test --workspace --test trace_hard_cases -- --nocapture table";

@@ -1,4 +1,4 @@
-//! Glass in glass, beside glass and against walls, and an eye inside of it.
+//! Glass in glass, beside glass and against walls, and an eye inside glass.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ fn block(world: &mut World, size: Vec3, middle: DVec3, ior: f32) -> Entity {
     world.spawn((mesh, glass(ior), fresnel(), Transform::from_translation(middle))).id()
 }
 
-/// The transmitted rays of a tree, one after another.
+/// Returns the chain of transmitted rays of a tree, beginning with the camera ray.
 fn chain(tree: &Branch) -> Vec<&Branch> {
     let mut chain = vec![tree];
     while let Some(branch) = next(chain[chain.len() - 1], Kind::Transmitted) {
@@ -47,7 +47,7 @@ fn deep(side: u32) -> TraceOptions {
     TraceOptions { depth: Some(200), weight: 0.0, ..options(side) }
 }
 
-/// No mirrored rays, so that a tree is a chain.
+/// Switches Fresnel reflection off, so that a tree has no mirrored rays and is a chain.
 fn clear(world: &mut World) {
     let mut media = world.query::<&mut Medium>();
     media.iter_mut(world).for_each(|mut medium| medium.fresnel = false);
@@ -55,7 +55,7 @@ fn clear(world: &mut World) {
 
 fn two_blocks_of_one_glass_are_one() -> Outcome {
     let mut pairs = Vec::new();
-    // Sizes that f32 holds exactly, and others.
+    // Sizes that f32 can represent exactly, and others.
     for unit in [0.25_f32, 0.1, 7.3] {
         for slant in [0.0, 0.3, 2.0] {
             let mut world = World::new();
@@ -70,7 +70,7 @@ fn two_blocks_of_one_glass_are_one() -> Outcome {
             let sine = slant / slant.hypot(1.0);
             let angle = (sine / 1.5_f64).asin();
             let last = chain[chain.len() - 1];
-            // Where it leaves: through both as through one, 2 d tan φ aside.
+            // Where it leaves: both blocks shift it as one block does, by 2 d tan φ.
             let aside = -last.origin.x / (2.0 * f64::from(unit)) - angle.tan();
             pairs.push((0.0, aside));
         }
@@ -102,7 +102,8 @@ fn a_block_between_others_bends_light_by_its_own_index() -> Outcome {
 }
 
 fn faces_that_overlap_in_part() -> Outcome {
-    // A smaller block on a larger one of the same glass: beside it the ray leaves into air, under it it stays in glass.
+    // A smaller block on a larger one of the same glass: beside the smaller one the ray leaves into air, and
+    // below it the ray stays in glass.
     let mut pairs = Vec::new();
     for (x, faces) in [(0.0, 2.0), (0.7, 2.0), (0.499_99, 2.0), (0.500_01, 2.0)] {
         let mut world = World::new();
@@ -231,7 +232,7 @@ fn absorption_of_each_shell_by_its_own_way() -> Outcome {
 }
 
 fn solids_that_overlap_are_left_in_any_order() -> Outcome {
-    // A from 0 to -2, B from -1 to -3: A is left inside of B, though B was entered last.
+    // A reaches from 0 to -2, B from -1 to -3: the ray leaves A inside B, although it entered B last.
     let mut world = World::new();
     for (middle, tint) in [(-1.0, 0.5_f32), (-2.0, 0.25)] {
         let medium =
@@ -320,7 +321,7 @@ fn an_eye_in_a_tinted_block() -> Outcome {
 }
 
 fn an_eye_a_hair_below_a_face() -> Outcome {
-    // Above the critical angle all is mirrored, wherever below the face the eye is.
+    // Beyond the critical angle all light is mirrored, however close the eye is to the face.
     let mut pairs = Vec::new();
     for below in [1e-3, 1e-5, 1e-6] {
         let mut world = World::new();
@@ -335,7 +336,8 @@ fn an_eye_a_hair_below_a_face() -> Outcome {
 }
 
 fn parallel_rays_that_start_inside_and_outside() -> Outcome {
-    // A wide parallel view that starts in the plane through a ball's middle: what starts in the ball is absorbed by the half of it.
+    // A wide parallel view that starts in the plane through a ball's centre: rays that start inside the ball
+    // pass through half of it and are absorbed there.
     let mut world = World::new();
     let tinted =
         Medium { attenuation_color: Vec3::splat(0.5), attenuation_distance: 1.0, ..Medium::default() };

@@ -1,4 +1,4 @@
-//! Mirrors in mirrors: corners that send light back, kaleidoscopes, long tunnels.
+//! Mirrors in mirrors: corners that send light back, kaleidoscopes and long tunnels.
 
 use std::f64::consts::FRAC_PI_3;
 
@@ -17,7 +17,7 @@ crate::cases! {
     }
 }
 
-/// Two mirrors that face each other, which glow a little.
+/// Two weakly emissive mirrors that face each other.
 pub fn facing_mirrors(weight: f32, emission: f32) -> World {
     let mut world = World::new();
     let mut glowing = mirror(weight);
@@ -31,7 +31,7 @@ pub fn facing_mirrors(weight: f32, emission: f32) -> World {
     world
 }
 
-/// Perfect mirrors through the origin whose fronts look along these directions.
+/// Perfect mirrors through the origin that face these directions.
 fn mirrors(fronts: &[DVec3]) -> World {
     let mut world = World::new();
     for front in fronts {
@@ -77,7 +77,7 @@ fn a_corner_of_two_sends_light_back() -> Outcome {
 }
 
 fn a_kaleidoscope_of_sixty_degrees() -> Outcome {
-    // Between mirrors at 60° a ray that comes along the middle is mirrored 3 times and goes back as it came, mirrored.
+    // Between mirrors at 60° a ray near their bisector is mirrored 3 times before it leaves.
     let mut world = mirrors(&[DVec3::Y, DVec3::new(FRAC_PI_3.sin(), -FRAC_PI_3.cos(), 0.0)]);
     let mut pairs = Vec::new();
     for angle in [0.2_f64, 0.5, 0.8] {
@@ -86,7 +86,8 @@ fn a_kaleidoscope_of_sixty_degrees() -> Outcome {
         let tree = tree(&mut world, &options(8));
         let (back, count) = last(&tree);
         assert_eq!(count, 3);
-        // Lines at 0° and 60°, three times in turn: θ becomes 240° - θ, or -120° - θ, which is the same.
+        // Reflections about lines at 0° and 60°, three in turn: θ becomes 240° - θ, or -120° - θ, which is
+        // the same.
         let turned = back.direction.y.atan2(back.direction.x);
         let came = (-tree.direction.y).atan2(-tree.direction.x);
         pairs.push((FRAC_PI_3 - came, turned));
@@ -100,7 +101,8 @@ fn a_tunnel_of_five_hundred() -> Outcome {
     let tree = tree(&mut world, &asked);
     let (end, count) = last(&tree);
     assert_eq!(count, 500);
-    // The way to the first mirror is 1, to each of the others 2, at 1/100 aside.
+    // The distance to the first mirror is 1 and to each of the others 2, and the ray moves aside by 1/100 of
+    // it.
     let aside = 0.01 * (1.0 + 2.0 * 499.0);
     Outcome::number(aside, end.origin.x, 1e-11, "how far aside the 500th reflection is")
 }

@@ -1,4 +1,5 @@
-//! Rays that start on a surface: shadow, mirrored and transmitted rays from a millimetre to a hundred kilometres, near the origin and far.
+//! Rays that start on a surface: shadow, mirrored and transmitted rays at sizes from a millimetre to a
+//! hundred kilometres, near the origin and far from it.
 
 use std::sync::Arc;
 
@@ -23,11 +24,11 @@ crate::cases! {
 const SIZES: [f64; 5] = [1e-3, 1.0, 1e2, 1e4, 1e5];
 const PLACES: [DVec3; 2] = [DVec3::ZERO, DVec3::new(1e6, -2e5, 3e6)];
 
-/// Every pixel of a world of each size at each place, whose pixels all have to have one value.
+/// Draws a world of each size at each place and pairs every pixel with the value that all of them must have.
 fn pixels(make: impl Fn(&mut World, f64, DVec3), expected: f64, options: &TraceOptions) -> Vec<(f64, f64)> {
     let mut found = Vec::new();
     for (size, place) in SIZES.into_iter().flat_map(|size| PLACES.map(|place| (size, place))) {
-        // A millimetre far out has no digits left in f32, nor has anything else there.
+        // Far from the origin, f32 cannot represent an object of a millimetre.
         if size < 1.0 && place != DVec3::ZERO {
             continue;
         }
@@ -40,7 +41,7 @@ fn pixels(make: impl Fn(&mut World, f64, DVec3), expected: f64, options: &TraceO
 }
 
 fn a_floor_lit_at_every_size() -> Outcome {
-    // Seen from the lamp: k_d L (n.l) / d² at every point, down to grazing rays at the picture's edge.
+    // Seen from the lamp: k_d L (n.l) / d² at every point, up to grazing angles at the picture's edge.
     let mut pairs = Vec::new();
     for (size, place) in SIZES.into_iter().flat_map(|size| PLACES.map(|place| (size, place))) {
         if size < 1.0 && place != DVec3::ZERO {
@@ -76,7 +77,7 @@ fn tilted(size: f64, place: DVec3) -> Transform {
         .with_scale(DVec3::splat(size))
 }
 
-/// What is seen of something under a sky of 1, from its own frame's `eye`, that has to show one value everywhere.
+/// Draws something under a sky of 1, from an `eye` in its own frame; it must show one value everywhere.
 fn in_a_furnace(
     add: impl Fn(&mut World, Transform),
     (eye, angle): (DVec3, f64),
@@ -91,7 +92,7 @@ fn in_a_furnace(
     Outcome::worst(pixels(make, expected, &options(48)), 0.0, tells)
 }
 
-/// Before a ball of radius 1.
+/// Eye and field of view in front of a ball of radius 1.
 const BEFORE: (DVec3, f64) = (DVec3::new(0.0, 0.0, 3.0), 0.35);
 
 fn a_mirror_of_triangles_does_not_see_itself() -> Outcome {
@@ -129,7 +130,7 @@ fn exact_glass_is_entered_and_left_once() -> Outcome {
 }
 
 fn a_path_does_not_shade_the_face_it_left() -> Outcome {
-    // A plane under a sky sees all of it, wherever the path goes on.
+    // A plane under a sky sees nothing but sky, whichever direction a path takes.
     let mut pairs = Vec::new();
     for size in SIZES {
         let mut world = World::new();
