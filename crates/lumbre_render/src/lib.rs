@@ -8,7 +8,7 @@
 //!                 │               and again for mirrors    mirrors ► refraction ►
 //!                 │                    │                   transparent ► yours ►
 //!                 │                    │                   display ► yours
-//!                 └──── facts ─────────┴──► explain: what the scene calls for, and what not
+//!                 └──── facts ─────────┴──► explain: what the scene needs, and what it does not
 //! ```
 //!
 //! The versions of bevy_ecs, glam and wgpu that a program must share with this crate are re-exported. A
