@@ -11,7 +11,7 @@ use crate::extract::LightSet;
 use crate::g_buffer::GBufferContents;
 use crate::rendering_path::ChosenPath;
 
-/// The facts about a scene, drawn with the options of a frame.
+/// The facts about a scene and the options of its frame.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SceneFacts {

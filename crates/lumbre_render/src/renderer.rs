@@ -339,7 +339,7 @@ impl Renderer {
         let _ = world.run_system_cached(propagate_transforms);
         clock.lap(|cpu| &mut cpu.transforms_ms);
         let mut settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-        // A fog that was created in code with invalid numbers is left out, like such lights.
+        // Like a light, a fog that was created in code with invalid numbers is left out.
         let fog_fault = settings.fog.and_then(|fog| fog.validate("scene").err());
         let mut left_out: Vec<String> = fog_fault.iter().map(ToString::to_string).collect();
         if fog_fault.is_some() {
