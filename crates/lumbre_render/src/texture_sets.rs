@@ -29,7 +29,7 @@ pub(crate) struct TextureSet {
     /// Bit i is set if slot i is bound.
     pub mask: u8,
     pub bind_group: wgpu::BindGroup,
-    /// Small copies of the material's textures, for warm-up draws.
+    /// Small black textures in place of the material's, for warm-up draws.
     pub stand_ins: MaterialTextures,
 }
 
@@ -50,7 +50,7 @@ pub(crate) fn features(mask: u8) -> impl Iterator<Item = (Feature, bool)> {
     SLOTS.iter().enumerate().map(move |(i, (feature, _))| (*feature, mask & (1 << i) != 0))
 }
 
-/// Returns copies of a material's textures that are as small as possible while a software rasterizer still
+/// Returns black textures in place of a material's, as small as possible while a software rasterizer still
 /// generates the same code for them. That depends on the samplers and on whether the sides are powers of two.
 fn stand_ins(textures: &MaterialTextures) -> MaterialTextures {
     let mut small = textures.clone();
@@ -127,8 +127,8 @@ impl TextureSets {
         Ok(group)
     }
 
-    /// Drops what no object uses. Call it before `Textures::sweep`, because the bind groups keep textures
-    /// alive.
+    /// Drops bind groups that no object uses. They keep textures alive on the GPU, so `Textures::sweep` alone
+    /// would not free these.
     pub fn sweep(&mut self) {
         self.sets.retain(|_, set| Arc::strong_count(set) > 1);
         self.lightmaps.retain(|_, group| Arc::strong_count(group) > 1);
