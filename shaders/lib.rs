@@ -1,5 +1,5 @@
-//! The shaders of Lumbre: WESL modules, embedded so that a program carries them, and their way to WGSL. Whoever compiles them chooses
-//! their features; no device is known here.
+//! The shaders of Lumbre: embedded WESL modules, and their compilation to WGSL. Features are chosen by the
+//! caller; nothing here depends on a device.
 //!
 //! ```text
 //!   g_buffer, deferred_lighting                                  the same surfaces, lit after all of them are drawn

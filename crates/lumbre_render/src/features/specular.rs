@@ -1,5 +1,5 @@
 //! Highlights: whether there is one, how sharp it is, with which distribution and Fresnel reflectance, and
-//! whether it conserves energy.
+//! whether it is normalized.
 
 use lumbre_optics::{Distribution, Fresnel};
 

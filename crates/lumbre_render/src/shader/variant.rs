@@ -108,7 +108,7 @@ features! {
     NormalTexture = 39 => "NORMAL_TEXTURE",
     /// Samples an occlusion texture.
     OcclusionTexture = 40 => "OCCLUSION_TEXTURE",
-    /// Its highlight conserves energy, like glTF's.
+    /// Its highlight is normalized, like glTF's.
     EnergyKeeping = 41 => "ENERGY_KEEPING",
     /// Writes the target's final values; the frame has no display pass.
     Display = 42 => "DISPLAY",
