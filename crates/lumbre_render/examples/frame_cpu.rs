@@ -1,6 +1,7 @@
 //! Measures the CPU time, stage by stage, of a frame with many objects and many lights: boxes on a plane, and
 //! as many lamps with a range of two metres just above them. Some of both move every frame.
-//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1] [--shading phong|gouraud|auto:0.01] [--frames 30]`
+//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1]
+//! [--shading phong|gouraud|auto:0.01] [--frames 30]`
 //!
 //! `--moving` is a percentage. Prints medians over the frames, in milliseconds. The frames are small, and the
 //! time for drawing them is not included.

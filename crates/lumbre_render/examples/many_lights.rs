@@ -1,7 +1,9 @@
 //! Measures the time of a frame against the number of lights: 64 balls (73,728 triangles with the floor)
 //! under point lights of three metres.
-//! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong|auto:0.01] [--reflection blinn]
-//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--path auto|forward|deferred] [--png FOLDER] [--account] [LIGHTS …]`
+//! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720]
+//! [--shading phong|auto:0.01] [--reflection blinn] [--kind point|spot|unbounded]
+//! [--lists auto|objects|clusters|everything] [--path auto|forward|deferred] [--png FOLDER] [--account]
+//! [LIGHTS …]`
 //!
 //! Times are wall-clock times from the call until the device has finished. Printed are the median and the
 //! minimum for frames of an unchanged World; the median for frames before each of which the camera is marked

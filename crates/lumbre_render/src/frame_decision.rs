@@ -61,7 +61,7 @@ pub(crate) struct Decided {
     pub lights_per_object: f32,
     /// What was chosen for the objects in view that are shaded by need.
     pub shading_by_need: ShadingNeeds,
-    /// An effect that is called for draws the shapes of objects.
+    /// Whether an effect that is called for draws the shapes of objects.
     pub draws_objects: bool,
     /// The census that the frame was decided from.
     pub census: Arc<Census>,

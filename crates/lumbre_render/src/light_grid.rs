@@ -10,7 +10,7 @@ use crate::extract::LightReach;
 /// A light whose sphere covers more cells than this is returned for every box.
 const MOST_CELLS: f64 = 64.0;
 
-/// Lights by place.
+/// The lights of a frame by their position.
 #[derive(Debug, Default)]
 pub(crate) struct LightGrid {
     /// Side of a cell in metres.

@@ -3,8 +3,8 @@
 //! `effects::mirrors`, its geometry in `extract::CameraView::reflected`.
 //!
 //! ```text
-//!   camera ──┬── mirror A ──── mirror B in A        a tree; each view is reflected in a plane of what its parent sees
-//!            └── mirror B ──── mirror A in B        and drawn before it
+//!   camera ──┬── mirror A ──── mirror B in A        a tree: each view is its parent's reflection in a plane
+//!            └── mirror B ──── mirror A in B        that the parent sees, and is drawn before the parent
 //! ```
 
 use glam::{DVec4, Vec3};
@@ -18,8 +18,8 @@ pub(crate) const MOST_VIEWS: usize = 16;
 /// Mirrors in the same plane share a view. Their normals may differ by at most this much, as the sine of the
 /// angle.
 const SAME_DIRECTION: f64 = 1e-6;
-/// Largest distance between such planes at the mirror's centre, relative to 1 m plus the radius of the mirror's
-/// bounding sphere.
+/// Largest distance between such planes at the mirror's centre, relative to 1 m plus the radius of the
+/// mirror's bounding sphere.
 const SAME_PLACE: f64 = 1e-5;
 
 /// The view in one plane of mirrors.

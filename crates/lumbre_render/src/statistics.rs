@@ -10,8 +10,8 @@ pub struct Statistics {
     /// Lights that are switched on, except ambient ones. Each face of an emissive object that lights others
     /// counts as one.
     pub lights: u32,
-    /// How many of these are static: a lightmapped mesh does not take their diffuse part. 0 while lightmaps are
-    /// switched off.
+    /// How many of these are static: a lightmapped mesh does not take their diffuse part. 0 while lightmaps
+    /// are switched off.
     pub static_lights: u32,
     /// Average length of the light list of an object in view, which each of its vertices or fragments loops
     /// over. Lights that fragments find by clusters are not included.

@@ -4,7 +4,7 @@
 //! the frame's limit. Curved surfaces are drawn without reflections.
 //!
 //! ```text
-//!   view of a mirror ──► mirrors in it ──► what is blended in it ──► mirrors of the frame
+//!   view in a mirror ──► mirrors in it ──► blended surfaces in it ──► mirrors of the frame
 //! ```
 
 use std::collections::HashMap;

@@ -5,9 +5,9 @@
 //! picture, or the background. Light that is reflected inside a body is lost.
 //!
 //! ```text
-//!   frame so far ──► behind ───────────────┐
-//!   back faces of bodies ──► back faces ───┼──► refraction: added where refractive surfaces are
-//!   what flat ones mirror (`mirrors`) ─────┘
+//!   frame so far ──► behind ────────────────────┐
+//!   back faces of bodies ──► back faces ────────┼──► refraction: added to the refractive surfaces
+//!   reflections in flat surfaces (`mirrors`) ───┘
 //! ```
 
 use std::collections::HashMap;

@@ -5,9 +5,9 @@
 //! ```text
 //!   vertices, pixels of its box ──────────────► evaluations: is anything cheaper than Phong? ──┐
 //!   mesh ► patches of its triangles ──┐                                                        ▼
-//!   object ► place, reflectance ──────┼─► prediction: errors of flat and Gouraud ──► choice: the cheapest that is within the bound
-//!   lights that reach it ► Lamp ──────┤   (kept while none of these changes and
-//!   eye, with room to move ───────────┘    the eye stays near where it was)
+//!   object ► place, reflectance ──────┼─► prediction: errors of flat and Gouraud ──► choice: the cheapest
+//!   lights that reach it ► Lamp ──────┤   (kept while none of these changes and      within the bound
+//!   eye, with room to move ───────────┘    the eye stays near its position)
 //! ```
 
 mod evaluations;
