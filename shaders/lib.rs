@@ -1,11 +1,11 @@
-//! The shaders of Lumbre: WESL modules, embedded so that a program carries them, and their way to WGSL. Whoever compiles them chooses
-//! their features; no device is known here.
+//! The shaders of Lumbre: embedded WESL modules, and their compilation to WGSL. Features are chosen by the
+//! caller; nothing here depends on a device.
 //!
 //! ```text
-//!   g_buffer, deferred_lighting                                  the same surfaces, lit after all of them are drawn
+//!   g_buffer, deferred_lighting                                  deferred shading of the same surfaces
 //!      ▼
 //!   forward ──► lighting, light_clusters, lightmap, textures …   the passes of lumbre_render
-//!      │           └──► optics/…                                 the equations, each with its f64 twin in lumbre_optics
+//!      │           └──► optics/…                                 the equations; f64 twins in lumbre_optics
 //!      ▼
 //!   display ──► display_color ──► tone_curve
 //! ```

@@ -1,8 +1,8 @@
-//! From WESL modules and features to the WGSL of one program: imports resolved, conditions decided. Not the check of what comes out: that
-//! is the device's, or naga's.
+//! Compiles WESL modules with a set of features to the WGSL of one program: imports are resolved and
+//! conditions are evaluated. The result is validated by the device or by naga, not here.
 //!
-//! The compiler of WESL is generic code. It stands behind this one function, so that it is built once and not in every crate that
-//! compiles shaders.
+//! The WESL compiler is generic code. It is wrapped in this one function, so that it is compiled only once
+//! and not in every crate that compiles shaders.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -10,28 +10,28 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::MODULES;
 
-/// Why a program has no WGSL: the compiler's words, which name module and place.
+/// Why a program could not be compiled: the compiler's message, which names module and position.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct WeslError(String);
 
-/// What holds for features that modules ask about and nobody named.
+/// How features are treated that modules use and that were not named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnnamedFeatures {
     /// They are off.
     AreOff,
-    /// They are a slip, and refused.
+    /// They are an error.
     AreErrors,
 }
 
 /// Which declarations a program keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kept<'a> {
-    /// The entry points and what they reach.
+    /// The entry points and what they use.
     EntryPoints,
-    /// The declarations of the root module that have these names, and what they reach.
+    /// The declarations of the root module with these names, and what they use.
     Declarations(&'a [&'a str]),
-    /// The whole root module and what it reaches.
+    /// The whole root module and what it uses.
     RootModule,
 }
 
@@ -44,17 +44,18 @@ pub struct Program<'a> {
     pub root: &'a str,
     /// Features by name, on or off.
     pub features: &'a [(&'a str, bool)],
-    /// What holds for the others.
+    /// How other features are treated.
     pub unnamed: UnnamedFeatures,
     /// Which declarations it keeps.
     pub kept: Kept<'a>,
 }
 
 impl Program<'_> {
-    /// The program in WGSL.
+    /// Compiles the program to WGSL.
     ///
     /// # Errors
-    /// If a path or a module does not parse, an import leads nowhere, or a feature is unnamed that has to be named.
+    /// Returns an error if a path or a module does not parse, an import cannot be resolved, or a feature is
+    /// not named although [`UnnamedFeatures::AreErrors`] is set.
     pub fn to_wgsl(&self) -> Result<String, WeslError> {
         let mut resolver = wesl::VirtualResolver::new();
         for (path, source) in self.modules {
@@ -82,18 +83,19 @@ impl Program<'_> {
     }
 }
 
-/// What was compiled of the embedded modules, by root and features that are on. A program asks for the same variants again for each renderer and device; each takes
-/// milliseconds to compile, and has some tens of kilobytes.
+/// The compiled embedded modules, by root and features that are on. A program needs the same variants again
+/// for each renderer and device; each takes milliseconds to compile and has some tens of kilobytes.
 static COMPILED: Mutex<BTreeMap<String, Arc<str>>> = Mutex::new(BTreeMap::new());
 
-/// One of the embedded modules in WGSL, with exactly these features. Compiled once in a process.
+/// Compiles one of the embedded modules to WGSL with exactly these features. The result is cached for the
+/// lifetime of the process.
 ///
 /// # Errors
-/// As [`Program::to_wgsl`].
+/// The same as those of [`Program::to_wgsl`].
 pub fn to_wgsl(root: &str, features: &[(&str, bool)]) -> Result<Arc<str>, WeslError> {
     let on = features.iter().filter(|(_, on)| *on).map(|(name, _)| *name);
     let key = std::iter::once(root).chain(on).collect::<Vec<_>>().join(" ");
-    // What another thread left is whole, whatever became of that thread.
+    // The map is valid even if another thread panicked while it held the lock.
     let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(wgsl) = compiled().get(&key) {
         return Ok(Arc::clone(wgsl));
@@ -105,7 +107,7 @@ pub fn to_wgsl(root: &str, features: &[(&str, bool)]) -> Result<Arc<str>, WeslEr
 
 fn compile(root: &str, features: &[(&str, bool)]) -> Result<String, WeslError> {
     let modules: Vec<_> = MODULES.iter().map(|(path, source)| (*path, Cow::Borrowed(*source))).collect();
-    // A feature that nobody named is a slip of ours, not a feature that is off.
+    // A feature that is not named is a mistake in the caller, not a feature that is off.
     let unnamed = UnnamedFeatures::AreErrors;
     Program { modules: &modules, root, features, unnamed, kept: Kept::EntryPoints }.to_wgsl()
 }

@@ -1,4 +1,4 @@
-//! A World, a Renderer, a target: one lit frame without a window.
+//! Draws one lit frame without a window, from a World, a Renderer and a target.
 //! `cargo run -p lumbre_render --example first_frame -- frame.png`
 
 use std::sync::Arc;

@@ -1,8 +1,10 @@
-//! What a frame of many objects and many lights costs the CPU, stage by stage: boxes on a plane, as many lamps of two metres just above
-//! them, of both a part moves every frame.
-//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1] [--shading phong|gouraud|auto:0.01] [--frames 30]`
+//! Measures the CPU time, stage by stage, of a frame with many objects and many lights: boxes on a plane, and
+//! as many lamps with a range of two metres just above them. Some of both move every frame.
+//! `cargo run --release -p lumbre_render --example frame_cpu -- [--number 10000] [--moving 1]
+//! [--shading phong|gouraud|auto:0.01] [--frames 30]`
 //!
-//! `--moving` is a percentage. Medians of the frames, in milliseconds; the frames are small, and their drawing is not counted.
+//! `--moving` is a percentage. Prints medians over the frames, in milliseconds. The frames are small, and the
+//! time for drawing them is not included.
 
 #![allow(clippy::print_stdout, reason = "it prints its results")]
 

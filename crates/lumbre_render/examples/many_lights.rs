@@ -1,10 +1,15 @@
-//! What a frame costs against the number of lights: 64 balls (73,728 triangles with the floor) under point lights of three metres.
-//! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720] [--shading phong|auto:0.01] [--reflection blinn]
-//! [--kind point|spot|unbounded] [--lists auto|objects|clusters|everything] [--path auto|forward|deferred] [--png FOLDER] [--account] [LIGHTS …]`
+//! Measures the time of a frame against the number of lights: 64 balls (73,728 triangles with the floor)
+//! under point lights of three metres.
+//! `cargo run --release -p lumbre_render --example many_lights -- [--frames 30] [--size 1280x720]
+//! [--shading phong|auto:0.01] [--reflection blinn] [--kind point|spot|unbounded]
+//! [--lists auto|objects|clusters|everything] [--path auto|forward|deferred] [--png FOLDER] [--account]
+//! [LIGHTS …]`
 //!
-//! Wall clock from the call to the finished frame, the device waited for: of frames of a still World the median and the least; the median of frames before each of which the camera is marked as
-//! changed, so that the World is looked through, and of frames that the target holds already (`FrameOptions::keep_unchanged`); and for all three the median of the CPU's part. With `--account`
-//! what one more frame of the second kind went into, and the lights that it tested.
+//! Times are wall-clock times from the call until the device has finished. Printed are the median and the
+//! minimum for frames of an unchanged World; the median for frames before each of which the camera is marked
+//! as changed, so that the World is extracted; the median for frames that the target already holds
+//! (`FrameOptions::keep_unchanged`); and for all three the median of the CPU time. With `--account` also the
+//! account of one more frame of the second kind, with the lights that it tested.
 
 #![allow(clippy::print_stdout, reason = "it prints its results")]
 
@@ -21,7 +26,7 @@ use lumbre_render::{
 };
 use lumbre_scene::{Camera, Mesh, Projection, Transform};
 
-/// Metres.
+/// Range of the lights in metres.
 const RANGE: f32 = 3.0;
 /// Half the side of the floor, in metres.
 const HALF_SIDE: f64 = 18.0;
@@ -111,7 +116,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 [&mut times, &mut on_cpu].into_iter().for_each(|times| times.sort_by(f64::total_cmp));
                 Ok(([times[frames / 2], times[0]], on_cpu[frames / 2], renderer.accounting().cloned()))
             };
-        // The first frames compile.
+        // Pipelines are created in the first frames.
         drawn(&mut world, &options, true)?;
         let kept = FrameOptions { keep_unchanged: true, ..options.clone() };
         let ([still, least], still_cpu, _) = drawn(&mut world, &options, false)?;
@@ -137,7 +142,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A floor, 64 balls, this many lights at random places just above the floor, and a camera that sees most of them.
+/// A floor, 64 balls, this many lights at random positions just above the floor, and a camera that sees most
+/// of them.
 fn balls(lights: u32, kind: Kind) -> World {
     let mut world = World::new();
     let floor = shapes::plane(2.0 * HALF_SIDE as f32, 2.0 * HALF_SIDE as f32, 64, 64);
@@ -178,7 +184,7 @@ fn balls(lights: u32, kind: Kind) -> World {
     world
 }
 
-/// The same numbers on every machine.
+/// A generator that gives the same numbers on every machine.
 struct Random(u64);
 
 impl Random {

@@ -1,8 +1,10 @@
-//! What a frame costs in which something is switched on for the first time: 64 balls under a few point lights, and then the scene's first spot light, first shadow,
-//! first texture and first blended surface, each while frames run.
+//! Measures the time of frames in which something is switched on for the first time: 64 balls under a few
+//! point lights, and then the scene's first spot light, first shadow, first texture and first blended
+//! surface, each while frames are drawn.
 //! `cargo run --release -p lumbre_render --example switch_on -- [--frames 60] [--size 640x360] [--wait]`
 //!
-//! Wall clock from the call to the finished frame, the device waited for: the median of the frames, the longest, and the frame in which the change is seen.
+//! Times are wall-clock times from the call until the device has finished. Printed are the median and the
+//! maximum over the frames, their ratio, and the number of frames until the change was visible.
 
 #![allow(clippy::print_stdout, reason = "it prints its results")]
 
@@ -17,7 +19,7 @@ use lumbre_optics::{AlphaMode, Light, Material, SpotCone};
 use lumbre_render::{FrameOptions, Gpu, MissingPipelines, Offscreen, OffscreenFormat, Renderer};
 use lumbre_scene::{Camera, Image, MaterialTextures, Mesh, Sampler, TextureReference, Transform};
 
-/// Its name, and what it does.
+/// The name of a change, and what it does.
 type Change<'a> = (&'static str, &'a dyn Fn(&mut World));
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -45,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let target = Offscreen::new(&gpu, size.0, size.1, OffscreenFormat::Rgba8)?;
     let mut frame = |world: &mut World| -> Result<(f64, bool), Box<dyn std::error::Error>> {
         if let Some(mut camera) = world.get_mut::<Camera>(camera) {
-            // Nothing is still.
+            // Prevents the frame from being reused as unchanged.
             camera.set_changed();
         }
         let start = Instant::now();
@@ -71,7 +73,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("first texture", &|world| {
             world.entity_mut(ball).insert(checks());
         }),
-        // And with it the first display pass.
+        // This also needs the first display pass.
         ("first blended surface", &|world| {
             if let Some(mut material) = world.get_mut::<Material>(ball) {
                 (material.alpha, material.alpha_mode) = (0.5, AlphaMode::Blend);

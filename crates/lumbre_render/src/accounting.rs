@@ -1,5 +1,6 @@
-//! The account of one frame: what its wall clock went into, by stages of the CPU, by passes of the device and by effects, with what is left over. Data, and its text; what is
-//! open and what is settled is the `ledger`'s.
+//! The account of one frame: where its wall-clock time was spent, by CPU stages, by passes on the device and
+//! by effects, and what is left over. Plain data and its text form. Which frames are still being measured is
+//! tracked in `ledger`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -10,44 +11,51 @@ use crate::statistics::{CpuStages, Uploads};
 
 /// What a frame cost, and where.
 ///
-/// The stages of the CPU follow each other without a gap, and the passes follow each other on the device. So a frame that was waited for lasts as long as its stages and its
-/// passes together, less what the device did already while the CPU still worked ([`overlapped_ms`](Self::overlapped_ms)), but for a [`remainder`](Self::remainder_ms): what the device
-/// does between passes and before the first, and what belongs to no stage. A frame that was not waited for overlaps with its neighbours, and its parts have no sum.
+/// The CPU stages follow each other without a gap, and so do the passes on the device. A frame that was
+/// waited for therefore takes as long as its stages and its passes together, minus the device's work that
+/// overlapped with the CPU's ([`overlapped_ms`](Self::overlapped_ms)), plus a
+/// [`remainder`](Self::remainder_ms): the device's work between passes and before the first one, and CPU time
+/// that belongs to no stage. A frame that was not waited for overlaps with its neighbours, so its parts have
+/// no sum.
 ///
-/// By effects the same is cut in another way: [`effects`](Self::effects) sum to all that was spent on the CPU, on the device, and uploaded. What all passes draw with (lists of
-/// lights, buffers, meshes, textures, irradiance volumes, pipelines of lit surfaces) is [`SCENE`]'s. An effect that is a feature of the lit shaders (spot lights, fog, textures) has no time of its own within
-/// the pass that draws with it: [`effect_costs`](crate::effect_costs()), `lumbre explain --measure`, measures it by leaving it out.
+/// [`effects`](Self::effects) splits the same cost by effect; these accounts sum to all CPU time, device time
+/// and uploaded bytes. What all passes draw with (light lists, buffers, meshes, textures, irradiance volumes,
+/// pipelines of lit surfaces) is attributed to [`SCENE`]. An effect that is a feature of the lit shaders
+/// (spot lights, fog, textures) has no time of its own within the pass that draws with it;
+/// [`effect_costs`](crate::effect_costs()) (`lumbre explain --measure`) measures it by leaving it out.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Accounting {
-    /// The frame, counted from 1 by its renderer.
+    /// Number of the frame, counted from 1 by its renderer.
     pub frame: u64,
-    /// Milliseconds from the call of `render` until the device had finished, if that was waited for.
+    /// Milliseconds from the call of `render` until the device had finished, if the frame was waited for.
     pub wall_ms: Option<f64>,
-    /// Milliseconds on the CPU until `render` returned.
+    /// CPU milliseconds until `render` returned.
     pub cpu_ms: f64,
-    /// What these consist of, in the order of the frame.
+    /// The stages that this time consists of, in the order of the frame.
     pub stages: Vec<StageAccount>,
-    /// Milliseconds between the return of `render` and the call of `wait`: the caller's own.
+    /// Milliseconds between the return of `render` and the call of `wait`, spent by the caller.
     pub between_ms: Option<f64>,
     /// Milliseconds in which the CPU waited for the device.
     pub waiting_ms: Option<f64>,
-    /// Milliseconds of passes that the device ran while the CPU still worked, if it was waited for: a lower bound, the passes' time less the time of waiting.
+    /// Milliseconds of passes that the device ran while the CPU was still working, if the frame was waited
+    /// for. This is a lower bound: the time of the passes minus the time of waiting.
     pub overlapped_ms: Option<f64>,
-    /// Milliseconds on the device from the first pass's begin to the last one's end.
+    /// Device milliseconds from the beginning of the first pass to the end of the last one.
     pub gpu_ms: Option<f64>,
-    /// Milliseconds on the device within passes.
+    /// Device milliseconds within passes.
     pub passes_ms: Option<f64>,
-    /// What these consist of, in the order of the frame.
+    /// The passes that this time consists of, in the order of the frame.
     pub passes: Vec<PassAccount>,
-    /// The same by who declared the passes, with what each did besides.
+    /// The same cost by the effect that declared the passes, together with what each effect did outside of
+    /// its passes.
     pub effects: Vec<EffectAccount>,
-    /// What was uploaded, by what it is.
+    /// What was uploaded, by kind.
     pub uploads: Uploads,
     /// What could not be measured, and why.
     pub notes: Vec<String>,
 }
 
-/// One stage of the CPU.
+/// One CPU stage.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StageAccount {
     /// Its name.
@@ -63,37 +71,42 @@ pub struct PassAccount {
     pub pass: String,
     /// The effect that declared it.
     pub effect: String,
-    /// Passes of the same group were merged into one.
+    /// Passes with the same group were merged into one wgpu pass.
     pub group: usize,
-    /// Milliseconds that the recording of its commands took on the CPU.
+    /// CPU milliseconds for recording its commands.
     pub cpu_ms: Option<f64>,
-    /// Milliseconds on the device; of the whole group where `shared` says so.
+    /// Device milliseconds; of the whole group if `shared` is true.
     pub gpu_ms: Option<f64>,
-    /// The device cannot tell the passes of the group apart: the time is that of all of them, and stands at each.
+    /// True if the device cannot time the passes of the group separately. Each of them then has the time of
+    /// the whole group.
     pub shared: bool,
     /// Shader invocations.
     pub invocations: Option<Invocations>,
-    /// Lights that its vertices or fragments tested, where that was counted.
+    /// Lights that its vertices or fragments tested, if they were counted.
     pub lights: Option<LightCount>,
 }
 
-/// How many lights a pass tests, and how many of these contribute. Counted while the pass draws, by vertices under flat and Gouraud shading and by fragments under Phong shading:
-/// those that something nearer covers later too, but not those that are hidden already, as they are not shaded (but for masked surfaces, whose fragments are tested for depth
-/// after they have run).
+/// How many lights a pass tests, and how many of these contribute. They are counted while the pass draws, by
+/// vertices under flat and Gouraud shading and by fragments under Phong shading. Fragments that a later draw
+/// covers are included. Fragments that are already hidden are not, because they are not shaded; masked
+/// surfaces are the exception, because their fragments run before the depth test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct LightCount {
-    /// Evaluations of a light at a point: a light of the object's list or of the cluster's. Neither ambient lights nor what pads a cluster's list are any.
+    /// Evaluations of a light at a point, for lights of the object's list and of the cluster's list. Neither
+    /// ambient lights nor the padding of a cluster's list count.
     pub tested: u64,
-    /// Of these, the evaluations whose light is reflected with more than 1/255 in at least one channel: the ambient, diffuse and specular part that the shader adds to the
-    /// surface's colour at this point, shadow and textures included, times the exposure; before other lights, clamps, fog, blending and tone curve. What a vertex reflects is taken before a texture
-    /// that fragments modulate it with.
+    /// Evaluations whose light contributes more than 1/255 in at least one channel: the ambient, diffuse and
+    /// specular parts that the shader adds to the surface's colour at this point, including shadow and
+    /// textures, times the exposure. Other lights, clamps, fog, blending and tone curve are not considered.
+    /// At a vertex, a texture that the fragments modulate by is not considered either.
     pub contributing: u64,
 }
 
-/// What one effect cost.
+/// The cost of one effect.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct EffectAccount {
-    /// Its name: that of the effect, [`SCENE`], or, where the device cannot tell merged passes apart, of all effects that share one, joined by " + ".
+    /// Name of the effect, or [`SCENE`]. For merged passes that the device cannot time separately, the names
+    /// of all effects that share them, joined by " + ".
     pub effect: String,
     /// Its passes that ran.
     pub passes: Vec<String>,
@@ -109,10 +122,10 @@ pub struct EffectAccount {
     pub pipelines_made: usize,
 }
 
-/// Who answers for what all lit passes draw with, and for what no effect did.
+/// Name of the account for what all lit passes share and for what no effect did.
 pub const SCENE: &str = "scene";
 
-/// What an effect did in a frame beside its passes.
+/// What an effect did in a frame outside of its passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct EffectShare {
     pub name: &'static str,
@@ -121,17 +134,17 @@ pub(crate) struct EffectShare {
     pub pipelines_made: usize,
 }
 
-/// What is known of a frame when it is submitted.
+/// What is known about a frame when it is submitted.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameShares {
     pub stages: CpuStages,
     pub uploads: Uploads,
     pub effects: Vec<EffectShare>,
-    /// Of surfaces that are lit.
+    /// Pipelines of lit surfaces.
     pub pipelines_made: usize,
 }
 
-/// The wall clock of a frame that was waited for, in milliseconds.
+/// The wall-clock times of a frame that was waited for, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Waited {
     pub wall_ms: f64,
@@ -180,20 +193,23 @@ impl Accounting {
         }
     }
 
-    /// Milliseconds of the stages and passes together, with what the caller did between drawing and waiting; what overlapped counts once. Where the device has no timestamps the time of
-    /// waiting stands for its passes.
+    /// Returns the milliseconds of the stages, the passes, and the caller's work between drawing and waiting.
+    /// Overlapping work counts once. On a device without timestamps, the time of waiting stands for the
+    /// passes.
     pub fn accounted_ms(&self) -> f64 {
         let stages: f64 = self.stages.iter().map(|stage| stage.ms).sum();
         let passes = self.passes_ms.or(self.waiting_ms).unwrap_or(0.0) - self.overlapped_ms.unwrap_or(0.0);
         stages + self.between_ms.unwrap_or(0.0) + passes
     }
 
-    /// Milliseconds of the wall clock that neither stages nor passes answer for; nothing if the frame was not waited for.
+    /// Returns the milliseconds of the wall-clock time that neither stages nor passes account for; `None` if
+    /// the frame was not waited for.
     pub fn remainder_ms(&self) -> Option<f64> {
         Some(self.wall_ms? - self.accounted_ms())
     }
 
-    /// Takes the lights that another frame of the same scene counted, pass by pass: what counts takes longer, so that times and counts are best of two frames.
+    /// Copies the light counts, pass by pass, of another frame of the same scene. Counting slows a frame
+    /// down, so times and counts are best taken from two frames.
     pub fn take_lights_of(&mut self, counted: &Self) {
         for pass in &mut self.passes {
             let same = counted.passes.iter().find(|other| other.pass == pass.pass);
@@ -204,7 +220,7 @@ impl Accounting {
         );
     }
 
-    /// For people: stages, passes, their sum, effects.
+    /// Formats the account as text: stages, passes, their sum, effects.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail, here and below.
@@ -330,7 +346,8 @@ fn count(count: Option<u64>) -> String {
     count.map_or_else(|| "-".to_owned(), |count| count.to_string())
 }
 
-/// The accounts of the effects in their order, those of merged passes that cannot be told apart after them, and the scene's.
+/// Returns the accounts of the effects in their order, then those of merged passes that cannot be timed
+/// separately, then the scene's.
 fn by_effect(shares: &FrameShares, passes: &[PassAccount]) -> Vec<EffectAccount> {
     let mut accounts: Vec<EffectAccount> = Vec::new();
     for share in &shares.effects {
@@ -339,7 +356,7 @@ fn by_effect(shares: &FrameShares, passes: &[PassAccount]) -> Vec<EffectAccount>
         account.uploaded_bytes += share.uploaded_bytes;
         account.pipelines_made += share.pipelines_made;
     }
-    // Who shares a wgpu pass whose parts have no times.
+    // The effects that share a wgpu pass whose parts cannot be timed.
     let mut sharers: BTreeMap<usize, Vec<&str>> = BTreeMap::new();
     for pass in passes.iter().filter(|pass| pass.shared) {
         let names = sharers.entry(pass.group).or_default();
@@ -376,7 +393,7 @@ fn by_effect(shares: &FrameShares, passes: &[PassAccount]) -> Vec<EffectAccount>
     accounts
 }
 
-/// The account of this name, a new one if there is none.
+/// Returns the account with this name; adds an empty one if there is none.
 fn account<'a>(accounts: &'a mut Vec<EffectAccount>, name: &str) -> &'a mut EffectAccount {
     let index = accounts.iter().position(|account| account.effect == name).unwrap_or_else(|| {
         accounts.push(EffectAccount { effect: name.to_owned(), ..EffectAccount::default() });
@@ -457,7 +474,7 @@ mod tests {
         let passes = vec![pass("forward", "forward", 0, GpuTime::Pass { ms: 9.0 })];
         let accounting = settled_after(passes, Waited { wall_ms: 10.0, waiting_ms: 6.0 });
         assert_eq!((accounting.overlapped_ms, accounting.between_ms), (Some(3.0), Some(0.5)));
-        // Half a millisecond of the CPU is of no stage.
+        // Half a millisecond of CPU time belongs to no stage.
         assert_eq!((accounting.accounted_ms(), accounting.remainder_ms()), (9.5, Some(0.5)));
         assert!(accounting.to_text().contains("3.000 ms of the passes"));
     }

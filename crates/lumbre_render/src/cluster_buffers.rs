@@ -1,5 +1,5 @@
-//! The GPU's copies of a frame's clusters: their grid, their lists, and the lean records of the lights in them. What stands in the lists
-//! is decided in `light_clusters`.
+//! The GPU's copies of a frame's clusters: the grid, the lists, and the compact records of their lights. The
+//! content of the lists is computed in `light_clusters`.
 
 use crate::extract::{LightClass, SceneLights, UNIFORM_LIGHTS};
 use crate::frame_bindings::FrameBuffer;
@@ -9,10 +9,10 @@ use crate::light_clusters::{BoundingSphere, ClusteredView, LightClusters};
 use crate::table_texture::TableTexture;
 use crate::{Gpu, RenderError};
 
-/// The name of the lists in errors and debuggers.
+/// Name of the lists in errors and debuggers.
 const LISTS: &str = "lists of lights per cluster";
 
-/// Those buffers of group 0 that belong to clusters.
+/// The buffers of group 0 that belong to clusters.
 #[derive(Debug)]
 pub(crate) struct ClusterBuffers {
     pub clusters: LightClusters,
@@ -20,7 +20,7 @@ pub(crate) struct ClusterBuffers {
     ranged: Vec<BoundingSphere>,
     grid: GrowableBuffer<ClusterGridData>,
     lists: Option<wgpu::Buffer>,
-    /// The same on a device that reads tables from textures.
+    /// The lists on a device that keeps tables in textures.
     list_table: TableTexture,
     lights: GrowableBuffer<InverseSquareLightData>,
 }
@@ -38,7 +38,7 @@ impl ClusterBuffers {
         }
     }
 
-    /// Makes the lists of a frame.
+    /// Builds the lists of a frame.
     pub fn build(&mut self, view: &ClusteredView, lights: &SceneLights) {
         self.inverse_square.clear();
         self.ranged.clear();
@@ -53,10 +53,10 @@ impl ClusterBuffers {
                 LightClass::Ranged => self.ranged.push(sphere(index)),
             }
         }
-        // Where no light of the class is left, its shaders read the black one behind all lights.
+        // If no light of the second class is left, its shaders read the black light that follows all others.
         let black = u32::try_from(lights.reaches.len()).unwrap_or(u32::MAX);
         self.clusters.build(view, [&self.inverse_square, &self.ranged], black);
-        // Baked lights stand last.
+        // Baked lights come last.
         let grid = &mut self.clusters.grid;
         grid.first_baked_inverse_square = lights.set.inverse_square.dynamic;
         grid.first_baked_ranged = lights.set.every.dynamic;
@@ -64,14 +64,14 @@ impl ClusterBuffers {
         self.lights.replace(lights.inverse_square.iter().copied().chain([InverseSquareLightData::BLACK]));
     }
 
-    /// Bytes that the next `upload` will send.
+    /// Returns the number of bytes that the next `upload` will send.
     pub fn pending_bytes(&self) -> u64 {
         self.grid.pending_bytes()
             + self.lights.pending_bytes()
             + size_of_val(self.clusters.values.as_slice()) as u64
     }
 
-    /// Brings the GPU's copies up to date; true if a buffer is another one than before.
+    /// Brings the GPU's copies up to date. Returns true if a buffer or texture was replaced.
     ///
     /// # Errors
     /// [`RenderError::BufferTooLarge`].
@@ -104,7 +104,7 @@ impl ClusterBuffers {
         Ok(renewed)
     }
 
-    /// What is bound of them, once `upload` has made it.
+    /// Returns the binding of a buffer, once `upload` has created it.
     pub fn bound(&self, buffer: FrameBuffer) -> Option<wgpu::BindingResource<'_>> {
         match buffer {
             FrameBuffer::ClusterGrid => self.grid.buffer().map(wgpu::Buffer::as_entire_binding),

@@ -1,47 +1,47 @@
-//! Things that take long to make, above all pipelines, made on a thread of the device's own while frames go on without them. Not when a frame goes on and when it waits:
-//! that is `options::MissingPipelines`.
+//! Values that take long to create, above all pipelines, created on the device's worker thread while frames
+//! continue without them. Whether a frame waits for them is decided by `options::MissingPipelines`.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, OnceLock};
 
 use crate::{EffectError, Gpu};
 
-/// Something that is made once: there, on its way, or impossible.
+/// A value that is created once: it is ready, still being created, or has failed.
 #[derive(Debug)]
 pub struct Deferred<T>(Arc<OnceLock<Result<T, EffectError>>>);
 
 impl<T: Send + Sync + 'static> Deferred<T> {
-    /// Begins to make it on the device's thread, after what was begun before.
+    /// Starts to create it on the device's worker thread, after the jobs that were queued before.
     pub fn begin(gpu: &Gpu, make: impl FnOnce() -> Result<T, EffectError> + Send + 'static) -> Self {
         let place = Arc::new(OnceLock::new());
         let made = Arc::clone(&place);
         gpu.worker_thread().run(Box::new(move || {
-            // Whoever waits is answered whatever happens.
+            // Waiting callers must get a result even if `make` panics.
             let result = catch_unwind(AssertUnwindSafe(make));
             let _ = made.set(result.unwrap_or_else(|_| Err("its making has panicked".into())));
         }));
         Self(place)
     }
 
-    /// Makes it at once.
+    /// Creates it at once on this thread.
     pub fn make(make: impl FnOnce() -> Result<T, EffectError>) -> Self {
         Self(Arc::new(OnceLock::from(make())))
     }
 
-    /// What became of it, or nothing yet.
+    /// Returns the result, or `None` while it is being created.
     pub fn get(&self) -> Option<Result<&T, &EffectError>> {
         self.0.get().map(Result::as_ref)
     }
 
-    /// What becomes of it.
+    /// Waits for the result and returns it.
     pub fn wait(&self) -> Result<&T, &EffectError> {
         self.0.wait().as_ref()
     }
 
-    /// Whether it is there; with `wait` it is waited for.
+    /// Returns true if it is ready. With `wait`, waits for it first.
     ///
     /// # Errors
-    /// It cannot be made; the words of the fault.
+    /// The error message if creating it has failed.
     pub fn is_there(&self, wait: bool) -> Result<bool, String> {
         let result = if wait { Some(self.wait()) } else { self.get() };
         match result {

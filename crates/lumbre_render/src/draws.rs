@@ -1,4 +1,5 @@
-//! What a frame draws, in which order, with which pipelines: culling, variants, sorting, batches. Not how they reach the GPU.
+//! Decides what a frame draws, in which order and with which pipelines: culling, variants, sorting and
+//! batching. Uploading is not done here.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -26,46 +27,47 @@ pub(crate) struct Batch {
     pub texture_set: Option<Arc<TextureSet>>,
     /// Group 2: a lightmap or an irradiance volume.
     pub baked_light: Option<Arc<wgpu::BindGroup>>,
-    /// Of what lights it, if that is deferred; else 0.
+    /// Number of the deferred class that lights the instances; 0 if they are lit forward.
     pub class_number: u32,
-    /// Into the instances of its view.
+    /// Range within the instances of its view.
     pub instances: Range<u32>,
 }
 
-/// Surfaces of a pass that one draw lights from the G-buffer: those that one pipeline lights with the same baked light. Its number, from 1 on, is one more than its place.
+/// Surfaces of a pass that are lit from the G-buffer by one draw: those with the same pipeline and the same
+/// baked light. The number of a class is its index plus one.
 #[derive(Debug)]
 pub(crate) struct DeferredClass {
     pub pass: LitPass,
     pub pipeline: PipelineKey,
     /// Group 2: a lightmap or an irradiance volume.
     pub baked_light: Option<Arc<wgpu::BindGroup>>,
-    /// The part of the frame that its surfaces are in.
+    /// The part of the frame that its surfaces may cover.
     pub window: Window,
 }
 
 /// The draws of a view, by pass.
 #[derive(Debug, Default)]
 pub(crate) struct Draws {
-    /// What is drawn into the G-buffer, of any pass.
+    /// What is drawn into the G-buffer, for all passes.
     pub geometry: Vec<Batch>,
-    /// What lights it.
+    /// The draws that light the G-buffer.
     pub deferred: Vec<DeferredClass>,
-    /// What the lightmap pass draws itself.
+    /// What the lightmap pass lights forward.
     pub lightmapped: Vec<Batch>,
-    /// What the forward pass draws itself.
+    /// What the forward pass lights forward.
     pub opaque: Vec<Batch>,
-    /// What lies behind them is drawn through them.
+    /// Surfaces through which what lies behind them is visible.
     pub refractive: Vec<Batch>,
     pub transparent: Vec<Batch>,
     /// In the order of the draws.
     pub instances: Vec<InstanceData>,
-    /// Where they begin among those of all views of the frame.
+    /// Index of the first instance among those of all views of the frame.
     pub first_instance: u32,
-    /// Objects outside the view.
+    /// Number of objects outside the view.
     pub outside: usize,
-    /// From the nearest to the farthest point of what is in view, along the line of sight, in metres.
+    /// Depth range of what is in view, along the line of sight, in metres.
     pub depths: Option<[f64; 2]>,
-    /// From the nearest to the farthest point of what is lit by clusters, along the line of sight, in metres.
+    /// Depth range of what is lit by clusters, along the line of sight, in metres.
     pub clustered_depths: Option<[f64; 2]>,
 }
 
@@ -77,24 +79,25 @@ pub(crate) struct VisibleObjects<'a> {
     depths: Option<[f64; 2]>,
     clustered_depths: Option<[f64; 2]>,
     deferred: Vec<DeferredClass>,
-    /// What the objects are drawn with: each once for a run of objects that are drawn alike.
+    /// The pipelines of the objects, one entry for each run of objects with the same pipelines.
     pipelines: Vec<ChosenPipelines>,
 }
 
-/// An object in view. Kept small, as thousands are read in the order of their draws: what a batch asks of the object stands beside it.
+/// An object in view. It is kept small because thousands of them are read in draw order; what a batch needs
+/// to know of the object is stored right here.
 struct Visible<'a> {
     pass: LitPass,
     slot: u32,
-    /// Smaller is drawn earlier.
+    /// Objects with a smaller value are drawn earlier.
     order: f64,
     object: &'a Object,
     mesh: MeshKey,
     texture_set: Option<&'a Arc<TextureSet>>,
-    /// Which of the pipelines draw it.
+    /// Index of the pipelines that draw it.
     pipelines: u32,
-    /// Group 2 of what lights it.
+    /// Group 2 of the pipeline that lights it.
     baked_light: Option<&'a Arc<wgpu::BindGroup>>,
-    /// 0 is none.
+    /// Number of its deferred class; 0 for none.
     class_number: u32,
 }
 
@@ -104,7 +107,7 @@ impl Visible<'_> {
     }
 }
 
-/// What draws a surface, and what lights it: the same, unless that is deferred.
+/// The pipelines that draw and light a surface. They are the same unless the surface is lit deferred.
 #[derive(Clone, Copy, PartialEq)]
 struct ChosenPipelines {
     drawn: PipelineKey,
@@ -112,7 +115,9 @@ struct ChosenPipelines {
 }
 
 impl<'a> VisibleObjects<'a> {
-    /// What `view` sees but for the objects in the slots `without`, each with the pipeline that `choose` answers with for the one that it calls for. What asks to be shaded by need is shaded as `need` says.
+    /// Finds what `view` sees, except the objects in the slots `without`. Each object gets the pipeline that
+    /// `choose` returns for the one that it calls for. Objects that ask for shading by need are shaded as
+    /// `need` says.
     pub fn new(
         (objects, volumes): (&'a Objects, &'a IrradianceVolumes),
         (view, without): (&CameraView, &[usize]),
@@ -128,7 +133,7 @@ impl<'a> VisibleObjects<'a> {
             let center = (object.center - objects.origin).extend(1.0);
             planes.iter().all(|plane| plane.dot(center) >= -object.radius)
         };
-        // Most objects are as the one before.
+        // Most objects have the same traits as the previous one, so its variant is kept.
         let mut known: Option<(ObjectTraits, Shading, Variant)> = None;
         let mut known_key: Option<(PipelineKey, LitPass, Option<ChosenPipelines>)> = None;
         for (slot, object) in objects.iter() {
@@ -164,7 +169,7 @@ impl<'a> VisibleObjects<'a> {
                 _ => ChosenPipelines::of(pipeline, pass, frame.g_buffer, choose),
             };
             known_key = Some((pipeline, pass, chosen));
-            // What waits for a pipeline is not drawn yet.
+            // An object whose pipeline is still being created is not drawn yet.
             let Some(mut pipelines) = chosen else { continue };
             let has = |feature| pipelines.lit.variant.has(feature);
             let lightmap = object.lightmap.as_ref().filter(|_| has(Feature::Lightmap));
@@ -178,7 +183,7 @@ impl<'a> VisibleObjects<'a> {
                 false => Some(0),
             };
             if class_number.is_none() {
-                // There are more than the G-buffer has numbers for.
+                // The G-buffer has no class number left, so the object is lit forward.
                 match choose(pipeline) {
                     Some(forward) => pipelines = ChosenPipelines { drawn: forward, lit: forward },
                     None => continue,
@@ -197,7 +202,7 @@ impl<'a> VisibleObjects<'a> {
             if seen.pipelines.last() != Some(&pipelines) {
                 seen.pipelines.push(pipelines);
             }
-            // What a table holds has numbers of 32 bits.
+            // Tables are indexed by 32 bits.
             let number = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
             seen.visible.push(Visible {
                 pass,
@@ -214,7 +219,8 @@ impl<'a> VisibleObjects<'a> {
         seen
     }
 
-    /// The number of the class of deferred surfaces that are lit so, if there is one left, and room for one more instance.
+    /// Returns the class number of deferred surfaces that are lit this way. `None` if no number is left, or
+    /// no room for another instance.
     fn class(
         &mut self,
         pass: LitPass,
@@ -243,7 +249,8 @@ impl<'a> VisibleObjects<'a> {
 }
 
 impl ChosenPipelines {
-    /// Those of a surface that the forward pass would draw with `forward`, as far as `choose` has any.
+    /// Returns the pipelines of a surface that the forward pass would draw with `forward`, as far as `choose`
+    /// finds them.
     fn of(
         forward: PipelineKey,
         pass: LitPass,
@@ -253,7 +260,7 @@ impl ChosenPipelines {
         match DeferredVariants::of(&forward.variant, pass, g_buffer) {
             Some(DeferredVariants { geometry, lighting }) => {
                 let drawn = PipelineKey { variant: geometry, format: g_buffer::FORMAT, ..forward };
-                // A triangle over the frame.
+                // Lighting draws a full-screen triangle.
                 let lit = PipelineKey {
                     variant: lighting,
                     mirrored: false,
@@ -273,12 +280,14 @@ impl ChosenPipelines {
 }
 
 impl Draws {
-    /// The draws of what is seen, with instances that come after so many of other views.
+    /// Creates the draws of what is in view. Their instances follow `first_instance` instances of other
+    /// views.
     pub fn new(seen: VisibleObjects<'_>, lights: &mut ObjectLightLists, first_instance: u32) -> Self {
         let VisibleObjects { visible, outside, depths, clustered_depths, deferred, pipelines } = seen;
         let mut draws =
             Self { outside, first_instance, depths, clustered_depths, deferred, ..Self::default() };
-        // Opaque front to back, so that hidden fragments are not shaded; transparent back to front. Ties by slot: the same every frame.
+        // Opaque surfaces are drawn front to back so that hidden fragments are not shaded, transparent ones
+        // back to front. Ties are broken by slot, which is the same every frame.
         let mut order: Vec<u128> = visible
             .iter()
             .zip(0..)
@@ -287,7 +296,7 @@ impl Draws {
         order.sort_unstable();
         draws.instances.reserve(visible.len());
         for key in order {
-            // What the key ends in.
+            // The key ends in the object's index.
             let seen = &visible[key as u32 as usize];
             draws.push(seen, &pipelines[seen.pipelines as usize], lights);
         }
@@ -311,9 +320,9 @@ impl Draws {
             LitPass::Transparent => &mut self.transparent,
         };
         let pipeline = pipelines.drawn;
-        // What lights the G-buffer is bound it.
+        // For a deferred surface, baked light is bound when the G-buffer is lit.
         let baked_light = seen.baked_light.filter(|_| !seen.is_deferred());
-        // A pipeline that stands in for another may have no textures.
+        // A pipeline that stands in for another one may have no textures.
         let texture_set = seen.texture_set.filter(|_| pipeline.texture_mask != 0);
         let fits = |batch: &Batch| {
             batch.pipeline == pipeline
@@ -336,7 +345,7 @@ impl Draws {
         }
     }
 
-    /// The batches that a pass draws.
+    /// Returns the batches that a pass draws.
     pub fn of(&self, pass: LitPass) -> &[Batch] {
         match pass {
             LitPass::Lightmap => &self.lightmapped,
@@ -346,32 +355,32 @@ impl Draws {
         }
     }
 
-    /// Draws what refracts with the other opaque surfaces, where it has no pass of its own yet.
+    /// Draws refractive surfaces with the other opaque ones, while the refraction effect is not ready.
     pub fn draw_refractive_opaque(&mut self) {
         self.opaque.append(&mut self.refractive);
     }
 
-    /// A batch's instances among those of all views of the frame.
+    /// Returns the range of a batch's instances among those of all views of the frame.
     pub fn instances_of(&self, batch: &Batch) -> Range<u32> {
         self.first_instance + batch.instances.start..self.first_instance + batch.instances.end
     }
 
-    /// Every batch, in the order of the passes: first those of the G-buffer.
+    /// Returns every batch, those of the G-buffer first, then those of each pass.
     pub fn batches(&self) -> impl Iterator<Item = &Batch> {
         self.geometry.iter().chain(LitPass::ALL.into_iter().flat_map(|pass| self.of(pass)))
     }
 
-    /// What a pass lights from the G-buffer, each with its number.
+    /// Returns the classes that a pass lights from the G-buffer, with their numbers.
     pub fn deferred_of(&self, pass: LitPass) -> impl Iterator<Item = (u32, &DeferredClass)> {
         (1..).zip(&self.deferred).filter(move |(_, class)| class.pass == pass)
     }
 
-    /// Every pipeline that it is drawn with: of batches, then of deferred lighting.
+    /// Returns every pipeline that is used, those of batches first, then those of deferred lighting.
     pub fn pipelines(&self) -> impl Iterator<Item = &PipelineKey> {
         self.batches().map(|batch| &batch.pipeline).chain(self.deferred.iter().map(|class| &class.pipeline))
     }
 
-    /// Every batch with the variant that lights it.
+    /// Returns every batch with the variant that lights it.
     pub fn lit_batches(&self) -> impl Iterator<Item = (&Batch, &Variant)> {
         self.batches().map(|batch| {
             let class = batch.class_number.checked_sub(1).and_then(|place| self.deferred.get(place as usize));
@@ -388,17 +397,20 @@ fn same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
     }
 }
 
-/// Deferred ones first, then by pass, by order, and by number, in which it ends: what is sorted are numbers alone, as what they stand for is large.
+/// Returns a key that sorts deferred objects first, then by pass, by order and by index, which the
+/// key ends in. Sorting keys is faster than moving the objects themselves, which are large.
 fn sort_key(deferred: bool, pass: LitPass, order: f64, number: u32) -> u128 {
     let kind = u128::from(!deferred) << 8 | pass as u128;
-    // The bits of a float as a number that is greater for a greater one.
+    // Maps the bits of a float to an integer with the same order.
     let bits = order.to_bits();
     let order = if bits >> 63 == 0 { bits | 1 << 63 } else { !bits };
     kind << 96 | u128::from(order) << 32 | u128::from(number)
 }
 
-/// By what the objects of a pass are sorted: how far the farthest point of the bounding sphere is from the eye where they are opaque, as a
-/// room or a floor is behind what it holds, and the nearest one, the farthest first, where they are transparent.
+/// Returns the value that the objects of a pass are sorted by. For opaque objects, this is the distance from
+/// the eye to the farthest point of the bounding sphere, because a room or a floor lies behind what it
+/// contains. For transparent ones, it is the negative distance to the nearest point, so that the farthest
+/// object comes first.
 fn order(object: &Object, eye: DVec3, pass: LitPass) -> f64 {
     let center = (object.center - eye).length();
     match pass {

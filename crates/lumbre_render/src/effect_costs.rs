@@ -1,5 +1,5 @@
-//! What each effect of a scene costs and gives: milliseconds of a frame and how much the picture changes, measured by drawing frames with it
-//! and without it. Not a prediction, and not a choice of what is drawn.
+//! Measures what each effect of a scene costs and contributes: milliseconds per frame and the change of the
+//! picture, by drawing frames with it and without it. Nothing is predicted here, and no effect is chosen.
 
 use std::time::{Duration, Instant};
 
@@ -12,22 +12,23 @@ use crate::{
     Accounting, Display, FrameOptions, Gpu, Measure, Offscreen, OffscreenFormat, RenderError, Renderer,
 };
 
-/// An effect that a scene calls for and that a frame can do without.
+/// An effect that a scene calls for and that a frame can be drawn without.
 #[derive(Clone, Copy, Debug)]
 pub struct Removable {
-    /// The effect, as a line of the census names it.
+    /// The name of the effect in the census.
     pub effect: &'static str,
     without: fn(&mut World, &mut FrameOptions),
 }
 
 impl Removable {
-    /// Takes the effect out of a World, or out of the options of its frame.
+    /// Removes the effect from a World, or from the options of its frame.
     pub fn remove(&self, world: &mut World, options: &mut FrameOptions) {
         (self.without)(world, options);
     }
 }
 
-/// The effects that a scene, or the options of its frame, call for and that can be left out, in the order of the census.
+/// Returns the effects that a scene, or the options of its frame, call for and that can be removed, in the
+/// order of the census.
 pub fn removable_effects(census: &Census, options: &FrameOptions) -> Vec<Removable> {
     let called_for: Vec<_> = census.lines().into_iter().filter(|line| line.called_for).collect();
     let by_need = matches!(options.shading, Some(Shading::Auto { .. }));
@@ -37,11 +38,11 @@ pub fn removable_effects(census: &Census, options: &FrameOptions) -> Vec<Removab
     EFFECTS.iter().copied().filter(is_called_for).collect()
 }
 
-/// As a line of the census names it.
+/// The name of the effect in the census.
 pub(crate) const BY_NEED: &str = "shading by need";
 
 const EFFECTS: &[Removable] = &[
-    // Against the next cheaper shading.
+    // Compared with the next cheaper shading.
     Removable {
         effect: "Gouraud shading",
         without: |world, options| {
@@ -54,7 +55,8 @@ const EFFECTS: &[Removable] = &[
             shade_otherwise(world, options, |shading| shading == Shading::Phong, Shading::Gouraud);
         },
     },
-    // Against what it may not be far from: what it adds is below zero as a rule.
+    // Compared with Phong shading, from which the result differs by no more than a bound. The cost is usually
+    // negative.
     Removable {
         effect: BY_NEED,
         without: |world, options| {
@@ -88,7 +90,7 @@ const EFFECTS: &[Removable] = &[
         effect: "specular",
         without: |world, _| {
             each_surface(world, |surface| surface.specular = Vec3::ZERO);
-            // A metallic-roughness texture makes the coefficient per texel.
+            // A metallic-roughness texture sets the specular coefficient per texel.
             each_textures(world, |textures| textures.metallic_roughness = None);
         },
     },
@@ -128,7 +130,7 @@ fn settings(world: &mut World, change: impl FnOnce(&mut SceneSettings)) {
     change(&mut world.get_resource_or_insert_with(SceneSettings::default));
 }
 
-/// Switches lights off by their kind and whether they have a cone.
+/// Switches lights off by their kind and by whether they have a cone.
 fn switch_off(world: &mut World, which: impl Fn(LightKind, bool) -> bool) {
     for mut light in world.query::<&mut Light>().iter_mut(world) {
         let has_cone = light.spot.is_some_and(|cone| !cone.is_everywhere());
@@ -144,7 +146,8 @@ fn each_textures(world: &mut World, change: impl Fn(&mut MaterialTextures)) {
     world.query::<&mut MaterialTextures>().iter_mut(world).for_each(|mut textures| change(&mut textures));
 }
 
-/// Shades objects of one technique by another, whether they chose it themselves or the scene for them.
+/// Replaces one shading technique by another, both for objects that chose it themselves and for the scene's
+/// default.
 fn shade_otherwise(world: &mut World, options: &mut FrameOptions, from: fn(Shading) -> bool, to: Shading) {
     if options.shading.is_some_and(from) {
         options.shading = Some(to);
@@ -181,37 +184,41 @@ fn remove<C: Component>(world: &mut World) {
     }
 }
 
-/// What an effect costs, and what the picture owes to it.
+/// What an effect costs, and how much it changes the picture.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct EffectCost {
-    /// The effect, as a line of the census names it.
+    /// The name of the effect in the census.
     pub effect: &'static str,
-    /// Milliseconds that a frame takes longer with it: the median over the rounds. Below zero if the frame is slower without it.
+    /// Milliseconds that a frame takes longer with the effect: the median over the rounds. Negative if the
+    /// frame is slower without it.
     pub milliseconds: f64,
-    /// Half of the range that the middle half of the rounds lies in, in milliseconds.
+    /// Half of the interquartile range over the rounds, in milliseconds.
     pub spread: f64,
-    /// Root mean square of how much the radiance of a pixel and channel differs without it, relative to their mean with it.
+    /// Root mean square, over pixels and channels, of the change of radiance without the effect, relative to
+    /// the mean radiance with it.
     pub difference: f64,
 }
 
-/// What a frame costs, and what its effects have to do with it.
+/// What a frame costs, and how its effects contribute to that.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FrameCost {
-    /// The device that it was measured on, and its driver.
+    /// The device that it was measured on, with its driver.
     pub device: String,
     /// Width and height of the frame in pixels.
     pub size: [u32; 2],
-    /// Milliseconds of a frame with all effects, from the call until the device has finished: the median.
+    /// Milliseconds of a frame with all effects, from the call until the device has finished: the median over
+    /// the rounds.
     pub milliseconds: f64,
-    /// Rounds that were measured; in each every frame is drawn once.
+    /// Number of measured rounds. Each round draws every frame once.
     pub rounds: usize,
-    /// What each effect that can be left out costs.
+    /// The cost of each effect that can be removed.
     pub effects: Vec<EffectCost>,
-    /// What one frame with all effects went into, by stages, passes and effects, with the lights that its passes tested.
+    /// The account of one frame with all effects, by stages, passes and effects, with the lights that its
+    /// passes tested.
     pub accounting: Option<Accounting>,
 }
 
-/// A frame that is drawn again and again.
+/// A frame that is drawn repeatedly.
 struct Drawn {
     world: World,
     options: FrameOptions,
@@ -230,7 +237,7 @@ impl Drawn {
         Ok(begun.elapsed().as_secs_f64() * 1e3)
     }
 
-    /// What a frame goes into; its lights are counted by another one.
+    /// Returns the account of a frame. Its lights are counted in a second frame.
     fn accounting(&mut self, target: &Offscreen) -> Result<Option<Accounting>, RenderError> {
         let mut measured = |measure| -> Result<Option<Accounting>, RenderError> {
             let options = FrameOptions { measure, ..self.options.clone() };
@@ -245,7 +252,7 @@ impl Drawn {
         Ok(accounting)
     }
 
-    /// Red, green and blue of each pixel, as radiance.
+    /// Returns red, green and blue of each pixel, as radiance.
     fn radiance(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<Vec<Vec3>, RenderError> {
         let target = Offscreen::new(gpu, size[0], size[1], OffscreenFormat::LinearFloat)?;
         let options = FrameOptions {
@@ -259,16 +266,17 @@ impl Drawn {
     }
 }
 
-/// Fewest rounds: with less there is no spread to speak of.
+/// Fewest rounds: with fewer, the spread would be meaningless.
 const FEWEST_ROUNDS: usize = 5;
-/// Most rounds: what varies after these varies with the hour.
+/// Most rounds: variations over a longer time come from the machine's load.
 const MOST_ROUNDS: usize = 101;
 
-/// Measures a scene's frame with all its effects, and without each of `effects` in turn. `scene` makes the scene with the options of its
-/// frame anew, once for each of them. Rounds go on for about `time`, interleaved, so that what else the machine does meets all alike.
+/// Measures a scene's frame with all its effects, and without each of `effects` in turn. `scene` creates the
+/// scene and the options of its frame anew for each of these. Rounds go on for about `time`; they are
+/// interleaved, so that the machine's other load affects all frames alike.
 ///
 /// # Errors
-/// [`RenderError`], as drawing a frame has it, or what `scene` returns.
+/// [`RenderError`], as for drawing a frame, or what `scene` returns.
 pub fn effect_costs<E: From<RenderError>>(
     gpu: &Gpu,
     scene: &mut dyn FnMut() -> Result<(World, FrameOptions), E>,
@@ -286,7 +294,7 @@ pub fn effect_costs<E: From<RenderError>>(
     let pictures = frames.iter_mut().map(|frame| frame.radiance(gpu, size)).collect::<Result<Vec<_>, _>>()?;
 
     let target = Offscreen::new(gpu, size[0], size[1], OffscreenFormat::Rgba8)?;
-    // Pipelines are made, and buffers grow, in the first frames.
+    // Pipelines are created and buffers grow in the first frames.
     for frame in &mut frames {
         frame.milliseconds(&target)?;
         frame.milliseconds(&target)?;
@@ -313,14 +321,15 @@ pub fn effect_costs<E: From<RenderError>>(
     })
 }
 
-/// The values that a quarter, half and three quarters of at least one number lie below.
+/// Returns the lower quartile, the median and the upper quartile of a non-empty list.
 fn quartiles(mut numbers: Vec<f64>) -> [f64; 3] {
     numbers.sort_by(f64::total_cmp);
     let last = numbers.len() - 1;
     [1, 2, 3].map(|quarter| numbers[quarter * last / 4])
 }
 
-/// Root mean square of the difference of two pictures, relative to the mean of the first; 0 for equal ones.
+/// Returns the root mean square of the difference of two pictures, relative to the mean of the first; 0 for
+/// equal pictures.
 fn relative_difference(with: &[Vec3], without: &[Vec3]) -> f64 {
     let numbers = 3.0 * with.len() as f64;
     let squares = with.iter().zip(without).map(|(a, b)| (a.as_dvec3() - b.as_dvec3()).length_squared());

@@ -1,4 +1,5 @@
-//! What each effect of a renderer does in a frame beside its passes: its time on the CPU, and by how much its work has grown.
+//! What each effect of a renderer does in a frame outside of its passes: its CPU time, and what it uploaded
+//! and created.
 
 use crate::accounting::EffectShare;
 use crate::effects::{Effect, EffectWork};
@@ -9,7 +10,7 @@ use crate::statistics::Uploads;
 pub(crate) struct EffectShares {
     /// Milliseconds on the CPU, by effect.
     pub ms: Vec<f64>,
-    /// Until the end of the last frame.
+    /// The effects' counters at the end of the last frame.
     worked: Vec<EffectWork>,
 }
 
@@ -21,7 +22,8 @@ impl EffectShares {
         self.worked.resize(effects.len(), EffectWork::default());
     }
 
-    /// Ends a frame: what each effect did in it. What they uploaded themselves is added to the frame's uploads.
+    /// Ends a frame and returns what each effect did in it. What the effects uploaded themselves is added to
+    /// the frame's uploads.
     pub fn end(&mut self, effects: &[Box<dyn Effect>], uploads: &mut Uploads) -> Vec<EffectShare> {
         let mut shares = Vec::with_capacity(effects.len());
         for ((effect, ms), worked) in effects.iter().zip(&self.ms).zip(&mut self.worked) {

@@ -1,9 +1,9 @@
-//! What can go wrong between a World and a frame.
+//! The errors of drawing a frame.
 
-/// Any error of an effect, which [`RenderError::Effect`] carries with the effect's name.
+/// Any error of an effect; [`RenderError::Effect`] carries it together with the effect's name.
 pub type EffectError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why there is no frame.
+/// Why a frame could not be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// No driver offers a device.
@@ -12,21 +12,21 @@ pub enum RenderError {
          draws without a GPU) ({source})"
     )]
     NoAdapter {
-        /// What wgpu tried.
+        /// The error of wgpu, which lists what was tried.
         source: wgpu::RequestAdapterError,
     },
-    /// WGPU_ADAPTER_NAME names none.
+    /// The environment variable WGPU_ADAPTER_NAME matches no adapter.
     #[error(
         "no graphics device is named like `{name}` (WGPU_ADAPTER_NAME); unset it to take the default one"
     )]
     NoAdapterNamed {
-        /// The name asked for.
+        /// The name that was asked for.
         name: String,
     },
     /// The device could not be opened.
     #[error("the graphics device could not be opened: {0}")]
     Device(#[from] wgpu::RequestDeviceError),
-    /// A device that was handed in allows less than a frame binds.
+    /// A device that was passed in has a lower limit than a frame needs.
     #[error(
         "the device's {limit} is {found}, and a frame needs {least}: ask for `wgpu::Limits::default()` or the adapter's own limits"
     )]
@@ -38,25 +38,25 @@ pub enum RenderError {
         /// What the device allows.
         found: u64,
     },
-    /// The device is gone (driver reset, unplugged): a new `Gpu` and `Renderer` are needed.
+    /// The device is gone (driver reset, unplugged). A new `Gpu` and a new `Renderer` are needed.
     #[error("the graphics device is lost; create a new Gpu and Renderer")]
     DeviceLost,
-    /// The device refused a command: out of memory, or a fault of ours.
+    /// The device refused a command: it is out of memory, or this crate has a bug.
     #[error("the graphics device refused a command: {message}")]
     Refused {
-        /// The device's words.
+        /// The device's error message.
         message: String,
     },
-    /// A window's surface could not be made.
+    /// A window's surface could not be created.
     #[error("the window gives no surface to draw on: {0}")]
     Surface(#[from] wgpu::CreateSurfaceError),
-    /// The surface and the device do not fit together.
+    /// The device cannot present to the surface.
     #[error("the graphics device `{adapter}` cannot present to this window")]
     SurfaceUnsupported {
         /// The adapter's name.
         adapter: String,
     },
-    /// A viewport that is empty, or reaches beyond its texture.
+    /// A viewport is empty or reaches beyond its texture.
     #[error(
         "the viewport of {} x {} texels at ({}, {}) does not lie within its target of {} x {}: give it a size of 1 or more, and keep it inside",
         size[0], size[1], origin[0], origin[1], texture[0], texture[1]
@@ -69,28 +69,28 @@ pub enum RenderError {
         /// Width and height of the texture.
         texture: [u32; 2],
     },
-    /// No camera to draw from.
+    /// The World has no camera.
     #[error("the World has no Camera: spawn one with `Camera::default()` and a Transform")]
     NoCamera,
-    /// The entity asked for is no camera.
+    /// The entity that was asked for is not a camera.
     #[error("entity {entity} has no Camera and GlobalTransform")]
     NotACamera {
         /// The entity.
         entity: bevy_ecs::entity::Entity,
     },
-    /// A camera's numbers make no picture.
+    /// A camera has a value that cannot give a picture.
     #[error("camera {entity}: {field} is {value}; it must be {wanted}")]
     BadCamera {
         /// The entity.
         entity: bevy_ecs::entity::Entity,
-        /// The field of `Projection` or the transform.
+        /// The field of `Projection`, of `Camera` or of the transform.
         field: &'static str,
         /// Its value.
         value: f64,
-        /// Its range.
+        /// The valid range.
         wanted: &'static str,
     },
-    /// Larger than the device's textures.
+    /// The frame is larger than the device's largest texture.
     #[error("a frame of {width}x{height} is beyond this device's {limit} texels; ask for a smaller one")]
     TargetTooLarge {
         /// Width in texels.
@@ -100,7 +100,7 @@ pub enum RenderError {
         /// The device's limit for either side.
         limit: u32,
     },
-    /// A texture that is no picture.
+    /// An image's data does not match its size.
     #[error(
         "image `{name}`: {width}x{height} texels, but {found} values instead of {expected}; sizes start at 1"
     )]
@@ -111,22 +111,23 @@ pub enum RenderError {
         width: u32,
         /// Height in texels.
         height: u32,
-        /// Values there are.
+        /// Number of values that were found.
         found: usize,
-        /// Values there should be.
+        /// Number of values that the size requires.
         expected: u64,
     },
-    /// More than a storage buffer holds, or a texture where tables are textures.
+    /// The data exceeds the largest storage buffer, or the largest texture on devices that keep tables in
+    /// textures.
     #[error("{what}: {bytes} bytes are beyond the {limit} that this device has room for; have fewer of them")]
     BufferTooLarge {
         /// What was to be stored.
         what: &'static str,
         /// Bytes needed.
         bytes: u64,
-        /// Bytes there are.
+        /// Bytes that fit.
         limit: u64,
     },
-    /// An emissive object makes more polygon lights than anyone would want to wait for.
+    /// An emissive object has too many faces to be evaluated as polygon lights in reasonable time.
     #[error(
         "`{object}`: {faces} or more of its emissive faces would light other objects, beyond the limit of {limit}; give the lamp \
          a simpler mesh, or take its EmissiveLight (LUMBRE_object.emissiveLight) away and put a light in its place"
@@ -134,48 +135,48 @@ pub enum RenderError {
     TooManyEmissiveFaces {
         /// Name of the object.
         object: String,
-        /// Polygons that they make, at least.
+        /// Number of polygons that its faces make, or a lower bound of it.
         faces: usize,
         /// The limit.
         limit: usize,
     },
-    /// A shader variant does not compile: a fault of ours, not of the scene.
+    /// A shader variant does not compile. This is a bug in this crate, not in the scene.
     #[error("shader variant [{variant}]: {message}")]
     Shader {
         /// The features of the variant.
         variant: String,
-        /// The compiler's words.
+        /// The compiler's error message.
         message: String,
     },
     /// An effect could not be prepared.
     #[error("effect `{effect}`: {source}")]
     Effect {
-        /// Its name.
+        /// Name of the effect.
         effect: &'static str,
-        /// What it met.
+        /// The effect's error.
         source: EffectError,
     },
-    /// A frame that needs a display pass, by a renderer without one.
+    /// The frame needs a display pass, and the renderer has none.
     #[error(
         "the frame needs a display pass (several samples per pixel, blended surfaces, a viewport, the probe, or an effect between light and display ask for one), and the renderer was \
          built without one: leave `BuiltIn::Display` in, or add an effect at `Stage::Display`"
     )]
     NoDisplay,
-    /// The render graph refuses.
+    /// The render graph is invalid.
     #[error(transparent)]
     Graph(#[from] Box<lumbre_graph::GraphError>),
-    /// The render graph fails while it runs.
+    /// The render graph failed while it ran.
     #[error(transparent)]
     Run(#[from] lumbre_graph::RunError),
-    /// A picture could not be written.
+    /// An image file could not be written.
     #[error("cannot write the picture {}: {source}", path.display())]
     Picture {
         /// The file.
         path: std::path::PathBuf,
-        /// Why.
+        /// The error of the encoder.
         source: image::ImageError,
     },
-    /// Reading back failed.
+    /// Reading a texture back failed.
     #[error("reading the frame back failed: {0}")]
     ReadBack(String),
 }

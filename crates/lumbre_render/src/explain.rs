@@ -1,4 +1,5 @@
-//! What a scene calls for and what it does not, without a device: the census, the passes with their reasons, the shader variants.
+//! Explains what a scene needs and what it does not, without a device: the census, the passes with their
+//! reasons, and the shader variants.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -24,31 +25,32 @@ use crate::shading_by_need::{Conditions, WorldNeeds, is_shaded_by_need};
 use crate::shading_need::ShadingNeed;
 use crate::{FrameOptions, RenderError, Renderer};
 
-/// A scene's frame, explained.
+/// The explanation of a scene's frame.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct SceneExplanation {
-    /// What there is, and what there is none of.
+    /// What the scene contains and what it does not.
     pub census: Census,
-    /// Spotlights whose cone falls between the points where an object is lit.
+    /// Spotlights whose cone falls between the points at which an object is lit.
     pub hidden_cones: Vec<HiddenCone>,
     /// The passes and resources of a frame.
     pub frame: Explanation,
-    /// Whether opaque surfaces are lit where they are drawn or afterwards, and why.
+    /// Whether opaque surfaces are lit forward or deferred, and why.
     pub rendering_path: String,
-    /// By which lists lights are found, and why.
+    /// Which lists lights are found by, and why.
     pub light_lists: Vec<String>,
-    /// What objects take that are shaded by need, and why; nothing where none is.
+    /// What was chosen for objects that are shaded by need, and why; empty if there are none.
     pub shading_by_need: Vec<ShadingNeed>,
     /// Each shader variant in use with the number of objects it draws.
     pub variants: BTreeMap<String, usize>,
-    /// What each effect costs, where somebody has measured it (see [`crate::effect_costs`]).
+    /// What each effect costs, if it has been measured (see [`crate::effect_costs`]).
     pub cost: Option<FrameCost>,
 }
 
-/// Explains the frame that these options would draw of `world`, in a target of this size.
+/// Explains the frame that would be drawn of `world` with these options into a target of this size.
 ///
 /// # Errors
-/// Faults of the graph; too many emissive faces on one object.
+/// [`RenderError::Graph`] if the graph is invalid, [`RenderError::TooManyEmissiveFaces`] if one object has
+/// too many.
 pub fn explain(
     world: &mut World,
     options: &FrameOptions,
@@ -59,10 +61,11 @@ pub fn explain(
 }
 
 impl Renderer {
-    /// Explains the frame that these options would draw of `world` in a target of this size, this renderer's effects among its passes. Draws nothing.
+    /// Explains the frame that would be drawn of `world` with these options into a target of this size,
+    /// including this renderer's own effects. Draws nothing.
     ///
     /// # Errors
-    /// As [`explain`].
+    /// The same as those of [`explain`].
     pub fn explain(
         &mut self,
         world: &mut World,
@@ -76,7 +79,7 @@ impl Renderer {
     }
 }
 
-/// As [`explain`], for a frame with these effects; `software` on a software rasterizer.
+/// Like [`explain`], for a frame with these effects. `software` is true for a software rasterizer.
 fn explain_with(
     world: &mut World,
     effects: &mut [Box<dyn Effect>],
@@ -130,13 +133,13 @@ fn explain_with(
     let light_lists = lights.listing(options.light_lists, clustered, objects.len());
     let target = TextureDescriptor::new_2d(width, height, target_format);
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE;
-    // Tables in textures are no resources of the graph.
+    // Tables in textures are not resources of the graph.
     let light = bindings.light_resources().filter(|(_, buffer)| !(software && buffer.is_table()));
     let light = light.map(|(name, buffer)| (name, buffer, usage));
     let frame =
         declare(effects.iter(), &plan, (target, None, &mut { light }), Last::default()).compile()?.explain();
     let hidden_cones = match options.shading {
-        // Whatever the objects ask for.
+        // This overrides what the objects ask for, and no cone falls between fragments.
         Some(Shading::Phong) => Vec::new(),
         _ => hidden_cones(world),
     };
@@ -154,7 +157,7 @@ fn explain_with(
 }
 
 impl SceneExplanation {
-    /// For people in a hurry: what runs. [`Self::to_text`] says also what does not, and why.
+    /// Formats the explanation briefly: what runs. [`Self::to_text`] also lists what does not run, and why.
     pub fn to_short_text(&self) -> String {
         let lines = self.census.lines();
         let mut text = self.heading();
@@ -204,7 +207,7 @@ impl SceneExplanation {
         })
     }
 
-    /// For people: every effect and every pass, with the reason why it runs or does not.
+    /// Formats the whole explanation: every effect and every pass, with the reason why it runs or does not.
     pub fn to_text(&self) -> String {
         let mut text = self.heading();
         for line in self.census.lines() {
@@ -237,7 +240,7 @@ impl SceneExplanation {
         text + &self.account()
     }
 
-    /// What objects take that are shaded by need.
+    /// Writes what was chosen for objects that are shaded by need.
     fn write_needs(&self, text: &mut String) {
         if self.shading_by_need.is_empty() {
             return;
@@ -248,7 +251,7 @@ impl SceneExplanation {
         }
     }
 
-    /// What a frame went into, where it was measured.
+    /// Formats the account of the measured frame, if there is one.
     fn account(&self) -> String {
         let accounting = self.cost.as_ref().and_then(|cost| cost.accounting.as_ref());
         accounting.map_or_else(String::new, |accounting| {

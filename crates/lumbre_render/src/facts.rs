@@ -1,5 +1,6 @@
-//! The facts that decide what a frame does: the scene's census, and how many objects each pass draws of it. Passes, shader variants and light lists follow from these,
-//! and so does what `explain` prints. Not the counting: objects and lights are counted where they are extracted.
+//! The facts that decide what a frame does: the scene's census, and how many objects each pass would draw.
+//! Passes, shader variants, light lists and the output of `explain` all follow from these. Counting is not
+//! done here: objects and lights are counted where they are extracted.
 
 use std::sync::Arc;
 
@@ -10,36 +11,39 @@ use crate::extract::LightSet;
 use crate::g_buffer::GBufferContents;
 use crate::rendering_path::ChosenPath;
 
-/// What a scene and the options of a frame come to.
+/// The facts about a scene and the options of its frame.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SceneFacts {
-    /// What there is of everything: of what can be drawn, wherever the camera looks.
+    /// Counts of everything in the scene that can be drawn, wherever the camera looks.
     pub census: Arc<Census>,
-    /// Shown opaque objects that are not lit by a lightmap, without those that refract.
+    /// Opaque objects that are not lit by a lightmap, without refractive ones. Like all counts here, this
+    /// includes only objects that are not hidden.
     pub opaque: usize,
-    /// Shown opaque objects with a lightmap, whether lightmaps are switched on or not.
+    /// Opaque objects with a lightmap, without refractive ones, whether lightmaps are switched on or not.
     pub lightmapped: usize,
-    /// Shown objects through which what lies behind them is drawn, if that is switched on.
+    /// Objects through which what lies behind them is drawn; 0 if refraction is switched off.
     pub refractive: usize,
-    /// Shown objects that are blended.
+    /// Objects that are blended.
     pub transparent: usize,
-    /// Lights that shine, ambient ones apart; each face of an emissive object that lights others is one.
+    /// Lights that shine, except ambient ones. Each face of an emissive object that lights others counts as
+    /// one.
     pub lights: u32,
-    /// Of these, the lights that ask for a shadow.
+    /// How many of these lights ask for a shadow.
     pub shadow_lights: u32,
-    /// Samples of a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Whether opaque surfaces are lit where they are drawn or afterwards.
+    /// Whether opaque surfaces are lit forward or deferred.
     pub(crate) path: ChosenPath,
-    /// What they are lit from afterwards, as far as they can be.
+    /// The contents of the G-buffer, if the frame is shaded deferred.
     pub(crate) g_buffer: Option<GBufferContents>,
-    /// What the scene sets: ambient light, fog, background, rates of evaluation.
+    /// The scene's settings: ambient light, fog, background, rates of evaluation.
     pub settings: SceneSettings,
 }
 
 impl SceneFacts {
-    /// Of objects, lights, and so many irradiance volumes that can be used, for a frame of this size; `software` on a software rasterizer.
+    /// Derives the facts from counts of objects, lights and usable irradiance volumes, for a frame of this
+    /// size. `software` is true on a software rasterizer.
     pub(crate) fn new(
         objects: &ObjectCensus,
         lights: &LightSet,
@@ -72,12 +76,12 @@ impl SceneFacts {
         }
     }
 
-    /// Whether what mirrors show is drawn as views of their own, where any is in sight.
+    /// Returns true if the views in mirrors are to be drawn, where a mirror is in sight.
     pub(crate) fn calls_for_mirrors(&self, options: &FrameOptions) -> bool {
         options.mirror_depth > 0 && self.census.planar_mirrors > 0
     }
 
-    /// Whether anything of a frame is lit by an irradiance volume.
+    /// Returns true if any object of the frame is lit by an irradiance volume.
     pub(crate) fn calls_for_irradiance_volumes(&self, options: &FrameOptions) -> bool {
         options.irradiance_volumes && self.census.lit_by_volume > 0
     }

@@ -1,5 +1,6 @@
-//! Group 0 of the forward shader: which of a frame's buffers a variant reads, and the layout that holds these and no others. The bindings are those of shaders/frame.wesl,
-//! shaders/light_clusters.wesl and shaders/light_counts.wesl. What stands in the buffers is not decided here.
+//! Group 0 of the lit shaders: which of a frame's buffers a variant reads, and the layout with just these.
+//! The bindings are those of shaders/frame.wesl, shaders/light_clusters.wesl and shaders/light_counts.wesl.
+//! The contents of the buffers are not defined here.
 
 use lumbre_optics::Shading;
 
@@ -18,17 +19,17 @@ pub(crate) enum FrameBuffer {
     LightList,
     ClusterGrid,
     ClusterLists,
-    /// As many as a uniform buffer holds.
+    /// Inverse-square lights in a uniform buffer, as many as fit.
     UniformLights,
-    /// The same lights, any number.
+    /// The same lights in a table, any number of them.
     InverseSquareLights,
-    /// Where fragments count lights.
+    /// Light counts of fragments.
     LightCounts,
-    /// Where vertices do.
+    /// Light counts of vertices.
     VertexLightCounts,
 }
 
-/// Some of the buffers of group 0.
+/// A set of buffers of group 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct FrameBindings(u16);
 
@@ -56,7 +57,7 @@ impl FrameBuffer {
         matches!(self, Self::Frame | Self::ClusterGrid | Self::UniformLights)
     }
 
-    /// Whether it is a texture on a device that reads tables from textures.
+    /// Returns true if it is a texture on a device that keeps tables in textures.
     pub fn is_table(self) -> bool {
         match self {
             Self::Objects | Self::Materials | Self::Instances => true,
@@ -66,12 +67,13 @@ impl FrameBuffer {
         }
     }
 
-    /// Whether shaders write it.
+    /// Returns true if shaders write it.
     pub fn is_counted_in(self) -> bool {
         matches!(self, Self::LightCounts | Self::VertexLightCounts)
     }
 
-    /// The stages that it is bound for: what is written is for one alone, as a device may have it in fragments and not in vertices.
+    /// Returns the stages that it is bound for. Counts are bound for one stage only, because a device may
+    /// support writes in fragments but not in vertices.
     fn visibility(self) -> wgpu::ShaderStages {
         match self {
             Self::LightCounts => wgpu::ShaderStages::FRAGMENT,
@@ -80,7 +82,7 @@ impl FrameBuffer {
         }
     }
 
-    /// The name of the graph's resource, if it holds light.
+    /// Returns the name of the graph's resource if the buffer holds light.
     pub fn light_resource(self) -> Option<&'static str> {
         match self {
             Self::Frame | Self::Objects | Self::Materials | Self::Instances => None,
@@ -95,7 +97,7 @@ impl FrameBuffer {
 }
 
 impl FrameBindings {
-    /// What a variant reads.
+    /// Returns the buffers that a variant reads.
     pub fn of(variant: &Variant) -> Self {
         let has = |feature| variant.has(feature);
         let listed = has(Feature::DynamicLights) || has(Feature::StaticLights);
@@ -115,7 +117,7 @@ impl FrameBindings {
         Self(FrameBuffer::ALL.into_iter().filter(reads).map(|buffer| 1 << buffer.binding()).sum())
     }
 
-    /// These and others.
+    /// Returns the union of both sets.
     pub fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
@@ -124,15 +126,16 @@ impl FrameBindings {
         FrameBuffer::ALL.into_iter().filter(move |buffer| self.0 & (1 << buffer.binding()) != 0)
     }
 
-    /// Whether a pass counts lights in one of them: each pass is bound its own counts then.
+    /// Returns true if lights are counted in one of them. Each pass then needs a bind group with its own
+    /// counts.
     pub fn count_lights(self) -> bool {
         self.buffers().any(FrameBuffer::is_counted_in)
     }
 
-    /// Those that hold light, by the name of the graph's resource, each once.
+    /// Returns the buffers that hold light, each once, with the name of the graph's resource.
     pub fn light_resources(self) -> impl Iterator<Item = (&'static str, FrameBuffer)> {
         let both = [FrameBuffer::UniformLights, FrameBuffer::InverseSquareLights];
-        // The same buffer, bound in two ways.
+        // Both are the same buffer, bound in two ways.
         let last = both.iter().all(|buffer| self.0 & (1 << buffer.binding()) != 0).then_some(both[1]);
         let named = self.buffers().filter(move |buffer| Some(*buffer) != last);
         named.filter_map(|buffer| Some((buffer.light_resource()?, buffer)))

@@ -1,4 +1,5 @@
-//! What a frame is decided to be, and what it was asked for: plain data, so that a frame can go on as the one before, or be that one.
+//! What was asked of a frame and what was decided for it. This is plain data, so that a later frame can reuse
+//! the decision while pipelines are missing, or be recognized as unchanged.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -21,7 +22,7 @@ use crate::{
     FrameOptions, FrameTarget, LitPasses, Measure, MissingPipelines, PassLights, Statistics, Viewport,
 };
 
-/// What the variants and passes of a frame follow from.
+/// What the shader variants and passes of a frame follow from.
 #[derive(Clone, Debug)]
 pub(crate) struct Decision {
     pub options: FrameOptions,
@@ -30,43 +31,43 @@ pub(crate) struct Decision {
     pub features: FrameFeatures,
 }
 
-/// Decisions whose pipelines are there, by the kind of their target.
+/// Decisions whose pipelines all exist, by the kind of their target.
 #[derive(Debug, Default)]
 pub(crate) struct Decisions {
     world: Option<WorldId>,
     made: Vec<(TargetKind, Decision)>,
 }
 
-/// The format of a target, and whether the frame fills a part of it.
+/// The format of a target, and whether the frame fills only a part of it.
 type TargetKind = (wgpu::TextureFormat, bool);
 
 fn target_kind(target: &FrameTarget) -> TargetKind {
     (target.format(), target.viewport.is_some())
 }
 
-/// A frame that is decided, ready to be uploaded and encoded.
+/// A frame that has been decided, ready to be uploaded and encoded.
 #[derive(Debug)]
 pub(crate) struct Decided {
     pub decision: Decision,
-    /// By effect: whether its passes are in the graph, and whether it is called for.
+    /// For each effect: whether its passes are in the graph, and whether it is called for.
     pub declared: Vec<bool>,
     pub called_for: Vec<bool>,
     pub lights: SceneLights,
     pub draws: Draws,
-    /// What is seen in mirrors.
+    /// What is visible in mirrors.
     pub mirrors: Vec<MirrorView>,
     pub light_list: Vec<u32>,
-    /// On average.
+    /// Average over the objects.
     pub lights_per_object: f32,
-    /// What objects in view take that are shaded by need.
+    /// What was chosen for the objects in view that are shaded by need.
     pub shading_by_need: ShadingNeeds,
-    /// An effect that is called for draws the shapes of objects.
+    /// Whether an effect that is called for draws the shapes of objects.
     pub draws_objects: bool,
-    /// What the frame was decided from.
+    /// The census that the frame was decided from.
     pub census: Arc<Census>,
 }
 
-/// From where a frame is seen, and where it goes.
+/// The view of a frame and its target.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen<'a> {
     pub target: &'a FrameTarget,
@@ -84,7 +85,7 @@ pub(crate) struct AskedFrame {
     format: wgpu::TextureFormat,
 }
 
-/// The last frame, for one in which nothing has changed.
+/// The last frame, which is drawn again if nothing has changed.
 #[derive(Debug)]
 pub(crate) struct LastFrame {
     pub asked: AskedFrame,
@@ -92,14 +93,15 @@ pub(crate) struct LastFrame {
     pub statistics: Statistics,
     pub view: CameraView,
     pub exposure: f32,
-    /// It waits for pipelines: the next one may be another.
+    /// It was drawn while pipelines were missing, so the next frame may differ.
     pub waits: bool,
-    /// What was drawn of it, and into which texture.
+    /// The plan that was run, and the texture that was drawn into.
     pub drawn: Option<(Arc<Plan>, wgpu::Texture)>,
 }
 
 impl Decisions {
-    /// The decision that a frame can go on with: none if it is to wait for its pipelines, or is the first of its kind.
+    /// Returns the decision that a frame can be drawn with while pipelines are missing; `None` if it has to
+    /// wait for them, or is the first of its kind.
     pub fn former(
         &mut self,
         world: &World,
@@ -114,7 +116,7 @@ impl Decisions {
         former.filter(|_| !waits).map(|(_, decision)| decision.clone())
     }
 
-    /// Keeps a decision whose pipelines are there.
+    /// Keeps a decision whose pipelines all exist.
     pub fn keep(&mut self, target: &FrameTarget, decision: &Decision) {
         let kind = target_kind(target);
         self.made.retain(|(other, _)| *other != kind);
@@ -123,7 +125,7 @@ impl Decisions {
 }
 
 impl Decision {
-    /// What effects are told of it.
+    /// Returns what effects need to know about the frame.
     pub fn shape(&self, seen: &Seen<'_>) -> FrameShape {
         self.plan.shape(seen.target, self.options.display, seen.exposure)
     }
@@ -134,22 +136,22 @@ impl Decision {
 }
 
 impl Decided {
-    /// Whether any of its draws counts lights.
+    /// Returns true if any of its draws counts lights.
     pub fn counts_lights(&self) -> bool {
         self.draws.pipelines().any(|pipeline| pipeline.variant.has(Feature::CountLights))
     }
 
-    /// The draws of each view: the camera's first, then those of mirrors.
+    /// Returns the draws of each view: the camera's first, then those in mirrors.
     pub fn every_draws(&self) -> impl Iterator<Item = &Draws> {
         std::iter::once(&self.draws).chain(self.mirrors.iter().map(|mirror| &mirror.draws))
     }
 
-    /// Every batch of every view.
+    /// Returns every batch of every view.
     pub fn batches(&self) -> impl Iterator<Item = &Batch> {
         self.every_draws().flat_map(Draws::batches)
     }
 
-    /// What each of its lit passes draws and tests.
+    /// Returns what each of its lit passes draws and tests.
     pub fn lit_passes(&self) -> LitPasses {
         LitPasses {
             lightmap: self.pass_lights(LitPass::Lightmap),
@@ -189,13 +191,14 @@ impl Decided {
         PassLights {
             objects,
             draws: batches.len() + classes().count(),
-            // Fewer than 2^32 lights have room; one may be in the lists of vertices and of clusters both.
+            // There are fewer than 2^32 lights. A light may be in the lists of objects and in those of
+            // clusters, hence the minimum.
             lights: (lights.len() as u32 + clustered).min(set.every.all),
             lights_per_object: entries as f32 / objects.max(1) as f32,
         }
     }
 
-    /// The buffers of group 0 that any of its draws reads.
+    /// Returns the buffers of group 0 that any of its draws reads.
     pub fn bindings(&self) -> FrameBindings {
         let pipelines = self.every_draws().flat_map(Draws::pipelines);
         let of = pipelines.map(|pipeline| FrameBindings::of(&pipeline.variant));
@@ -205,7 +208,7 @@ impl Decided {
 
 impl AskedFrame {
     pub fn new(world: &World, target: &FrameTarget, options: &FrameOptions) -> Self {
-        // Whether it is measured changes nothing of it, unless its shaders count.
+        // Measuring does not change the picture or its draws, unless lights are counted.
         let measure = if options.measure == Measure::Lights { Measure::Lights } else { Measure::Nothing };
         let options = FrameOptions { measure, keep_unchanged: false, ..options.clone() };
         Self {
@@ -219,18 +222,19 @@ impl AskedFrame {
 }
 
 impl LastFrame {
-    /// Whether a frame that was asked for so is this one, if nothing has changed in the World.
+    /// Returns true if a frame that was asked for like this equals this one, provided that nothing has
+    /// changed in the World.
     pub fn is(&self, asked: &AskedFrame) -> bool {
         !self.waits && self.asked == *asked
     }
 
-    /// Its plan, if it is in this texture.
+    /// Returns its plan if it was drawn into this texture.
     pub fn plan_in(&self, target: &FrameTarget) -> Option<&Arc<Plan>> {
         self.drawn.as_ref().filter(|(_, texture)| *texture == target.texture).map(|(plan, _)| plan)
     }
 }
 
-/// The camera that a frame was asked for, in one that goes on as another.
+/// Returns the options with the camera that the current frame was asked for.
 pub(crate) fn with_camera(options: &FrameOptions, camera: Option<Entity>) -> FrameOptions {
     FrameOptions { camera, ..options.clone() }
 }

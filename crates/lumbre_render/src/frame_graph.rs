@@ -1,4 +1,5 @@
-//! The graph of a frame: the effects' passes in the order of their stages, the overlay, and the way back of what was counted.
+//! Declares the render graph of a frame and runs it: the effects' passes in the order of their stages, then
+//! the overlay and the copy of the light counts.
 
 use lumbre_graph::{BufferDescriptor, BufferRead, Executor, Frame, Imports, LoadOp, TextureDescriptor};
 
@@ -8,18 +9,18 @@ use crate::frame_plan::FramePlan;
 use crate::frame_scene::FrameScene;
 use crate::{FrameTarget, Gpu, RenderError, Viewport};
 
-/// What draws over the finished frame.
+/// Draws over the finished frame.
 pub(crate) type Overlay<'a> = Box<dyn FnOnce(&mut wgpu::RenderPass<'static>) + 'a>;
 
 /// What comes after all effects.
 #[derive(Default)]
 pub(crate) struct Last<'a> {
     pub overlay: Option<Overlay<'a>>,
-    /// Where lit passes have counted lights, and where that is copied to.
+    /// The buffer that lit passes count lights in, and the buffer that it is copied to.
     pub counts: Option<[wgpu::Buffer; 2]>,
 }
 
-/// A buffer that surfaces take light from, by its name in the graph.
+/// A buffer that surfaces are lit from, with its name in the graph.
 pub(crate) type LightBuffer = (&'static str, FrameBuffer, wgpu::BufferUsages);
 
 /// Declares the frame's graph and runs it.
@@ -44,7 +45,7 @@ pub(crate) fn run_graph<'a>(
     Ok(executor.execute_with(&gpu.device, &gpu.queue, graph, &imports, scene)?)
 }
 
-/// The passes of a frame.
+/// Declares the passes of a frame.
 pub(crate) fn declare<'a>(
     effects: impl IntoIterator<Item = &'a Box<dyn Effect>>,
     plan: &FramePlan,
@@ -74,7 +75,7 @@ pub(crate) fn declare<'a>(
             Ok(())
         });
     if let Some([counts, copy]) = counts {
-        // In the frame's own commands: another submission would wait for them.
+        // This is part of the frame's own commands; a separate submission would have to wait for them.
         graph.set_owner("light counts");
         let pass = graph.transfer_pass("light counts").after("overlay");
         pass.side_effect("brings counts of lights to memory").run(move |context| {

@@ -1,4 +1,5 @@
-//! What is decided of a frame before its graph is declared: formats, samples, and how radiance reaches the target.
+//! What is decided about a frame before its graph is declared: formats, samples, and how radiance is
+//! converted to the target's values.
 
 use crate::extract::{MirrorSurface, RefractorSurface};
 use crate::facts::SceneFacts;
@@ -6,30 +7,30 @@ use crate::rehearsal::Rehearsals;
 use crate::statistics::Uploads;
 use crate::{Display, FrameOptions, FrameTarget, Gpu, Viewport};
 
-/// How radiance reaches the target.
+/// How radiance is converted to the target's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ending {
-    /// The target takes radiance as it is.
+    /// The lit shaders write radiance directly into the target.
     Direct,
-    /// The lit shaders write the target's numbers: there is no display pass.
+    /// The lit shaders write the target's final values; there is no display pass.
     Folded,
-    /// By a pass of its own, from the linear frame.
+    /// A separate pass converts the linear frame.
     DisplayPass,
 }
 
-/// Decisions about a frame: formats, samples, and its end.
+/// The plan of a frame: formats, samples, and how it ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FramePlan {
-    /// Of the linear frame.
+    /// Format of the linear frame.
     pub linear_format: wgpu::TextureFormat,
-    /// Of what lit colours are drawn into.
+    /// Format that lit colours are drawn into.
     pub lit_format: wgpu::TextureFormat,
     pub samples: u32,
     pub ending: Ending,
 }
 
 impl FramePlan {
-    /// The plan for a target of eight bits. With `radiance`, something needs the linear frame.
+    /// Plans a frame for an eight-bit target. `radiance` is true if something needs the linear frame.
     pub fn new(
         facts: &SceneFacts,
         options: &FrameOptions,
@@ -38,7 +39,8 @@ impl FramePlan {
     ) -> Self {
         let samples = facts.samples;
         let linear_format = wgpu::TextureFormat::Rgba16Float;
-        // Of what is encoded neither a blend nor the mean of several samples would be right, and bytes hide what the probe looks for.
+        // Blending or averaging encoded colours would be wrong, and an eight-bit target hides the values that
+        // the probe looks for.
         let folded = !radiance && facts.transparent == 0 && samples == 1 && !options.probe;
         match folded {
             true => Self { linear_format, lit_format: target, samples, ending: Ending::Folded },
@@ -46,19 +48,19 @@ impl FramePlan {
         }
     }
 
-    /// As [`new`](Self::new), with what the device can do.
+    /// Like [`new`](Self::new), also considering what the device supports.
     pub fn for_device(
         facts: &SceneFacts,
         options: &FrameOptions,
         radiance: bool,
         (gpu, target, exposure): (&Gpu, &FrameTarget, f32),
     ) -> Self {
-        // A part of a texture would want depth as large as all of it.
+        // Without a display pass, the depth buffer would have to be as large as the whole texture.
         let radiance = radiance || target.viewport.is_some();
         let mut plan = Self::new(facts, options, target.format, radiance);
         let wide = wgpu::TextureFormat::Rgba32Float;
         let features = gpu.device.features();
-        // Without these features WebGPU promises neither blending nor multisampling of 32-bit floats.
+        // Without these features WebGPU guarantees neither blending nor multisampling of 32-bit floats.
         let flags = gpu.adapter.get_texture_format_features(wide).flags;
         let resolves = features.contains(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
             && flags.sample_count_supported(plan.samples)
@@ -79,7 +81,7 @@ impl FramePlan {
         plan
     }
 
-    /// What effects are told of it.
+    /// Returns what effects need to know about the frame.
     pub fn shape(&self, target: &FrameTarget, display: Display, exposure: f32) -> FrameShape {
         let (display, exposure) = match self.ending {
             Ending::Direct => (Display::Linear, 1.0),
@@ -104,37 +106,38 @@ impl FramePlan {
     }
 }
 
-/// What a frame is drawn into, and how, for [`Effect::prepare`](crate::effects::Effect::prepare).
+/// The formats and sizes of a frame, for [`Effect::prepare`](crate::effects::Effect::prepare).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FrameShape {
-    /// Width and height of the frame, and of the textures of the [`Board`](crate::effects::Board), in texels.
+    /// Width and height of the frame, and of the textures on the [`Board`](crate::effects::Board), in texels.
     pub size: [u32; 2],
     /// The part of the target that the frame fills, if it is not all of it.
     pub viewport: Option<Viewport>,
     /// Format of [`Board::linear`](crate::effects::Board::linear).
     pub linear_format: wgpu::TextureFormat,
-    /// Format of what [`Board::lit_pass`](crate::effects::Board::lit_pass) draws into.
+    /// Format that passes of [`Board::lit_pass`](crate::effects::Board::lit_pass) draw into.
     pub lit_format: wgpu::TextureFormat,
     /// Format of [`Board::target`](crate::effects::Board::target).
     pub target_format: wgpu::TextureFormat,
-    /// Samples per pixel of [`Board::depth`](crate::effects::Board::depth) and of what [`Board::lit_pass`](crate::effects::Board::lit_pass) draws into.
+    /// Samples per pixel of [`Board::depth`](crate::effects::Board::depth) and of the targets of
+    /// [`Board::lit_pass`](crate::effects::Board::lit_pass).
     pub samples: u32,
-    /// From radiance to the target's numbers.
+    /// How radiance is converted to the target's values.
     pub display: Display,
     /// Factor on radiance before the display.
     pub exposure: f32,
-    /// Whether the display is a pass of its own.
+    /// Whether a separate pass does the conversion.
     pub display_pass: bool,
-    /// The atlas of shadow maps, where the frame has any.
+    /// The atlas of shadow maps, if the frame has any.
     pub(crate) shadow_atlas: Option<ShadowAtlas>,
-    /// What mirrors show, parents before children; unknown before the frame is decided.
+    /// The views in mirrors, parents before children; `None` before the frame is decided.
     pub(crate) mirrors: Option<Vec<MirrorShape>>,
-    /// What light passes through, as far as the camera sees it.
+    /// The transmissive surfaces that the camera sees.
     pub(crate) refractors: Vec<RefractorSurface>,
     /// What has been uploaded for the frame.
     pub(crate) uploads: Uploads,
-    /// First draws where no frame waits for them, if the frame is to have any.
+    /// The warm-up device, if pipelines are to be warmed up.
     pub(crate) rehearsals: Option<Rehearsals>,
 }
 
@@ -146,14 +149,14 @@ pub(crate) struct ShadowAtlas {
     pub pipelines: usize,
 }
 
-/// What the effect of mirrors needs to know of one of their views.
+/// What the mirror effect needs to know about one view in a mirror.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MirrorShape {
-    /// The view that sees the mirrors: 0 is the camera's, 1 the first of the mirrors'.
+    /// The view that sees the mirrors: 0 is the camera's, 1 is the first view in a mirror.
     pub parent: usize,
-    /// The part of the frame in which they are: the corner of the least numbers, width and height in texels.
+    /// The part of the frame that the mirrors cover: upper left corner, width and height in texels.
     pub pixels: [u32; 4],
-    /// Whether anything is blended in it.
+    /// Whether anything that is visible in it is blended.
     pub transparent: bool,
     pub surfaces: Vec<MirrorSurface>,
 }

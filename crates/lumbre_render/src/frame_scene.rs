@@ -1,4 +1,5 @@
-//! What the passes of a frame draw with: its draws, their pipelines and buffers, and the view. Every pass is lent it; what is drawn was decided before.
+//! What the passes of a frame draw with: its draws, their pipelines and buffers, and the view. Every pass has
+//! access to it; what is drawn has been decided before.
 
 use bevy_ecs::entity::Entity;
 use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
@@ -13,19 +14,19 @@ use crate::shader::{Feature, Variant};
 use crate::shadows::ShadowMaps;
 use crate::view_buffers::{FrameGroup, ViewBuffers};
 
-/// A shape with its normals.
+/// The attributes of a shape with its normals.
 pub(crate) const SHAPE: [Attribute; 2] = [Attribute::Position, Attribute::Normal];
 
-/// A frame's scene, as its passes find it in `context.user`.
+/// The scene of a frame, which passes access as `context.user`.
 pub struct FrameScene<'a> {
     pub(crate) draws: &'a Draws,
     pub(crate) objects: &'a Objects,
     pub(crate) pipelines: &'a Pipelines,
     pub(crate) meshes: &'a MeshBuffers,
     pub(crate) flat_rule: FlatRule,
-    /// What is seen in mirrors.
+    /// The views in mirrors.
     pub(crate) mirrors: &'a [MirrorView],
-    /// The buffers of each view: the camera's first, then those of mirrors.
+    /// The buffers of each view: the camera's first, then those in mirrors.
     pub(crate) views: &'a [ViewBuffers],
     pub(crate) view: CameraView,
     /// Width and height of the frame in texels.
@@ -33,39 +34,40 @@ pub struct FrameScene<'a> {
     pub(crate) shadows: &'a ShadowMaps,
 }
 
-/// The camera of a frame.
+/// The camera view of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FrameView {
-    /// Where the camera stands in the world, in metres.
+    /// Position of the camera in the world, in metres.
     pub eye: DVec3,
-    /// The camera's axes in the world, unit: right, up, backward.
+    /// The camera's axes in the world, of unit length: right, up, backward.
     pub basis: DMat3,
-    /// From the world to clip space, reversed-Z: depth 1 at the near plane. Multiply by an object's matrix in f64 before rounding to f32.
+    /// Transforms world space to clip space. Depth is reversed-Z: 1 at the near plane. Multiply by an
+    /// object's matrix in f64 before rounding to f32.
     pub clip_from_world: DMat4,
 }
 
 /// An object in view, for effects that draw its shape.
 #[derive(Clone, Copy)]
 pub struct DrawnObject<'a> {
-    /// Whose it is.
+    /// The entity of the object.
     pub entity: Entity,
-    /// From the mesh to the world.
+    /// Transforms mesh space to world space.
     pub world_from_mesh: DAffine3,
-    /// From the mesh to clip space.
+    /// Transforms mesh space to clip space.
     pub clip_from_mesh: Mat4,
     mesh: &'a GpuMesh,
 }
 
 impl<'a> FrameScene<'a> {
-    /// The camera.
+    /// Returns the camera view.
     pub fn view(&self) -> FrameView {
         let clip_from_world = self.view.clip_from_frame(DVec3::ZERO);
         FrameView { eye: self.view.eye, basis: self.view.basis, clip_from_world }
     }
 
-    /// The objects in view, once each, in an order that stays the same while the scene does. Empty unless an effect that is called for
-    /// [draws objects](crate::effects::Effect::draws_objects).
+    /// Returns the objects in view, each once, in an order that stays the same while the scene does. Empty
+    /// unless an effect that is called for [draws objects](crate::effects::Effect::draws_objects).
     pub fn objects(&self) -> impl Iterator<Item = DrawnObject<'a>> {
         let clip_from_world = self.view.clip_from_frame(DVec3::ZERO);
         let (objects, meshes) = (self.objects, self.meshes);
@@ -99,19 +101,20 @@ impl<'a> FrameScene<'a> {
                 let first = run[0].slot;
                 pass.set_vertex_buffer(0, positions.slice(..));
                 pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-                // A few thousand casters at most fill a run.
+                // A run has at most as many casters as there are objects, fewer than 2^24.
                 pass.draw_indexed(0..slices.count, 0, first..first + run.len() as u32);
             }
         }
     }
 
-    /// What shaders of a view of their own bind in group 0, as the lit surfaces do: what they know of the view (0 is the camera's, 1 the first of those in mirrors), and the
-    /// transforms of all objects.
+    /// Returns the buffers that the effects' own shaders bind in group 0 like the lit surfaces: the uniform
+    /// of a view (0 is the camera's, 1 is the first view in a mirror), and the transforms of all objects.
     pub(crate) fn view_and_transforms(&self, view: usize) -> Option<[&wgpu::Buffer; 2]> {
         Some([self.views.get(view)?.frame(), self.objects.transforms.buffer()?])
     }
 
-    /// Draws the shape of an object once, as instance `slot`: these attributes are in the vertex buffers, one each.
+    /// Draws the shape of an object once, with its slot as the instance index. Each attribute is in a vertex
+    /// buffer of its own.
     pub(crate) fn draw_shape(
         &self,
         pass: &mut wgpu::RenderPass<'static>,
@@ -134,8 +137,8 @@ impl<'a> FrameScene<'a> {
         self.draw_view(pass, lit_pass, 0);
     }
 
-    /// Draws the opaque surfaces that the camera sees and that a pass does not light from the G-buffer. No pass lights the G-buffer after any of them: what it
-    /// lights may lie behind them.
+    /// Draws the opaque surfaces of a pass that are lit forward. They are drawn only after every pass has lit
+    /// the G-buffer, because deferred surfaces may lie behind them.
     pub(crate) fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass) {
         let later = self.lights_deferred(LitPass::Forward);
         if lit_pass == LitPass::Forward && later {
@@ -146,7 +149,7 @@ impl<'a> FrameScene<'a> {
         }
     }
 
-    /// Draws the surfaces of a pass that a view shows: 0 is the camera's, 1 the first of those in mirrors.
+    /// Draws the surfaces of a pass that a view shows: 0 is the camera's, 1 is the first view in a mirror.
     pub(crate) fn draw_view(&self, pass: &mut wgpu::RenderPass<'static>, lit_pass: LitPass, view: usize) {
         let draws = match view {
             0 => Some(self.draws),
@@ -158,24 +161,24 @@ impl<'a> FrameScene<'a> {
         });
     }
 
-    /// Draws into the G-buffer what the camera sees and is lit from there.
+    /// Draws the deferred surfaces that the camera sees into the G-buffer.
     pub(crate) fn draw_g_buffer(&self, pass: &mut wgpu::RenderPass<'static>) {
         let Some(buffers) = self.views.first() else { return };
         let view = (self.draws, buffers);
         self.draw_batches(pass, &self.draws.geometry, view, &FrameGroup::of_geometry);
     }
 
-    /// Whether the camera sees anything of a pass that is lit from the G-buffer.
+    /// Returns true if the camera sees any deferred surface of a pass.
     pub(crate) fn lights_deferred(&self, lit_pass: LitPass) -> bool {
         self.draws.deferred_of(lit_pass).next().is_some()
     }
 
-    /// The layout of the group that lighting from the G-buffer binds it in.
+    /// Returns the layout of the G-buffer's bind group.
     pub(crate) fn g_buffer_layout(&self) -> &wgpu::BindGroupLayout {
         self.pipelines.g_buffer_layout()
     }
 
-    /// Lights what the G-buffer holds of a pass.
+    /// Lights the deferred surfaces of a pass.
     pub(crate) fn light_deferred(
         &self,
         pass: &mut wgpu::RenderPass<'static>,
@@ -202,7 +205,7 @@ impl<'a> FrameScene<'a> {
         pass.set_scissor_rect(0, 0, self.size[0], self.size[1]);
     }
 
-    /// Draws batches of a view; `group` answers with what a variant is bound in group 0.
+    /// Draws batches of a view. `group` returns the bind group 0 of a variant.
     fn draw_batches(
         &self,
         pass: &mut wgpu::RenderPass<'static>,
@@ -248,15 +251,17 @@ impl<'a> FrameScene<'a> {
         }
     }
 
-    /// Binds baked light and shadow maps, as far as a variant reads them; false if the maps are not there.
+    /// Binds baked light and shadow maps, as far as a variant reads them. Returns false if the shadow maps do
+    /// not exist.
     fn bind_light(
         &self,
         pass: &mut wgpu::RenderPass<'static>,
         variant: &Variant,
         baked_light: Option<&wgpu::BindGroup>,
     ) -> bool {
-        // A group behind one that the pipeline before had and this one has not: wgpu-core 30 takes the same group for bound still and leaves it
-        // out, though the device has dropped it. Taken away first, it is bound again.
+        // When the previous pipeline has a group that this one lacks, wgpu-core 30 considers groups with a
+        // higher index to be still bound and skips setting the same one again, although the device has
+        // dropped it. Unsetting the group first makes wgpu bind it again.
         let mut bind_again = |index: u32, group: &wgpu::BindGroup| {
             pass.set_bind_group(index, None::<&wgpu::BindGroup>, &[]);
             pass.set_bind_group(index, group, &[]);
@@ -274,7 +279,8 @@ impl<'a> FrameScene<'a> {
 }
 
 impl DrawnObject<'_> {
-    /// Draws its triangles once with the pipeline and the bind groups that are set: vertex buffer 0 has positions in the mesh's space, three f32 a vertex.
+    /// Draws its triangles once with the current pipeline and bind groups. Vertex buffer 0 holds positions in
+    /// mesh space, three f32 per vertex.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         let slices = self.mesh.slices(&[Attribute::Position], None);
         let (Some(positions), Some(indices)) = (slices.attributes.first(), slices.indices) else { return };

@@ -1,5 +1,6 @@
-//! The G-buffer of deferred shading: which surfaces can be lit from it, with which variants, and how it is bound. Its pass is `effects::g_buffer`, what a frame draws with it
-//! is decided in `draws`. Layout twin of shaders/g_buffer.wesl.
+//! The G-buffer of deferred shading: which surfaces can be lit from it, with which variants, and how it is
+//! bound. Its pass is `effects::g_buffer`; what a frame draws with it is decided in `draws`. Layout twin of
+//! shaders/g_buffer.wesl.
 
 use lumbre_optics::Shading;
 
@@ -10,32 +11,34 @@ use crate::shader::{Feature, Variant};
 /// What the G-buffer of a frame holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct GBufferContents {
-    /// Coordinates of lightmaps, and what textures and vertex colours modulate light with: of frames that have any.
+    /// Lightmap coordinates, and the tint by which textures and vertex colours modulate light. Only frames
+    /// with any of these have details.
     pub details: bool,
 }
 
-/// Of each of its textures. Two of them are as much as every device draws into at once.
+/// Format of each of its textures. Two of them use all 32 bytes per sample that every device can write at
+/// once.
 pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
-/// The largest number of a class; 0 is none.
+/// The largest class number; 0 means none.
 pub(crate) const LAST_CLASS: u32 = 0xff;
-/// The largest number of an instance that it has room for.
+/// The largest instance index that it can store.
 pub(crate) const LAST_INSTANCE: u32 = (1 << 23) - 1;
 
-/// The variants of a deferred surface.
+/// The shader variants of a deferred surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DeferredVariants {
-    /// Draws its shape into the G-buffer.
+    /// Draws the surface into the G-buffer.
     pub geometry: Variant,
-    /// Lights it, with all others that take the same.
+    /// Lights the surface, together with all others that use the same variant.
     pub lighting: Variant,
 }
 
-/// What stands in the G-buffer's details, or is read there for them.
+/// Features that write the details of the G-buffer, or that are needed to compute them.
 const DETAILED: [Feature; 5] =
     [Feature::Uv0, Feature::Uv1, Feature::BaseColorTexture, Feature::VertexColor, Feature::Lightmap];
 
-/// What the G-buffer has no room for: numbers of a material that differ from place to place, frames of tangents, what neighbours on the same surface differ in, and
-/// coverage.
+/// Features that need what the G-buffer has no room for: material parameters that vary over the surface,
+/// tangent frames, derivatives within the same surface, and coverage.
 const FORWARD_ONLY: [Feature; 7] = [
     Feature::EmissiveTexture,
     Feature::MetallicRoughnessTexture,
@@ -47,8 +50,8 @@ const FORWARD_ONLY: [Feature; 7] = [
 ];
 
 impl DeferredVariants {
-    /// Those of a surface that a pass would draw with `forward`, where the frame has a G-buffer; none if that has no room for what `forward` reads, or if no light is
-    /// evaluated in fragments.
+    /// Returns the variants of a surface that a pass would draw with `forward`, if the frame has a G-buffer.
+    /// `None` if the G-buffer has no room for what `forward` reads, or if no light is evaluated in fragments.
     pub fn of(forward: &Variant, pass: LitPass, contents: Option<GBufferContents>) -> Option<Self> {
         let contents = contents.filter(|_| matches!(pass, LitPass::Lightmap | LitPass::Forward))?;
         let has = |feature: &Feature| forward.has(*feature);
@@ -69,13 +72,14 @@ impl DeferredVariants {
         let mut lighting = forward.without(&read);
         lighting.set(Feature::VertexColor, tinted);
         lighting.set(Feature::Deferred, true);
-        // So that nothing stands in for it that reads what this frame has not.
+        // Keeps variants that read details from standing in for this one in frames without them.
         lighting.set(Feature::GBufferDetails, contents.details);
         Some(Self { geometry, lighting })
     }
 }
 
-/// The layout of group 1 of what lights from it: its two textures, or the first one twice.
+/// Creates the layout of group 1 of deferred lighting: the two textures. Without details, the first texture
+/// is bound twice.
 pub(crate) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     let entry = |binding| wgpu::BindGroupLayoutEntry {
         binding,
@@ -93,7 +97,7 @@ pub(crate) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     })
 }
 
-/// Group 1 of what lights from it.
+/// Creates group 1 of deferred lighting.
 pub(crate) fn group(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,

@@ -1,4 +1,4 @@
-//! The device that everything is drawn with. Not a window: a surface is made from one in `window_surface`.
+//! The wgpu device and what it was created from. Surfaces are created in `window_surface`.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -8,7 +8,8 @@ use bevy_ecs::resource::Resource;
 use crate::RenderError;
 use crate::worker_thread::WorkerThread;
 
-/// A wgpu instance, adapter, device and queue, with the features that measuring needs where the adapter has them.
+/// A wgpu instance, adapter, device and queue. Devices that are opened here have the features for
+/// measurements if the adapter supports them.
 #[derive(Resource, Clone, Debug)]
 pub struct Gpu {
     /// The instance.
@@ -24,10 +25,10 @@ pub struct Gpu {
     worker_thread: Arc<WorkerThread>,
 }
 
-/// A field of `wgpu::Limits` by name, how it is read, and the least that will do.
+/// A field of `wgpu::Limits`: its name, how to read it, and the least value that is sufficient.
 type LeastLimit = (&'static str, fn(&wgpu::Limits) -> u64, u64);
 
-/// What a frame binds at most, and the least that a device has to allow of it.
+/// The limits of a device that bound what a frame binds, with the least values that are required.
 const LEAST_LIMITS: [LeastLimit; 4] = [
     ("max_bind_groups", |limits| u64::from(limits.max_bind_groups), 4),
     (
@@ -38,15 +39,17 @@ const LEAST_LIMITS: [LeastLimit; 4] = [
     (
         "max_sampled_textures_per_shader_stage",
         |limits| u64::from(limits.max_sampled_textures_per_shader_stage),
-        // Five of a material, one of baked light, the atlas of shadow maps; and eight tables where they are textures.
+        // Five textures of a material, one of baked light, the shadow atlas, and eight tables where these are
+        // textures.
         15,
     ),
     ("max_uniform_buffer_binding_size", |limits| limits.max_uniform_buffer_binding_size, 1 << 16),
 ];
 
 impl Gpu {
-    /// Features that are used where a device has them, none of which is required: queries to measure with, shaders that count lights ([`Measure::Lights`](crate::Measure)), and
-    /// blending and multisampling of 32-bit floats for frames of full precision.
+    /// Features that are used if a device has them; none is required. They are queries for measurements,
+    /// shaders that count lights ([`Measure::Lights`](crate::Measure)), and blending and multisampling of
+    /// 32-bit floats for frames with full precision.
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
         .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
@@ -56,11 +59,13 @@ impl Gpu {
         .union(wgpu::Features::FLOAT32_BLENDABLE)
         .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
 
-    /// A device that a program has made for itself. `wgpu::Limits::default()` is enough, without any feature; storage buffers as large as the adapter
-    /// allows let more objects and lights in.
+    /// Wraps a device that a program has created itself. `wgpu::Limits::default()` without any feature is
+    /// sufficient; a larger limit on storage buffers, such as the adapter's, allows more objects and lights.
     ///
-    /// Its callbacks for a lost device and for uncaptured errors are set, so that [`check`](Self::check) and the renderer know of both. A program that sets
-    /// callbacks of its own afterwards passes on what they are told to [`note_lost`](Self::note_lost) and [`note_error`](Self::note_error).
+    /// Sets the device's callbacks for a lost device and for uncaptured errors, so that
+    /// [`check`](Self::check) and the renderer notice both. A program that installs its own callbacks
+    /// afterwards must forward what they receive to [`note_lost`](Self::note_lost) and
+    /// [`note_error`](Self::note_error).
     ///
     /// # Errors
     /// [`RenderError::DeviceTooSmall`].
@@ -92,28 +97,31 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// What callbacks may hold: the device itself would keep itself alive.
+    /// Returns what a callback may own: if it owned the device, the device would keep itself alive.
     fn notes(&self) -> Notes {
         Notes { lost: Arc::clone(&self.lost), fault: Arc::clone(&self.fault) }
     }
 
-    /// Notes that the device is gone, for a program that is told so itself.
+    /// Records that the device is lost, for a program with its own callback.
     pub fn note_lost(&self) {
         self.lost.store(true, Ordering::Relaxed);
     }
 
-    /// Notes an error of the device, for a program that is told of it itself: the next [`check`](Self::check) answers with the first.
+    /// Records an error of the device, for a program with its own callback. The next [`check`](Self::check)
+    /// returns the first recorded error.
     pub fn note_error(&self, error: &wgpu::Error) {
         self.notes().error(error);
     }
 
-    /// A device without a window. The environment variables of wgpu (`WGPU_BACKEND`, `WGPU_ADAPTER_NAME`) choose among several.
+    /// Opens a device without a window. The environment variables of wgpu (`WGPU_BACKEND`,
+    /// `WGPU_ADAPTER_NAME`) choose among several.
     ///
     /// # Errors
-    /// [`RenderError::NoAdapter`], which says what to install, and [`RenderError::Device`].
+    /// [`RenderError::NoAdapter`], whose message says what to install, [`RenderError::NoAdapterNamed`],
+    /// [`RenderError::Device`] and [`RenderError::DeviceTooSmall`].
     pub fn headless() -> Result<Self, RenderError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-        // OpenGL is asked only if nothing better is there: its libraries complain aloud where there is no display.
+        // OpenGL is tried last: without a display its libraries print errors.
         let others = descriptor.backends & wgpu::Backends::SECONDARY;
         if descriptor.backends.intersects(wgpu::Backends::PRIMARY) {
             descriptor.backends &= wgpu::Backends::PRIMARY;
@@ -124,11 +132,11 @@ impl Gpu {
         }
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.backends = others;
-        // The first error is the one that tells what to install.
+        // The first error is the one that says what to install.
         Self::from_instance(wgpu::Instance::new(descriptor), None).or(first)
     }
 
-    /// A device that can present to `surface`, which was made by `instance`.
+    /// Opens a device that can present to `surface`, which must have been created by `instance`.
     ///
     /// # Errors
     /// As [`Gpu::headless`].
@@ -144,12 +152,13 @@ impl Gpu {
         Self::from_adapter(instance, adapter)
     }
 
-    /// Whether several devices of the adapter may work at once. Those of OpenGL take turns, and give up when one of them takes seconds.
+    /// Returns true if several devices of the adapter can work at the same time. Devices of OpenGL take
+    /// turns, and fail when one of them takes seconds.
     pub fn has_independent_devices(&self) -> bool {
         self.adapter.get_info().backend != wgpu::Backend::Gl
     }
 
-    /// Another device of the same adapter.
+    /// Opens another device of the same adapter.
     ///
     /// # Errors
     /// [`RenderError::Device`], [`RenderError::DeviceTooSmall`].
@@ -157,20 +166,21 @@ impl Gpu {
         Self::from_adapter(self.instance.clone(), self.adapter.clone())
     }
 
-    /// A device of an adapter that is known.
+    /// Opens a device of a given adapter.
     pub(crate) fn from_adapter(
         instance: wgpu::Instance,
         adapter: wgpu::Adapter,
     ) -> Result<Self, RenderError> {
         let mut features = adapter.features() & Self::OPTIONAL_FEATURES;
         if adapter.get_info().device_type == wgpu::DeviceType::Cpu {
-            // A software rasterizer draws a render pass tile by tile: a timestamp in the midst of it tells of the last tile alone.
+            // A software rasterizer draws a render pass tile by tile, so a timestamp within it would cover
+            // the last tile only.
             features.remove(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
         }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("lumbre"),
             required_features: features,
-            // The adapter's own limits: no light or object count is refused that the machine could take.
+            // The adapter's own limits, so that no scene is refused that the machine could handle.
             required_limits: adapter.limits(),
             ..Default::default()
         };
@@ -178,27 +188,28 @@ impl Gpu {
         Self::from_parts(instance, adapter, device, queue)
     }
 
-    /// Whether a processor draws instead of a GPU.
+    /// Returns true if the frames are drawn by a CPU instead of a GPU.
     pub fn is_software(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether the shaders of lit surfaces look things up in textures instead of storage buffers.
+    /// Returns true if the shaders of lit surfaces read tables from textures instead of storage buffers.
     pub(crate) fn reads_tables_from_textures(&self) -> bool {
         self.is_software()
     }
 
-    /// Where pipelines are made that no frame waits for.
+    /// The thread that creates pipelines which no frame waits for.
     pub(crate) fn worker_thread(&self) -> &WorkerThread {
         &self.worker_thread
     }
 
-    /// Whether the device is gone: make another `Gpu` and another renderer.
+    /// Returns true if the device is lost. A new `Gpu` and a new renderer are needed then.
     pub fn is_lost(&self) -> bool {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// What the device refused since this was asked last (out of memory, or a fault of ours): the frame is not to be trusted.
+    /// Reports the first error of the device since the last call (out of memory, or a bug in this crate).
+    /// After an error the frame is not valid.
     ///
     /// # Errors
     /// [`RenderError::DeviceLost`], [`RenderError::Refused`].
@@ -207,20 +218,21 @@ impl Gpu {
             return Err(RenderError::DeviceLost);
         }
         let Some(message) = self.fault.lock().ok().and_then(|mut fault| fault.take()) else { return Ok(()) };
-        // A device that goes refuses commands at once, and says that it is lost when its queue is empty: that is waited for.
+        // A device that is being lost refuses commands at once, but reports the loss only when its queue is
+        // empty, so wait for that.
         let timeout = Some(std::time::Duration::from_secs(1));
         let _ = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout });
         Err(if self.is_lost() { RenderError::DeviceLost } else { RenderError::Refused { message } })
     }
 
-    /// Name and driver of the adapter, for reports: figures mean little without them.
+    /// Returns name and driver of the adapter, for reports of measurements.
     pub fn describe(&self) -> String {
         let info = self.adapter.get_info();
         format!("{} ({:?}, {} {})", info.name, info.backend, info.driver, info.driver_info)
     }
 }
 
-/// What was noted of a device.
+/// What the callbacks of a device record.
 struct Notes {
     lost: Arc<AtomicBool>,
     fault: Arc<Mutex<Option<String>>>,

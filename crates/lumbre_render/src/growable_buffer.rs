@@ -1,4 +1,4 @@
-//! A storage buffer, or a table in a texture, that mirrors a Vec and uploads only what changed.
+//! A storage buffer or a table in a texture that mirrors a Vec and uploads only what changed.
 
 use std::ops::Range;
 
@@ -7,16 +7,16 @@ use bytemuck::Pod;
 use crate::table_texture::TableTexture;
 use crate::{Gpu, RenderError};
 
-/// Values between two changes that are sent along with them.
+/// Largest gap, in values, between two changes that are uploaded together.
 const COALESCED: usize = 16;
 
-/// A mirrored storage buffer, or table.
+/// A mirrored storage buffer or table.
 #[derive(Debug)]
 pub(crate) struct GrowableBuffer<T> {
     label: &'static str,
     pub values: Vec<T>,
     dirty: Vec<Range<usize>>,
-    /// Values that there is room for from the start.
+    /// Smallest capacity, in values.
     least: usize,
     buffer: Option<wgpu::Buffer>,
     capacity: usize,
@@ -25,7 +25,8 @@ pub(crate) struct GrowableBuffer<T> {
     texture: TableTexture,
 }
 
-/// Where the values are on a device that reads tables from textures; any other has them in a buffer.
+/// Where the values are kept on a device that keeps tables in textures. Any other device has them in a
+/// buffer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum KeptIn {
     Buffer,
@@ -49,35 +50,37 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         }
     }
 
-    /// A table, which is a texture on a device that reads tables from textures.
+    /// Creates a table, which is a texture on a device that keeps tables in textures.
     pub fn table(label: &'static str) -> Self {
         Self { kept_in: KeptIn::Texture, ..Self::new(label) }
     }
 
-    /// A table that is a buffer everywhere too, for shaders that read that.
+    /// Creates a table that exists as a buffer, too, on every device, for shaders that read the buffer.
     pub fn table_and_buffer(label: &'static str) -> Self {
         Self { kept_in: KeptIn::Both, ..Self::new(label) }
     }
 
-    /// A buffer that is a uniform one too, of which shaders read `least` values whether they are there or not.
+    /// Creates a buffer that is also used as a uniform buffer. It has room for the `least` values that
+    /// shaders declare, even if there are fewer.
     pub fn uniform(label: &'static str, least: usize) -> Self {
         let new = Self::new(label);
         Self { least, usage: new.usage | wgpu::BufferUsages::UNIFORM, ..new }
     }
 
-    /// As [`uniform`](Self::uniform), and a table for shaders that read more than a uniform buffer holds.
+    /// Like [`uniform`](Self::uniform), and also a table for shaders that read more than a uniform buffer
+    /// holds.
     pub fn uniform_and_table(label: &'static str, least: usize) -> Self {
         Self { kept_in: KeptIn::Both, ..Self::uniform(label, least) }
     }
 
-    /// Sets one value and remembers it for the next upload.
+    /// Sets one value and marks it for the next upload.
     pub fn set(&mut self, index: usize, value: T) {
         if index >= self.values.len() {
             self.values.resize(index + 1, T::zeroed());
         }
         self.values[index] = value;
         match self.dirty.last_mut() {
-            // A few values between two changes are cheaper to send than another copy.
+            // Sending a few unchanged values is cheaper than another copy.
             Some(last) if index >= last.start && index <= last.end + COALESCED => {
                 last.end = last.end.max(index + 1);
             }
@@ -85,7 +88,7 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         }
     }
 
-    /// Replaces all values; those that are equal to the old ones are not uploaded again.
+    /// Replaces all values. Those that are equal to the old ones are not uploaded again.
     pub fn replace(&mut self, values: impl IntoIterator<Item = T>) {
         let mut count = 0;
         for value in values {
@@ -101,13 +104,13 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         });
     }
 
-    /// Bytes that the next `upload` will send.
+    /// Returns the number of bytes that the next `upload` will send.
     pub fn pending_bytes(&self) -> u64 {
         let dirty: usize = self.dirty.iter().map(ExactSizeIterator::len).sum();
         (dirty * size_of::<T>()) as u64
     }
 
-    /// Brings the GPU's copies up to date; true if one is another than before.
+    /// Brings the GPU's copies up to date. Returns true if one of them was replaced.
     ///
     /// # Errors
     /// [`RenderError::BufferTooLarge`].
@@ -160,13 +163,13 @@ impl<T: Pod + PartialEq> GrowableBuffer<T> {
         }
     }
 
-    /// What the shaders of lit surfaces are bound of it, once `upload` has made it.
+    /// Returns the binding for the shaders of lit surfaces, once `upload` has created it.
     pub fn bound(&self) -> Option<wgpu::BindingResource<'_>> {
         let texture = self.texture.view().map(wgpu::BindingResource::TextureView);
         texture.or_else(|| self.buffer.as_ref().map(wgpu::Buffer::as_entire_binding))
     }
 
-    /// The copy in a buffer, once `upload` has made it.
+    /// Returns the copy in a buffer, once `upload` has created it.
     pub fn buffer(&self) -> Option<&wgpu::Buffer> {
         self.buffer.as_ref()
     }
@@ -186,7 +189,7 @@ mod tests {
         assert_eq!(buffer.pending_bytes(), 0);
         buffer.replace([1, 9, 3]);
         assert_eq!((buffer.pending_bytes(), buffer.values.as_slice()), (4, [1, 9, 3].as_slice()));
-        // What changed close together is sent in one piece, what did not apart.
+        // Changes close to each other are sent in one piece, others separately.
         buffer.replace(0..100);
         buffer.dirty.clear();
         buffer.replace((0..100).map(|value| if [3, 9, 90].contains(&value) { 0 } else { value }));

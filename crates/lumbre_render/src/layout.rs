@@ -1,4 +1,5 @@
-//! The bytes that shaders read. Layout twins of shaders/frame.wesl and shaders/optics/evaluate_light.wesl, field by field.
+//! The data that shaders read. Layout twins of shaders/frame.wesl and shaders/optics/evaluate_light.wesl,
+//! field by field.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, UVec3, Vec3, Vec4};
@@ -34,7 +35,7 @@ pub(crate) struct FrameData {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct InstanceData {
-    /// The object, and from bit 24 on the class of a deferred surface.
+    /// Index of the object; from bit 24 on the class of a deferred surface.
     object_and_class: u32,
     pub first_light: u32,
     pub dynamic_end: u32,
@@ -42,17 +43,18 @@ pub(crate) struct InstanceData {
 }
 
 impl InstanceData {
-    /// The same light for an object, of which a table has fewer than 2^24, and for the class of deferred surfaces that it is of; 0 for none.
+    /// Returns the same light list for an object (its slot, less than 2^24) and its class of deferred
+    /// surfaces (0 for none).
     pub fn of_object(self, object: u32, class_number: u32) -> Self {
         Self { object_and_class: object | class_number << 24, ..self }
     }
 
-    /// The lights that reach no object in particular: baked ones begin at `dynamic_end`.
+    /// Creates a light list without an object. Its baked lights begin at `dynamic_end`.
     pub fn lit_by(first_light: u32, dynamic_end: u32, static_end: u32) -> Self {
         Self { object_and_class: 0, first_light, dynamic_end, static_end }
     }
 
-    /// The slot of the object.
+    /// Returns the slot of the object.
     pub fn object(&self) -> u32 {
         self.object_and_class & 0xff_ffff
     }
@@ -67,7 +69,7 @@ pub(crate) struct ObjectData {
 }
 
 impl ObjectData {
-    /// `origin` is subtracted in f64 before the rounding to f32.
+    /// Subtracts `origin` in f64 before rounding to f32.
     pub fn new(transform: &GlobalTransform, origin: DVec3) -> Self {
         let matrix = transform.0.matrix3;
         let translation = transform.0.translation - origin;
@@ -75,7 +77,8 @@ impl ObjectData {
             let row = matrix.row(index);
             [row.x as f32, row.y as f32, row.z as f32, translation[index] as f32]
         };
-        // Only the direction of a normal matters: scaled so that neither tiny nor huge scales leave f32.
+        // Only the direction of a normal matters. Scaling the matrix keeps very small and very large scales
+        // within f32.
         let normal = transform.normal_matrix();
         let largest = normal.x_axis.abs().max(normal.y_axis.abs()).max(normal.z_axis.abs()).max_element();
         let factor = if largest > 0.0 && largest.is_finite() { 1.0 / largest } else { 0.0 };
@@ -86,19 +89,20 @@ impl ObjectData {
     }
 }
 
-/// A colour made in code that holds no number is black where it does: no frame holds NaN. Files are checked when they are loaded.
+/// Replaces channels that are not finite by 0, so that no frame contains NaN. This is for colours that were
+/// created in code; files are checked when they are loaded.
 pub(crate) fn finite(color: Vec3) -> Vec3 {
     let channel = |value: f32| if value.is_finite() { value } else { 0.0 };
     Vec3::new(channel(color.x), channel(color.y), channel(color.z))
 }
 
-/// A reflection coefficient or a vertex colour, within what keeps products with light inside f32: infinity times a cosine of 0 would
-/// be no number.
+/// Clamps a reflection coefficient or a vertex colour so that its products with light stay finite in f32.
+/// Infinity times a cosine of 0 would be NaN.
 pub(crate) fn coefficient(color: Vec3) -> Vec3 {
     finite(color).clamp(Vec3::splat(-LARGEST_COEFFICIENT), Vec3::splat(LARGEST_COEFFICIENT))
 }
 
-/// Radiance that is added as it is: emission, ambient light, backgrounds, fogs.
+/// Clamps radiance that is added directly: emission, ambient light, background and fog.
 pub(crate) fn radiance(color: Vec3) -> Vec3 {
     let largest = Vec3::splat(LARGEST_INTENSITY as f32);
     finite(color).clamp(-largest, largest)
@@ -152,14 +156,15 @@ impl CoordinatesData {
         Self { u: u.extend(texture.tex_coord as f32).to_array(), v: v.extend(0.0).to_array() }
     }
 
-    /// With a number that its shader reads in `v.w`.
+    /// Stores a number that its shader reads from `v.w`.
     fn with(mut self, number: f32) -> Self {
         self.v[3] = finite(Vec3::splat(number)).x.clamp(-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT);
         self
     }
 }
 
-/// The 18 texels of a material; the constants behind `coordinates_of` in shaders/frame.wesl say which is which.
+/// The 18 texels of a material. The constants after `coordinates_of` in shaders/frame.wesl name their
+/// positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MaterialData {
@@ -213,7 +218,7 @@ pub(crate) struct SurfaceMapsData {
 }
 
 impl SurfaceMapsData {
-    /// Of a material that has either; nothing of one that has neither.
+    /// Creates the data of a material with a normal map or an occlusion texture; `None` if it has neither.
     pub fn new(textures: &MaterialTextures) -> Option<Self> {
         let (normal, occlusion) = (textures.normal.as_ref(), textures.occlusion.as_ref());
         (normal.is_some() || occlusion.is_some()).then(|| Self {
@@ -244,7 +249,7 @@ pub(crate) struct LightData {
 }
 
 impl LightData {
-    /// A light in frame space, without a shadow.
+    /// Creates the record of a light in frame space, without a shadow.
     pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
         let cone = light.spot.filter(|cone| !cone.is_everywhere());
         let cosines = cone.map(|cone| cone.cosines());
@@ -274,12 +279,13 @@ impl LightData {
 }
 
 impl LightData {
-    /// The same with the flags of its shadow.
+    /// Adds the flags of its shadow.
     pub fn with_shadow(self, shadow: u32) -> Self {
         Self { flags: self.flags | shadow, ..self }
     }
 
-    /// A polygon light in frame space: its edges stand where other kinds have their axis and their attenuation.
+    /// Creates the record of a polygon light in frame space. Its edges are stored in the fields that
+    /// other kinds use for axis and attenuation.
     pub fn polygon(light: &PolygonLight, origin: DVec3) -> Self {
         let radiance = finite(light.radiance.as_vec3());
         Self {
@@ -294,18 +300,18 @@ impl LightData {
     }
 }
 
-/// `InverseSquareLight`: what a fragment needs of a light without a cone, of one colour, whose attenuation is the inverse square within
-/// a range.
+/// `InverseSquareLight`: what a fragment needs of a light of one colour whose attenuation is the inverse
+/// square within a range, with a smooth cone or without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct InverseSquareLightData {
     position: Vec3,
     inverse_range_squared: f32,
-    /// Divided by the quadratic coefficient.
+    /// The colour divided by the quadratic coefficient.
     color: Vec3,
-    /// The constant coefficient by the quadratic one, m².
+    /// The constant coefficient divided by the quadratic one, in m².
     constant: f32,
-    /// As `smooth_spot_factor` takes it.
+    /// The cone as `smooth_spot_factor` takes it.
     cone: Vec4,
 }
 
@@ -319,7 +325,7 @@ impl InverseSquareLightData {
         cone: Vec4::W,
     };
 
-    /// A light in frame space.
+    /// Creates the record of a light in frame space.
     pub fn new(light: &Light, transform: &GlobalTransform, origin: DVec3) -> Self {
         let Attenuation { range, constant, quadratic, .. } = light.attenuation;
         let range = f64::from(range);

@@ -1,4 +1,5 @@
-//! The ledger: measured frames whose numbers are on their way from the device, until the account of each can be settled. What an account holds is `accounting`'s.
+//! The ledger of measured frames whose results are still on their way from the device. Each frame's account
+//! is completed when all of them have arrived; what an account holds is defined in `accounting`.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -10,30 +11,31 @@ use crate::accounting::{Accounting, FrameShares, LightCount, Waited};
 use crate::light_counter::PassCounts;
 use crate::stage_clock::milliseconds;
 
-/// Frames that may be open at once: more than the graph measures.
+/// Largest number of open frames: more than the graph measures at once.
 const MOST_OPEN: usize = 8;
 
-/// A frame that is on its way.
+/// A frame whose results have not all arrived.
 #[derive(Debug)]
 pub(crate) struct OpenFrame {
     pub frame: u64,
     pub begun: Instant,
     pub shares: FrameShares,
-    /// Its lights are counted.
+    /// Whether its lights are counted.
     pub counts_lights: bool,
-    /// What keeps some of them from being counted.
+    /// Why some lights are not counted.
     pub notes: Vec<String>,
     pub report: Option<GraphReport>,
     pub lights: Option<PassCounts>,
 }
 
-/// Accounts, open and settled.
+/// Open and completed accounts.
 #[derive(Debug, Default)]
 pub(crate) struct Ledger {
     open: VecDeque<OpenFrame>,
-    /// A frame was drawn since that is not measured: nobody waits for the open ones alone.
+    /// An unmeasured frame was drawn since, so a wait is not for the open frames alone.
     passed_over: bool,
-    /// The last frame, if it was settled before anybody waited for it: all had arrived at once, as nothing of it is measured on the device.
+    /// The last frame, if its account was completed before it was waited for. This happens if nothing of it
+    /// is measured on the device, so that its report is there at once.
     settled_at_once: Option<OpenFrame>,
     newest: Option<Arc<Accounting>>,
 }
@@ -47,12 +49,12 @@ impl Ledger {
         (self.passed_over, self.settled_at_once) = (false, None);
     }
 
-    /// Notes that a frame was drawn that is not measured.
+    /// Records that an unmeasured frame was drawn.
     pub fn pass_over(&mut self) {
         (self.passed_over, self.settled_at_once) = (true, None);
     }
 
-    /// Takes what the graph measured.
+    /// Adds the graph's measurements to their frame.
     pub fn note_report(&mut self, report: &GraphReport) {
         if let Some(frame) =
             self.open.iter_mut().find(|open| open.frame == report.frame && open.report.is_none())
@@ -61,15 +63,15 @@ impl Ledger {
         }
     }
 
-    /// Takes the lights that a frame counted.
+    /// Adds a frame's light counts.
     pub fn note_lights(&mut self, number: u64, lights: PassCounts) {
         if let Some(frame) = self.open.iter_mut().find(|open| open.frame == number) {
             frame.lights = Some(lights);
         }
     }
 
-    /// Settles the newest frame of which all has arrived, and those before it, whose numbers were overtaken. With `waited`, since when somebody has waited for the
-    /// last frame until now.
+    /// Completes the newest frame whose results have all arrived, and drops those before it. `waited` is the
+    /// time at which waiting for the last frame began, if it was waited for until now.
     pub fn settle(&mut self, waited: Option<Instant>) {
         let is_complete =
             |open: &OpenFrame| open.report.is_some() && (open.lights.is_some() || !open.counts_lights);
@@ -87,14 +89,14 @@ impl Ledger {
         self.settled_at_once = Some(frame).filter(|_| is_last && waited.is_none());
     }
 
-    /// The newest account that is settled.
+    /// Returns the newest completed account.
     pub fn newest(&self) -> Option<&Arc<Accounting>> {
         self.newest.as_ref()
     }
 }
 
 impl OpenFrame {
-    /// Its account, once its report is there.
+    /// Returns the frame's account, or `None` without its report.
     fn account(&self, waited: Option<Waited>) -> Option<Accounting> {
         let mut report = self.report.clone()?;
         report.notes.extend(self.notes.iter().cloned());

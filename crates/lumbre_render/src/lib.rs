@@ -1,4 +1,5 @@
-//! The passes that light a bevy_ecs World, their GPU buffers, and headless frames. No window library and no files are known here.
+//! Renders a bevy_ecs World with wgpu: the passes, their GPU buffers, and headless frames. This crate depends
+//! on no window library and reads no scene files.
 //!
 //! ```text
 //!   World ──► extract ─────────► draws ──────────────► effects ───────────────────► target
@@ -7,14 +8,15 @@
 //!                 │               and again for mirrors    mirrors ► refraction ►
 //!                 │                    │                   transparent ► yours ►
 //!                 │                    │                   display ► yours
-//!                 └──── facts ─────────┴──► explain: what the scene calls for, and what not
+//!                 └──── facts ─────────┴──► explain: what the scene needs, and what it does not
 //! ```
 //!
-//! The versions of bevy_ecs, glam and wgpu that a program has to share are re-exported. A program that has a device hands it in by [`Gpu::from_parts`]; one
-//! that has a schedule adds [`render_frame`] to it; passes of its own are an [`Effect`](effects::Effect), which [`Renderer::builder`] takes:
-//! integrations/own_program does all three.
+//! The versions of bevy_ecs, glam and wgpu that a program must share with this crate are re-exported. A
+//! program that has its own device passes it to [`Gpu::from_parts`]; one that has a schedule adds
+//! [`render_frame`] to it; one that has its own passes implements [`Effect`](effects::Effect) and gives it to
+//! [`Renderer::builder`]. The program in integrations/own_program does all three.
 //!
-//! A World, a renderer, a target:
+//! A World, a renderer and a target are all that a frame needs:
 //!
 //! ```
 //! use std::sync::Arc;

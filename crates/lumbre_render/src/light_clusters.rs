@@ -1,42 +1,46 @@
-//! Clustered forward shading (Olsson, Billeter and Assarsson, High Performance Graphics 2012): the view is cut into tiles of pixels and
-//! slices of depth, and each of these clusters has a list of the lights whose range reaches it, so that a fragment asks those alone.
-//! Exact, not an approximation: a light that is left out of a cluster is 0 in all of it. Built on the CPU, every frame that something
-//! moved in; what the shader reads of it is shaders/light_clusters.wesl. Not the lists of whole objects: those are `light_lists`.
+//! Clustered forward shading (Olsson, Billeter and Assarsson, High Performance Graphics 2012). The view is
+//! divided into tiles of pixels and slices of depth; each of these clusters has a list of the lights whose
+//! range reaches it, and a fragment evaluates only those. The lists are exact, not an approximation: a light
+//! that is missing from a cluster is 0 everywhere in it. They are built on the CPU for every frame in which
+//! something moved. The shader that reads them is shaders/light_clusters.wesl; the lists of whole objects are
+//! in `light_lists`.
 
 use glam::{DVec3, UVec3};
 
 use crate::extract::{CameraView, ViewVolume};
 use crate::layout::ClusterGridData;
 
-/// Sides of tiles that are tried, in pixels, the finest first. 32 is where lists are short and 64-pixel tiles of a software rasterizer
-/// still hold whole ones; coarser ones are for frames in which the lists would take longer to make than they save.
+/// Tile sides that are tried, in pixels, finest first. At 32 pixels the lists are short, and the 64-pixel
+/// tiles of a software rasterizer still contain whole tiles. Coarser tiles are for frames in which building
+/// the lists would take longer than they save.
 const TILE_SIDES: [u32; 7] = [32, 64, 128, 256, 512, 1024, 16384];
-/// Most clusters, and most entries of lists, as far as they can be told beforehand, before a coarser grid is taken.
+/// Largest number of clusters, and largest estimated number of list entries. Beyond these, a coarser grid is
+/// used.
 const MANY_CLUSTERS: f64 = 131_072.0;
 const MANY_ENTRIES: f64 = 3e6;
-/// Lights from which the entries are estimated beforehand, where there are more.
+/// Number of lights that the list entries are estimated from, if there are more.
 const SAMPLED_LIGHTS: usize = 1000;
-/// Most slices of depth.
+/// Largest number of depth slices.
 const MOST_SLICES: f64 = 96.0;
-/// By how much of itself a light's range grows, and by how much of the distance from the origin of frame space: the roundings of
-/// points, of the depth and of its logarithm on the device.
+/// By how much a light's range is enlarged, relative to the range and to the distance from the origin of
+/// frame space. This covers the rounding of points, of the depth and of its logarithm on the device.
 const RANGE_MARGIN: f64 = 1e-4;
 const DISTANCE_MARGIN: f64 = 2e-6;
-/// Slices overlap by this part of one, for the same reason.
+/// Slices overlap by this fraction of a slice, for the same reason.
 const SLICE_MARGIN: f64 = 2e-3;
 
-/// A ball that holds all points that a light reaches.
+/// A sphere that contains all points that a light reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundingSphere {
-    /// The number by which the shader knows the light.
+    /// The index of the light in the shader.
     pub light: u32,
-    /// In the world.
+    /// In world space.
     pub center: DVec3,
-    /// Metres, finite.
+    /// In metres, finite.
     pub radius: f64,
 }
 
-/// What a grid is laid over.
+/// The view that a grid is built for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ClusteredView {
     pub view: CameraView,
@@ -44,23 +48,24 @@ pub(crate) struct ClusteredView {
     pub origin: DVec3,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Distances along the line of sight between which there is anything to light, in metres.
+    /// Depth range along the line of sight that contains anything to light, in metres.
     pub depths: [f64; 2],
 }
 
-/// The lists of a frame. Its vectors are kept from frame to frame.
+/// The light lists of a frame. Its vectors are reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct LightClusters {
-    /// For each cluster where its list begins in here, and where the last one ends; the same for the second class of lights; then the
-    /// lists of the first class, one after the other, two lights in a word, a word for a list that is empty to read, and the lists of the
-    /// second class with one light in a word.
+    /// The offset at which the list of each cluster begins in this vector, and the end of the last list; the
+    /// same for the second class of lights; then the lists of the first class with two lights per word, and
+    /// those of the second class with one light per word. Each class ends in one extra word, so that an empty
+    /// list at the end can be read.
     pub values: Vec<u32>,
     pub grid: ClusterGridData,
-    /// Pixels along the side of a tile.
+    /// Side of a tile in pixels.
     pub tile_side: u32,
-    /// Entries of all lists.
+    /// Number of entries in all lists.
     pub entries: usize,
-    /// The number of a light of the first class that is black.
+    /// Index of a black light of the first class.
     black: u32,
     spheres: Vec<ViewSphere>,
     spans: Vec<Span>,
@@ -68,7 +73,7 @@ pub(crate) struct LightClusters {
     slices: Vec<[f64; 2]>,
 }
 
-/// A ball in view space: x to the right, y downwards, depth along the line of sight.
+/// A sphere in view space: x to the right, y downwards, depth along the line of sight.
 #[derive(Clone, Copy, Debug)]
 struct ViewSphere {
     light: u32,
@@ -86,7 +91,8 @@ struct Span {
     light: u32,
 }
 
-/// One screen axis of the grid. A coordinate on it is x (or y) divided by depth in perspective, x itself otherwise.
+/// One screen axis of the grid. A coordinate on it is x (or y) divided by depth in a perspective view, and x
+/// itself otherwise.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     first: f64,
@@ -95,8 +101,9 @@ struct Axis {
     perspective: bool,
 }
 
-/// The plane at an edge of a row, through the eye in perspective and else along the line of sight: the signed distance of a point from
-/// it is y `normal_y` + depth `normal_depth` - `offset`, positive below.
+/// The plane at an edge of a row: through the eye in a perspective view, otherwise parallel to the line of
+/// sight. The signed distance of a point from it is y `normal_y` + depth `normal_depth` - `offset`, positive
+/// below.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     normal_y: f64,
@@ -104,7 +111,8 @@ struct Edge {
     offset: f64,
 }
 
-/// The depth axis: slices of equal ratio in perspective, so that clusters are about as deep as they are wide, else of equal depth.
+/// The depth axis. In a perspective view the slices have equal ratios, so that clusters are about as deep as
+/// they are wide; otherwise they have equal depths.
 #[derive(Clone, Copy, Debug)]
 struct Depths {
     count: u32,
@@ -114,8 +122,9 @@ struct Depths {
 }
 
 impl LightClusters {
-    /// Makes the lists of both classes of lights. Those of the first are numbered from 0, and the number after the last is a black one's; `none` is evaluated where
-    /// there is none of the second.
+    /// Builds the lists of both classes of lights. Lights of the first class are numbered from 0, and the
+    /// number after the last one is a black light. `none` is evaluated if there is no light of the second
+    /// class.
     pub fn build(&mut self, view: &ClusteredView, classes: [&[BoundingSphere]; 2], none: u32) {
         self.spheres.clear();
         for sphere in classes.into_iter().flatten() {
@@ -143,7 +152,7 @@ impl LightClusters {
         self.class(first..self.spheres.len(), clusters + 1, clusters, [&columns, &rows], &depths, Some(any));
     }
 
-    /// The finest grid whose lists are not too long.
+    /// Chooses the finest grid whose lists are not too long.
     fn choose(&mut self, view: &ClusteredView) -> (Axis, Axis, Depths) {
         let mut near = f64::INFINITY;
         let mut far = f64::NEG_INFINITY;
@@ -159,23 +168,25 @@ impl LightClusters {
             self.tile_side = side;
             grid = Some((axes[0], axes[1], depths));
             let clusters = f64::from(axes[0].count) * f64::from(axes[1].count) * f64::from(depths.count);
-            // The volume of a ball is half that of the cube around it.
+            // The volume of a sphere is about half that of the cube around it.
             if clusters <= MANY_CLUSTERS && 0.5 * self.cells(&axes, &depths) <= MANY_ENTRIES {
                 break;
             }
         }
-        // There is at least one side.
+        // Not reached, because at least one side is tried.
         grid.unwrap_or_else(|| {
             let [columns, rows] = Axis::both(view, 32);
             (columns, rows, Depths::new(view, 32, near, far))
         })
     }
 
-    /// Clusters of the boxes around all balls, estimated from a thousand of them where there are more.
+    /// Returns the number of clusters in the bounding boxes of all spheres, estimated from a sample of them
+    /// if there are many.
     fn cells(&self, axes: &[Axis; 2], depths: &Depths) -> f64 {
         let count = self.spheres.len();
         let sampled = count.min(SAMPLED_LIGHTS);
-        // By the golden ratio: evenly over all, and out of step with lamps that come in groups.
+        // Multiples of the golden ratio spread the sample evenly over all lights, out of step with lights
+        // that come in groups.
         let sample = (0..sampled).map(|number| match sampled < count {
             true => {
                 let scattered = (number as u64).wrapping_mul(0x9E37_79B9) & 0xffff_ffff;
@@ -195,7 +206,8 @@ impl LightClusters {
         cells.sum::<f64>() * count as f64 / sampled.max(1) as f64
     }
 
-    /// Appends the lists of one class, whose offsets stand at `table`: in pairs, or one by one with `any` of the class behind them, for a list that is empty.
+    /// Appends the lists of one class, whose offsets begin at `table`: in pairs without `any`, otherwise one
+    /// by one, followed by `any`, a light of the class for empty lists to read.
     fn class(
         &mut self,
         lights: std::ops::Range<usize>,
@@ -233,11 +245,12 @@ impl LightClusters {
         let begin = self.values.len();
         let Some(any) = any else { return self.fill_pairs(table, clusters, begin) };
         self.fill(table, clusters, begin);
-        // Any light of the class may be evaluated anywhere: it adds nothing where it does not reach.
+        // Evaluating any light of the class is harmless: it adds nothing where it does not reach.
         self.values.push(any);
     }
 
-    /// Writes the lists of the spans: from lengths to ends, and backwards from there, which turns ends into beginnings.
+    /// Writes the lists of the spans. Turns lengths into end offsets, then fills each list from its end,
+    /// which turns the end offsets into begin offsets.
     fn fill(&mut self, table: usize, clusters: usize, begin: usize) {
         let mut end = begin;
         for offset in &mut self.values[table..=table + clusters] {
@@ -255,7 +268,7 @@ impl LightClusters {
         }
     }
 
-    /// As `fill`, two lights in a word; a list of odd length ends in a black light.
+    /// Like `fill`, with two lights per word. A list of odd length ends in a black light.
     fn fill_pairs(&mut self, table: usize, clusters: usize, begin: usize) {
         let black = self.black | self.black << 16;
         let mut end = begin;
@@ -264,7 +277,7 @@ impl LightClusters {
             *offset = saturated(2 * end + length);
             end += length.div_ceil(2);
         }
-        // And one more for a list that is empty to read.
+        // One more word, for an empty list to read.
         self.values.resize(end + 1, black);
         for span in self.spans.iter().rev() {
             for cluster in span.first..span.first + span.count {
@@ -280,7 +293,7 @@ impl LightClusters {
     }
 }
 
-/// A number of words, as far as a u32 goes: beyond it no device has a buffer.
+/// Converts a number of words to u32. Beyond that range no device has a buffer.
 fn saturated(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }
@@ -306,7 +319,8 @@ impl ViewSphere {
         }
     }
 
-    /// A ball around what of this one is in a slice: as wide as the disc in which its nearest plane cuts it.
+    /// Returns a sphere around the part of this one that lies in a slice. Its radius is that of the largest
+    /// cross-section within the slice.
     fn between(&self, near: f64, far: f64) -> Option<Self> {
         let depth = self.depth.max(near).min(far);
         let beyond = self.depth - depth;
@@ -314,7 +328,7 @@ impl ViewSphere {
         (squared > 0.0).then(|| Self { depth, radius: squared.sqrt(), ..*self })
     }
 
-    /// A ball around what of this one is between the planes of a row.
+    /// Returns a sphere around the part of this one that lies between the planes of a row.
     fn in_row(&self, [top, bottom]: [Edge; 2]) -> Option<Self> {
         let above = top.distance(self);
         let below = bottom.distance(self);
@@ -349,7 +363,8 @@ impl Edge {
 }
 
 impl Axis {
-    /// Columns and rows of tiles of `side` pixels, from the frame's upper left corner; the last ones may reach beyond the frame.
+    /// Returns the columns and rows of tiles with this side in pixels, from the frame's upper left corner.
+    /// The last ones may extend beyond the frame.
     fn both(view: &ClusteredView, side: u32) -> [Self; 2] {
         let (half, perspective) = match view.view.volume {
             ViewVolume::Perspective { half_width, half_height, .. } => ([half_width, half_height], true),
@@ -365,7 +380,7 @@ impl Axis {
         })
     }
 
-    /// The first and the last tile that a ball reaches.
+    /// Returns the first and the last tile that a sphere reaches.
     fn span(&self, place: f64, depth: f64, radius: f64) -> Option<[u32; 2]> {
         let (least, most) = match self.perspective {
             true => tangents(place, depth, radius),
@@ -373,12 +388,13 @@ impl Axis {
         };
         let [first, last] = [least, most].map(|place| (place - self.first) / self.step);
         let count = f64::from(self.count);
-        // Casts round down and saturate.
+        // Casts to u32 round down and saturate.
         (last >= 0.0 && first < count).then(|| [first.max(0.0) as u32, last.min(count - 1.0) as u32])
     }
 }
 
-/// The least and the largest place / depth of a disc, seen from the origin: infinite where its tangent does not meet what is in front.
+/// Returns the least and the largest place / depth of a disc as seen from the origin; infinite where the
+/// tangent does not meet anything in front.
 fn tangents(place: f64, depth: f64, radius: f64) -> (f64, f64) {
     let squared = place * place + depth * depth - radius * radius;
     if squared <= 0.0 {
@@ -393,13 +409,13 @@ fn tangents(place: f64, depth: f64, radius: f64) -> (f64, f64) {
 }
 
 impl Depths {
-    /// Slices between two depths; what is nearer belongs to the first one and what is farther to the last.
+    /// Creates slices between two depths. Nearer points belong to the first slice, farther ones to the last.
     fn new(view: &ClusteredView, side: u32, near: f64, far: f64) -> Self {
         let [columns, rows] = Axis::both(view, side);
         let width = columns.step.min(rows.step);
         let one = Self { count: 1, scale: 0.0, bias: 0.0, logarithmic: columns.perspective };
         let extent = far - near;
-        // Without a light or an object there is none.
+        // There is no light or no object in this range.
         if extent.is_nan() || extent <= 0.0 {
             return one;
         }
@@ -410,7 +426,7 @@ impl Depths {
         }
         let near = near.max(far * 1e-9);
         let octaves = (far / near).log2();
-        // Slices as deep as tiles are wide; where they were too many, deeper ones.
+        // Slices are as deep as tiles are wide, or deeper if there would be too many.
         let per_octave = 1.0 / (1.0 + width).log2();
         let count = (octaves * per_octave).ceil().clamp(1.0, MOST_SLICES);
         let scale = count / octaves;
@@ -422,7 +438,7 @@ impl Depths {
         along * self.scale + self.bias
     }
 
-    /// The first and the last slice that a ball reaches; none behind the eye.
+    /// Returns the first and the last slice that a sphere reaches; `None` if it lies behind the eye.
     fn span(&self, depth: f64, radius: f64) -> Option<[u32; 2]> {
         if self.logarithmic && depth + radius <= 0.0 {
             return None;
@@ -430,11 +446,11 @@ impl Depths {
         let end = f64::from(self.count - 1);
         let first = self.slice(depth - radius) - SLICE_MARGIN;
         let last = self.slice(depth + radius) + SLICE_MARGIN;
-        // Casts round down.
+        // Casts to u32 round down.
         Some([first, last].map(|slice| slice.clamp(0.0, end) as u32))
     }
 
-    /// Where a slice begins and ends.
+    /// Returns the depths at which a slice begins and ends.
     fn bounds(&self, slice: u32) -> [f64; 2] {
         let depth = |place: f64| {
             let along = (place - self.bias) / self.scale;
@@ -478,7 +494,7 @@ mod tests {
         ClusteredView { view, origin: DVec3::new(1.0, -2.0, 0.25), size, depths }
     }
 
-    /// What shaders/light_clusters.wesl does; none outside of the frame.
+    /// Twin of `cluster_at` in shaders/light_clusters.wesl; `None` outside of the frame.
     fn cluster_at(clusters: &LightClusters, of: &ClusteredView, point: DVec3) -> Option<usize> {
         let clip = of.view.clip_from_frame(of.origin) * (point - of.origin).extend(1.0);
         let [x, y] = [clip.x / clip.w, clip.y / clip.w];
@@ -532,7 +548,7 @@ mod tests {
             let first: Vec<BoundingSphere> = (0..301).map(&mut sphere).collect();
             let second: Vec<BoundingSphere> = (500..600).map(&mut sphere).collect();
             let mut clusters = LightClusters::default();
-            // Twice: what was there before leaves no trace.
+            // Built twice, to check that nothing is left from the first time.
             clusters.build(&view, [&second, &first], 0);
             clusters.build(&view, [&first, &second], 0);
             let (mut seen, mut listed, mut reaching) = (0, 0, 0);
@@ -559,7 +575,8 @@ mod tests {
                 }
             }
             assert!(seen > 100, "view {number}: only {seen} points are in view");
-            // All lights in each list would be 401 for each point; a frame of a single tile has little else.
+            // With all lights in each list there would be 401 per point. A frame with a single tile has
+            // almost that many.
             let most = if size[1] < 32 { 401 } else { 100 };
             assert!(
                 listed < most * seen,
@@ -583,7 +600,7 @@ mod tests {
             "{}",
             clusters.entries
         );
-        // One large lamp for seven small ones, in turn: the estimate sees both.
+        // One large light for every seven small ones: the estimate must consider both.
         let mixed = |large: f64, small: f64| -> Vec<BoundingSphere> {
             let radius = |light: u32| if light.is_multiple_of(8) { large } else { small };
             (0..16_000).map(|light| BoundingSphere { radius: radius(light), ..sphere(light) }).collect()
@@ -596,7 +613,7 @@ mod tests {
             few.0 < coarse && few.1 > 0.1 * MANY_ENTRIES && few.1 < 2.0 * MANY_ENTRIES,
             "{few:?}, {coarse}"
         );
-        // None at all: every list is empty, and there is a word to read.
+        // Without any light every list is empty, and there is still a word to read.
         clusters.build(&view, [&[], &[]], 0);
         assert_eq!((clusters.entries, list(&clusters, 0, true)), (0, vec![]));
         assert!((clusters.values[0] as usize) < clusters.values.len());

@@ -1,5 +1,5 @@
-//! Counts of lights that passes make while they draw, and their way back to memory: for frames that are measured so ([`Measure::Lights`](crate::Measure)), and for no others. What is counted is
-//! `shaders/light_counts.wesl`'s.
+//! Reads back the counts of lights that passes make while they draw, in frames that are measured with
+//! [`Measure::Lights`](crate::Measure). The counting itself is in `shaders/light_counts.wesl`.
 
 use lumbre_graph::{MapRequest, MapState};
 
@@ -7,29 +7,30 @@ use crate::Gpu;
 use crate::accounting::LightCount;
 use crate::extract::LitPass;
 
-/// Bytes between the counts of two passes: bound with an offset, which is a multiple of this on every device.
+/// Bytes between the counts of two passes. They are bound at an offset, and 256 is a valid offset alignment
+/// on every device.
 const STRIDE: u64 = 256;
-/// Four words for each pass: tested and contributing, 64 bits each.
+/// Four words per pass: tested and contributing, 64 bits each.
 const WORDS: usize = 4;
-/// Frames whose counts may be on their way at once.
+/// Largest number of frames whose counts are being read back at once.
 const MOST_ON_THE_WAY: usize = 4;
-/// Storage buffers that a variant with every feature reads; one more counts.
+/// Storage buffers that a variant with every feature reads. Counting needs one more.
 const OTHER_STORAGE_BUFFERS: u32 = 8;
 
 /// The shader stages in which lights are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct CountedStages {
-    /// Of flat and Gouraud shading.
+    /// For flat and Gouraud shading.
     pub vertices: bool,
-    /// Of Phong shading.
+    /// For Phong shading.
     pub fragments: bool,
 }
 
-/// The counts of one frame, by pass.
+/// The light counts of one frame, by pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PassCounts([LightCount; LitPass::ALL.len()]);
 
-/// What passes count into, and copies of it that are on their way.
+/// The buffer that passes count into, and copies of it that are being read back.
 #[derive(Debug, Default)]
 pub(crate) struct LightCounter {
     counts: Option<wgpu::Buffer>,
@@ -45,7 +46,7 @@ struct Copied {
 }
 
 impl CountedStages {
-    /// What a device can count in, and why not in all.
+    /// Returns the stages that a device can count in, and notes on what it cannot count.
     pub fn of(gpu: &Gpu) -> (Self, Vec<String>) {
         let downlevel = gpu.adapter.get_downlevel_capabilities().flags;
         let room = gpu.device.limits().max_storage_buffers_per_shader_stage > OTHER_STORAGE_BUFFERS;
@@ -79,7 +80,7 @@ impl CountedStages {
 }
 
 impl PassCounts {
-    /// Those of the pass of this name, if it draws lit surfaces.
+    /// Returns the counts of the pass with this name, if that pass draws lit surfaces.
     pub fn of(&self, pass: &str) -> Option<LightCount> {
         LitPass::ALL.into_iter().find(|lit| lit.name() == pass).map(|lit| self.0[lit as usize])
     }
@@ -98,7 +99,7 @@ impl PassCounts {
 }
 
 impl LightCounter {
-    /// Makes the buffer, if it is not there yet, and sets all counts to 0.
+    /// Creates the buffer if needed, and sets all counts to 0.
     pub fn begin(&mut self, gpu: &Gpu) {
         let counts = self.counts.get_or_insert_with(|| {
             let usage =
@@ -108,13 +109,14 @@ impl LightCounter {
         gpu.queue.write_buffer(counts, 0, &[0; (STRIDE as usize) * LitPass::ALL.len()]);
     }
 
-    /// The counts of a pass, as they are bound; nothing before [`begin`](Self::begin).
+    /// Returns the binding of a pass's counts; `None` before [`begin`](Self::begin).
     pub fn binding(&self, pass: LitPass) -> Option<wgpu::BufferBinding<'_>> {
         let (offset, size) = (pass as u64 * STRIDE, wgpu::BufferSize::new(4 * WORDS as u64));
         self.counts.as_ref().map(|buffer| wgpu::BufferBinding { buffer, offset, size })
     }
 
-    /// The counts and a buffer to copy them to, within the frame's own commands; nothing if too many are on their way.
+    /// Returns the buffer of counts and a buffer to copy it into within the frame's commands; `None` if too
+    /// many copies are being read back.
     pub fn copy(&mut self, gpu: &Gpu) -> Option<[wgpu::Buffer; 2]> {
         let counts = self.counts.clone().filter(|_| self.on_the_way.len() < MOST_ON_THE_WAY)?;
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
@@ -122,13 +124,13 @@ impl LightCounter {
         Some([counts, copy])
     }
 
-    /// After a frame was submitted: asks for the copy of its counts.
+    /// Requests the copy of a frame's counts to be mapped, after the frame was submitted.
     pub fn send_for(&mut self, frame: u64, copy: wgpu::Buffer) {
         let request = MapRequest::new(&copy);
         self.on_the_way.push(Copied { frame, buffer: copy, request });
     }
 
-    /// Waits for the answers to all that was sent for, after the device was polled to the end.
+    /// Waits for all requested copies, after the device was polled to completion.
     pub fn wait(&self) {
         for copied in &self.on_the_way {
             if copied.request.wait() == MapState::Waiting {
@@ -137,7 +139,8 @@ impl LightCounter {
         }
     }
 
-    /// The counts that have arrived, each with its frame's number. The device has to be polled before, as the graph does.
+    /// Returns the counts that have arrived, each with its frame's number. The device must have been polled
+    /// before, which the graph does.
     pub fn arrived(&mut self) -> Vec<(u64, PassCounts)> {
         let mut arrived = Vec::new();
         while let Some(first) = self.on_the_way.first()

@@ -1,5 +1,5 @@
-//! A uniform grid over the balls that lights reach, so that the lights near a box are found without asking all of them: a list per
-//! object then costs what overlaps. Not exact by itself: whoever asks tests what it is given.
+//! A uniform grid over the spheres that lights reach, for finding the lights near a box without testing all
+//! of them. The grid may return lights that do not reach the box; the caller has to test them.
 
 use std::collections::HashMap;
 
@@ -7,29 +7,30 @@ use glam::{DVec3, I64Vec3};
 
 use crate::extract::LightReach;
 
-/// A light whose ball lies in more cells than this is given to everyone.
+/// A light whose sphere covers more cells than this is returned for every box.
 const MOST_CELLS: f64 = 64.0;
 
-/// Lights by place.
+/// The lights of a frame by their position.
 #[derive(Debug, Default)]
 pub(crate) struct LightGrid {
     /// Side of a cell in metres.
     side: f64,
     cells: HashMap<I64Vec3, Vec<u32>>,
-    /// In no cell: they reach far, or everywhere.
+    /// Lights that are in no cell, because their range is large or infinite.
     far_reaching: Vec<u32>,
-    /// For each light the last question that it was an answer to.
+    /// For each light, the last query that returned it.
     asked: Vec<u32>,
     question: u32,
 }
 
 impl LightGrid {
-    /// The grid of a frame's lights; its cells are as wide as their balls are on average.
+    /// Creates the grid of a frame's lights. The side of its cells is the geometric mean of their diameters.
     pub fn new(reaches: &[LightReach]) -> Self {
         let bounded = |reach: &&LightReach| reach.radius.is_finite() && reach.polygon.is_none();
         let (mut sum, mut count) = (0.0, 0.0);
         for reach in reaches.iter().filter(bounded) {
-            // The mean of logarithms: one ball of a kilometre does not make the cells of a thousand of a metre useless.
+            // The mean of the logarithms, so that one sphere of a kilometre does not make the cells useless
+            // for a thousand spheres of a metre.
             sum += reach.radius.max(1e-9).ln();
             count += 1.0;
         }
@@ -46,13 +47,13 @@ impl LightGrid {
         grid
     }
 
-    /// The cells of a box, if they are few.
+    /// Returns the cells that a box covers, if they are few.
     fn cells_of(&self, center: DVec3, half_size: DVec3) -> Option<impl Iterator<Item = I64Vec3> + use<>> {
         let [least, most] =
             [center - half_size, center + half_size].map(|corner| (corner / self.side).floor());
         let sizes = most - least + 1.0;
         let within = least.abs().max(most.abs()).max_element() < 1e15;
-        // Neither is true of NaN.
+        // Both comparisons are false for NaN.
         let few = within && sizes.element_product() <= MOST_CELLS;
         let [least, most] = [least, most].map(|cell| cell.as_i64vec3());
         few.then(|| {
@@ -62,7 +63,7 @@ impl LightGrid {
         })
     }
 
-    /// Collects every light that may reach a box, and some that do not, in rising order.
+    /// Collects every light that may reach a box, and some that do not, in ascending order.
     pub fn near(&mut self, center: DVec3, half_size: DVec3, lights: &mut Vec<u32>) {
         lights.clear();
         let Some(cells) = self.cells_of(center, half_size) else {

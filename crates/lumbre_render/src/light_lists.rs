@@ -1,6 +1,9 @@
-//! Which lights reach which object: a list per object, by the object's bounding box and the light's range, or the plane that a polygon
-//! light shines from. Exact, not an approximation: a light is left out only where its range window is 0, or where nothing of the object
-//! lies before the polygon. An emitter's own faces do not light it: rounding would decide on which side of them it lies. Lists are per object and not per screen tile, so that Gouraud's vertices outside the view keep their light.
+//! Light lists per object: which lights reach which object, found by the object's bounding box and the
+//! light's range, or the plane that a polygon light shines from. The lists are exact, not an approximation: a
+//! light is left out only if its range window is 0 on the whole object, or if no part of the object lies in
+//! front of the polygon. An emitter's own faces do not light it, because rounding would decide which side of
+//! them it lies on. Lists are per object rather than per screen tile, so that vertices outside the view,
+//! which Gouraud shading evaluates, keep their light.
 
 use std::collections::HashMap;
 
@@ -15,28 +18,29 @@ use crate::light_grid::LightGrid;
 /// Bytes of one index on the device.
 const INDEX_BYTES: u64 = size_of::<u32>() as u64;
 
-/// Lists of light indices; objects that the same lights reach share one.
+/// Lists of light indices. Objects that are reached by the same lights share a list.
 #[derive(Debug)]
 pub(crate) struct ObjectLightLists<'a> {
     reaches: &'a [LightReach],
     everything: bool,
-    /// Made when an object first asks.
+    /// Created when the first list is built.
     grid: Option<LightGrid>,
     near: Vec<u32>,
-    /// Lights that no cluster's list has.
+    /// Lights that are in no cluster's list.
     unbounded: Vec<u32>,
     /// All lists, one after the other.
     pub indices: Vec<u32>,
     known: HashMap<Vec<u32>, InstanceData>,
     lengths: (u64, u64),
-    /// Indices that the device takes, and those that are needed: past the first none is stored, and [`check`](Self::check) refuses.
+    /// Number of indices that the device can hold, and number that is needed. Indices beyond the first number
+    /// are not stored, and [`check`](Self::check) fails.
     most: u64,
     needed: u64,
 }
 
 impl<'a> ObjectLightLists<'a> {
-    /// No lists yet. Baked lights stand last in `reaches`; the device's buffers hold `bytes`.
-    /// With `everything` each list has every light.
+    /// Creates empty lists. Baked lights come last in `reaches`; the device's buffer holds `bytes`. With
+    /// `everything`, each list has every light.
     pub fn new(reaches: &'a [LightReach], everything: bool, bytes: u64) -> Self {
         let most = (bytes / INDEX_BYTES).min(u64::from(u32::MAX));
         let unbounded = (0..).zip(reaches).filter(|(_, light)| light.class == LightClass::Unbounded);
@@ -55,7 +59,8 @@ impl<'a> ObjectLightLists<'a> {
         }
     }
 
-    /// The list of an object whose fragments have lists of their own (`clustered`), where it is empty because those have every light: then the object need not be looked at.
+    /// Returns the empty list of an object whose fragments use clusters (`clustered`), if every light is in
+    /// those. The object's bounds are not needed then.
     pub fn empty_if_clustered(&mut self, clustered: bool) -> Option<InstanceData> {
         (clustered && self.unbounded.is_empty()).then(|| {
             self.lengths.1 += 1;
@@ -63,8 +68,8 @@ impl<'a> ObjectLightLists<'a> {
         })
     }
 
-    /// The list of an object with this bounding box in the world (its `object` is 0). Where the object's fragments have lists of their
-    /// own (`clustered`), only of the lights that those do not have.
+    /// Returns the list of an object with this bounding box in the world (its `object` is 0). If the object's
+    /// fragments use clusters (`clustered`), the list has only the lights that are in no cluster.
     pub fn reaching(
         &mut self,
         entity: Entity,
@@ -86,7 +91,7 @@ impl<'a> ObjectLightLists<'a> {
         if self.needed > self.most {
             return InstanceData::default();
         }
-        // `most` is a u32.
+        // `most` fits into a u32, so the counts do, too.
         let end = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
         let first_light = end(self.indices.len());
         let dynamic = list.iter().filter(|index| !self.reaches[**index as usize].baked).count();
@@ -96,7 +101,8 @@ impl<'a> ObjectLightLists<'a> {
         instance
     }
 
-    /// The lights that reach an object with this bounding box in the world, or with brute force all, in rising order.
+    /// Returns the lights that reach an object with this bounding box in the world, in ascending order. With
+    /// `everything`, these are all lights except polygons that do not shine on the object.
     pub fn lights_of(
         &mut self,
         entity: Entity,
@@ -119,7 +125,8 @@ impl<'a> ObjectLightLists<'a> {
         self.near.iter().copied().filter(move |index| reached(&reaches[*index as usize]))
     }
 
-    /// Whether all lists fit into the device's buffer: a light that is lost silently would be a wrong picture.
+    /// Checks that all lists fit into the device's buffer. Silently dropping a light would give a wrong
+    /// picture.
     ///
     /// # Errors
     /// [`RenderError::BufferTooLarge`].
@@ -132,7 +139,7 @@ impl<'a> ObjectLightLists<'a> {
         Err(RenderError::BufferTooLarge { what, bytes, limit })
     }
 
-    /// Lights per object, on average over all objects that were asked of.
+    /// Returns the average length of the objects' lists.
     pub fn mean_length(&self) -> f32 {
         self.lengths.0 as f32 / self.lengths.1.max(1) as f32
     }
@@ -167,10 +174,10 @@ mod tests {
         let far = lists.reaching(object, DVec3::new(11.0, 0.0, 0.0), DVec3::splat(0.5), false);
         assert_eq!(lists.indices, [0, 1, 3, 1, 2]);
         assert_eq!((far.first_light, far.dynamic_end, far.static_end), (3, 5, 5));
-        // The same lights, the same list.
+        // The same lights give the same list.
         assert_eq!(lists.reaching(object, DVec3::new(0.1, 0.0, 0.0), DVec3::splat(0.5), false), near);
         assert_eq!(lists.indices.len(), 5);
-        // A box that touches the sphere meets it where the window is 0 already.
+        // A box that only touches the sphere meets it where the window is already 0.
         assert_eq!(lists.reaching(object, DVec3::new(-3.0, 0.0, 0.0), DVec3::ONE, false).static_end, 6);
     }
 
@@ -184,7 +191,7 @@ mod tests {
             polygon: None,
         };
         let reaches: Vec<LightReach> = (0..10).map(|x| light(f64::from(x))).collect();
-        // Two lights reach each point half way between neighbours: each object has a list of its own.
+        // Two lights reach each point halfway between neighbours, so each object has a list of its own.
         let fill = |objects: u32, bytes: u64| {
             let mut lists = ObjectLightLists::new(&reaches, false, bytes);
             for object in 0..objects {
@@ -222,7 +229,7 @@ mod tests {
         assert_eq!(count(other, 0.0, 0.5), 1);
         assert_eq!(count(lamp, 0.0, 0.5), 0);
         assert_eq!(count(other, 3.0, 0.5), 0);
-        // It touches the plane with its lowest face: nothing of it is lit. A little lower, something is.
+        // It touches the plane with its lowest face, so nothing of it is lit. A little lower, something is.
         assert_eq!(count(other, 2.5, 0.5), 0);
         assert_eq!(count(other, 2.49, 0.5), 1);
     }

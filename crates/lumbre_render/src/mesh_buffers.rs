@@ -1,4 +1,5 @@
-//! GPU copies of meshes: one buffer per attribute, made when a variant first asks for it. Who uses which is decided in `draws`.
+//! GPU copies of meshes: one buffer per attribute, created when a variant first needs it. Which draw uses
+//! which is decided in `draws`.
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
@@ -11,7 +12,7 @@ use wgpu::util::DeviceExt;
 use crate::Gpu;
 use crate::layout::coefficient;
 
-/// Attributes in the order of their shader locations.
+/// Vertex attributes in the order of their shader locations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Attribute {
     Position,
@@ -36,7 +37,7 @@ impl Attribute {
     }
 }
 
-/// The vertices of a mesh for one rate of evaluation.
+/// The attribute buffers of a mesh, with shared or with expanded vertices.
 #[derive(Debug, Default)]
 struct VertexBuffers {
     attributes: [Option<wgpu::Buffer>; Attribute::ALL.len()],
@@ -45,27 +46,28 @@ struct VertexBuffers {
 /// The GPU's copy of one mesh.
 #[derive(Debug)]
 pub(crate) struct GpuMesh {
-    /// As the entities have it.
+    /// The mesh as the entities have it.
     shared: Arc<TriangleMesh>,
-    /// The same, with tangents once something asked for them.
+    /// The same mesh, with tangents once they were needed.
     source: Arc<TriangleMesh>,
-    /// The coordinates of the normal map that it is drawn with.
+    /// The texture coordinates of its normal map, if the mesh needs tangents for one.
     tangents: Option<TextureCoordinateSet>,
     indexed: VertexBuffers,
     indices: Option<wgpu::Buffer>,
     /// Three vertices per triangle, for flat shading by each rule.
     expanded: [VertexBuffers; FlatRule::ALL.len()],
-    /// Middle of the bounding box in mesh space.
+    /// Centre of the bounding box in mesh space.
     pub center: DVec3,
-    /// Half its sides.
+    /// Half the sides of that box.
     pub half_size: DVec3,
-    /// A triangle with a vertex that is not there; attributes that are not there read as their neutral values instead.
+    /// Set if an index is out of range, so that the mesh cannot be drawn. Missing attributes are no fault;
+    /// they read as neutral values.
     pub fault: Option<MeshError>,
-    /// How large and curved its triangles are, once something asked.
+    /// Size and curvature of its triangles, computed on first use.
     spread: OnceLock<SurfaceSpread>,
 }
 
-/// Middle of the bounding box in mesh space, and half its sides.
+/// Returns the centre of the bounding box in mesh space and half its sides.
 pub(crate) fn mesh_box(mesh: &TriangleMesh) -> (DVec3, DVec3) {
     let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for position in mesh.positions.iter().filter(|position| position.is_finite()) {
@@ -79,7 +81,7 @@ pub(crate) fn mesh_box(mesh: &TriangleMesh) -> (DVec3, DVec3) {
     }
 }
 
-/// A draw's worth of buffers.
+/// The buffers of one draw.
 pub(crate) struct MeshSlices<'a> {
     pub attributes: Vec<&'a wgpu::Buffer>,
     pub indices: Option<&'a wgpu::Buffer>,
@@ -105,22 +107,22 @@ impl GpuMesh {
         }
     }
 
-    /// Number of triangles.
+    /// Returns the number of triangles.
     pub fn triangles(&self) -> usize {
         self.source.triangle_count()
     }
 
-    /// Number of vertices.
+    /// Returns the number of vertices.
     pub fn vertices(&self) -> usize {
         self.source.positions.len()
     }
 
-    /// How large and curved its triangles are: looked up in all of them when this is first asked.
+    /// Returns size and curvature of its triangles. The first call looks at all of them.
     pub fn spread(&self) -> &SurfaceSpread {
         self.spread.get_or_init(|| SurfaceSpread::of(&self.shared))
     }
 
-    /// Makes what is missing of these attributes; answers with the bytes uploaded for it.
+    /// Creates the missing buffers of these attributes, and returns the uploaded bytes.
     pub fn prepare(&mut self, gpu: &Gpu, attributes: &[Attribute], flat: Option<FlatRule>) -> u64 {
         let mut uploaded = match attributes.contains(&Attribute::Tangent) {
             true => self.make_tangents(gpu),
@@ -149,11 +151,11 @@ impl GpuMesh {
         uploaded
     }
 
-    /// Tangents for a mesh that has none. Vertices may be split, so that what was made of the indexed vertices is made again; answers with the bytes
-    /// uploaded for that.
+    /// Computes tangents for a mesh that has none. This may split vertices, so existing indexed buffers are
+    /// created again. Returns the bytes uploaded for that.
     fn make_tangents(&mut self, gpu: &Gpu) -> u64 {
         let Some(set) = self.tangents.filter(|_| self.source.tangents.is_empty()) else { return 0 };
-        // A mesh that is not sound shows its map as if it were flat.
+        // An invalid mesh shows its normal map as if it were flat.
         let Ok(source) = self.source.with_tangents(set) else { return 0 };
         self.source = Arc::new(source);
         self.indices = None;
@@ -163,12 +165,12 @@ impl GpuMesh {
         if again.is_empty() { 0 } else { self.prepare(gpu, &again, None) }
     }
 
-    /// Whether `prepare` made indexed positions.
+    /// Returns true if `prepare` has created indexed positions.
     pub fn has_positions(&self) -> bool {
         self.indexed.attributes[Attribute::Position as usize].is_some()
     }
 
-    /// The buffers that `prepare` made, in order.
+    /// Returns the buffers that `prepare` created, in order.
     pub fn slices(&self, attributes: &[Attribute], flat: Option<FlatRule>) -> MeshSlices<'_> {
         let buffers = flat.map_or(&self.indexed, |rule| &self.expanded[rule as usize]);
         let found = attributes.iter().filter_map(|a| buffers.attributes[*a as usize].as_ref()).collect();
@@ -188,7 +190,7 @@ fn vertex_buffer(gpu: &Gpu, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Bu
     })
 }
 
-/// One attribute in vertex order; an absent one reads as its neutral value.
+/// Returns one attribute in vertex order; a missing one reads as its neutral value.
 fn indexed_attribute(mesh: &TriangleMesh, attribute: Attribute) -> Vec<u8> {
     let count = mesh.positions.len();
     match attribute {
@@ -201,7 +203,8 @@ fn indexed_attribute(mesh: &TriangleMesh, attribute: Attribute) -> Vec<u8> {
     }
 }
 
-/// A normal whose square f32 can hold: one that is no vector is the zero vector, which takes ambient light only.
+/// Returns a normal whose square fits into f32. One that is not finite becomes the zero vector, which takes
+/// ambient light only.
 fn usable_normal(normal: Vec3) -> Vec3 {
     let largest = normal.abs().max_element();
     match (normal.is_finite(), largest > LARGEST_NORMAL) {
@@ -211,16 +214,17 @@ fn usable_normal(normal: Vec3) -> Vec3 {
     }
 }
 
-/// A tangent whose square f32 can hold; one that is no vector is the zero vector, on which a normal map has no effect.
+/// Returns a tangent whose square fits into f32. One that is not finite becomes the zero vector, on which a
+/// normal map has no effect.
 fn usable_tangent(tangent: Vec4) -> Vec4 {
     let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
     usable_normal(tangent.truncate()).extend(side)
 }
 
-/// Normals longer than this, in metres, are scaled down before they are squared.
+/// Normals with a larger component than this are scaled down before they are squared.
 const LARGEST_NORMAL: f32 = 1e9;
 
-/// A vertex colour without numbers that light cannot be multiplied with; coverage that is no number covers.
+/// Returns a vertex colour that light can be multiplied by. An alpha that is not finite becomes 1.
 fn usable_color(color: Vec4) -> Vec4 {
     let alpha = if color.w.is_finite() { color.w } else { 1.0 };
     coefficient(color.truncate()).extend(alpha)
@@ -234,8 +238,9 @@ fn filled<T: bytemuck::Pod>(values: &[T], neutral: T, count: usize, usable: impl
     }
 }
 
-/// One attribute with three vertices per triangle. What flat shading evaluates once for a polygon, all three have: under the centroid
-/// rule the face's normal, the centroid and the mean colour, computed in f64; else what one of the vertices has.
+/// Returns one attribute with three vertices per triangle. All three have the values that flat shading
+/// evaluates once for the polygon: by the centroid rule the face's normal, the centroid and the mean colour,
+/// computed in f64; otherwise those of one vertex.
 fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule) -> Vec<u8> {
     fn value<T: Copy>(values: &[T], neutral: T, index: u32) -> T {
         values.get(index as usize).copied().unwrap_or(neutral)
@@ -246,7 +251,7 @@ fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule)
         bytemuck::cast_slice(&corners.collect::<Vec<T>>()).to_vec()
     }
     let place = |index| value(&mesh.positions, Vec3::ZERO, index).as_dvec3();
-    // The corner that stands for the polygon; none under the centroid rule.
+    // The corner that provides the polygon's values; `None` by the centroid rule.
     let provoking = match rule {
         FlatRule::Centroid => None,
         FlatRule::FirstVertex => Some(0),
@@ -283,13 +288,14 @@ fn expanded_attribute(mesh: &TriangleMesh, attribute: Attribute, rule: FlatRule)
                 Some(first) => color(first),
                 None => (color(0) + color(1) + color(2)) / 3.0,
             };
-            // Coverage is not lit: it stays the corner's own.
+            // Alpha is not lit, so each corner keeps its own.
             flat.truncate().extend(color(corner).w)
         }),
     }
 }
 
-/// Address of a shared mesh, and which tangents it needs where it has none: what entities share, the GPU shares.
+/// Address of a shared mesh, and the texture coordinates that tangents have to be computed for, if any.
+/// Meshes that entities share are also shared on the GPU.
 pub(crate) type MeshKey = (usize, Option<TextureCoordinateSet>);
 
 /// Every mesh in use.
@@ -299,10 +305,11 @@ pub(crate) struct MeshBuffers {
 }
 
 impl MeshBuffers {
-    /// The key of a mesh, known from now on. `normal_map` says which coordinates its normal map reads, if it has one.
+    /// Registers a mesh and returns its key. `normal_map` is the set of coordinates that its normal map
+    /// reads, if it has one.
     pub fn insert(&mut self, mesh: &Arc<TriangleMesh>, normal_map: Option<TextureCoordinateSet>) -> MeshKey {
         let key = (Arc::as_ptr(mesh) as usize, normal_map.filter(|_| mesh.tangents.is_empty()));
-        // The copy keeps the Arc alive, so that an address never names another mesh.
+        // The copy keeps the Arc alive, so the address cannot be reused by another mesh.
         self.meshes.entry(key).or_insert_with(|| GpuMesh::new(Arc::clone(mesh), key.1));
         key
     }
@@ -315,7 +322,7 @@ impl MeshBuffers {
         self.meshes.get_mut(&key)
     }
 
-    /// Forgets meshes that no entity holds any more.
+    /// Drops meshes that no entity uses any more.
     pub fn sweep(&mut self) {
         let mut held: HashMap<usize, usize> = HashMap::new();
         for (key, mesh) in &self.meshes {

@@ -1,30 +1,32 @@
-//! Exposure by metering: from a frame's log-average luminance to the factor that shows it as a middle grey. Not the display.
+//! Metering of the exposure: finds the factor that maps the log-average luminance of a frame to middle grey.
+//! Applying the exposure belongs to the display.
 
 use bevy_ecs::world::World;
 use glam::Vec4;
 
 use crate::{Display, FrameOptions, Gpu, Measure, Offscreen, OffscreenFormat, RenderError, Renderer};
 
-/// What the log-average luminance becomes: the middle grey of photography.
+/// The value that the log-average luminance is mapped to: the middle grey of photography.
 const MIDDLE_GREY: f64 = 0.18;
-/// Below this a pixel shows no light, and is not metered: the background, or a shadow without any.
+/// Pixels below this luminance are not metered: they show the background, or a shadow that no light reaches.
 const DARK: f64 = 1e-7;
-/// Width of the frame that is metered, in pixels.
+/// Width of the metered frame, in pixels.
 const WIDTH: u32 = 256;
 
-/// What metering found.
+/// The result of metering a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metering {
-    /// Log-average luminance of what is lit, in units of radiance: cd/m² where lights are in candela and lux.
+    /// Log-average luminance of the lit pixels, in units of radiance: cd/m² if lights are given in candela
+    /// and lux.
     pub luminance: f64,
-    /// The factor on radiance that shows it as a middle grey.
+    /// The factor on radiance that maps this luminance to middle grey.
     pub exposure: f32,
-    /// Share of what is lit that would be white without an exposure, 0 to 1.
+    /// Fraction of the lit pixels, from 0 to 1, that would be clipped to white without an exposure.
     pub clipped: f64,
 }
 
 impl Metering {
-    /// Of linear pixels; nothing if none of them is lit.
+    /// Meters linear pixels. Returns `None` if none of them is lit.
     pub fn of(pixels: &[Vec4]) -> Option<Self> {
         let luminance = |pixel: &Vec4| {
             0.2126 * f64::from(pixel.x) + 0.7152 * f64::from(pixel.y) + 0.0722 * f64::from(pixel.z)
@@ -41,20 +43,22 @@ impl Metering {
         Some(Self { luminance, exposure, clipped })
     }
 
-    /// The exposure value at ISO 100 whose factor is this exposure: the factor is 1 / (1.2 · 2^EV).
+    /// Returns the exposure value at ISO 100 that corresponds to this exposure: the factor is 1 / (1.2 ·
+    /// 2^EV).
     pub fn exposure_value(&self) -> f64 {
         -(1.2 * f64::from(self.exposure)).log2()
     }
 }
 
-/// Meters frames again and again, with the renderer that draws them: a small picture of its own beside them.
+/// Meters frames repeatedly with the renderer that draws them, into a small target of its own.
 #[derive(Debug)]
 pub struct LightMeter {
     target: Offscreen,
 }
 
 impl LightMeter {
-    /// A meter for frames of a width by height of `aspect`, by a picture of at most `width` texels a row.
+    /// Creates a meter for frames with this aspect ratio (width by height), which draws a picture of `width`
+    /// texels per row.
     ///
     /// # Errors
     /// [`RenderError::TargetTooLarge`].
@@ -66,7 +70,7 @@ impl LightMeter {
     /// Meters the frame that the options describe. The same World gives the same exposure.
     ///
     /// # Errors
-    /// [`RenderError`], as drawing a frame has it.
+    /// [`RenderError`], as for drawing a frame.
     pub fn measure(
         &self,
         gpu: &Gpu,
@@ -87,10 +91,11 @@ impl LightMeter {
     }
 }
 
-/// Meters one frame that the options describe, drawn small, of a width by height of `aspect`. The same World gives the same exposure.
+/// Meters one frame that the options describe, drawn small with this aspect ratio (width by height). The same
+/// World gives the same exposure.
 ///
 /// # Errors
-/// [`RenderError`], as drawing a frame has it.
+/// [`RenderError`], as for drawing a frame.
 pub fn meter(
     gpu: &Gpu,
     world: &mut World,

@@ -1,6 +1,6 @@
-//! One level of a texture, before it is uploaded, and the box filter that makes the next one.
+//! One mip level of a texture in memory, and the box filter that computes the next one.
 
-/// Texels of four bytes.
+/// Texels of four bytes each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct MipLevel {
     pub width: u32,
@@ -8,8 +8,9 @@ pub(crate) struct MipLevel {
     pub rgba: Vec<u8>,
 }
 
-/// The texels of a row or column of `size` that texel `index` of the next level covers, each with its part of it. Of an odd size the next level has the half rounded
-/// down, so that three texels meet in each of its texels: none is lost.
+/// Returns the texels of a row or column of `size` texels that texel `index` of the next level covers, each
+/// with its weight. The next level of an odd size has half of it, rounded down, so three texels contribute to
+/// each of its texels and none is lost.
 pub(crate) fn box_filter(size: u32, index: u32) -> impl Iterator<Item = (u32, f32)> + Clone {
     let half = size / 2;
     let taps = match (half, size % 2) {
@@ -23,7 +24,7 @@ pub(crate) fn box_filter(size: u32, index: u32) -> impl Iterator<Item = (u32, f3
     taps.into_iter().filter(|(_, part)| *part > 0.0)
 }
 
-/// Rows and columns at once: the texels that texel (`x`, `y`) of the next level covers, with their parts of it.
+/// Returns the texels that texel (`x`, `y`) of the next level covers in two dimensions, with their weights.
 pub(crate) fn box_filter_2d(
     [width, height]: [u32; 2],
     [x, y]: [u32; 2],

@@ -1,9 +1,10 @@
-//! The views that the planar mirrors of a frame call for: which mirrors are seen from where, as seen in which others, and what each adds to the surface that mirrors.
-//! Not how a view is drawn (`effects::mirrors`), nor its geometry (`extract::CameraView::reflected`).
+//! Chooses the views that the planar mirrors of a frame need: which mirrors are visible from where, directly
+//! or in other mirrors, and what each contributes to its surface. How a view is drawn is in
+//! `effects::mirrors`, its geometry in `extract::CameraView::reflected`.
 //!
 //! ```text
-//!   camera ──┬── mirror A ──── mirror B in A        a tree; each view is reflected in a plane of what its parent sees
-//!            └── mirror B ──── mirror A in B        and drawn before it
+//!   camera ──┬── mirror A ──── mirror B in A        a tree: each view is its parent's reflection in a plane
+//!            └── mirror B ──── mirror A in B        that the parent sees, and is drawn before the parent
 //! ```
 
 use glam::{DVec4, Vec3};
@@ -12,26 +13,28 @@ use crate::draws::Draws;
 use crate::extract::{CameraView, MirrorData, MirrorSurface, Object, Objects, Window};
 use crate::frame_plan::MirrorShape;
 
-/// More views than this a frame does not have, beside the camera's.
+/// Largest number of views in mirrors in a frame.
 pub(crate) const MOST_VIEWS: usize = 16;
-/// Mirrors that lie in one plane share a view: planes whose normals are as near as this, as the sine of an angle.
+/// Mirrors in the same plane share a view. Their normals may differ by at most this much, as the sine of the
+/// angle.
 const SAME_DIRECTION: f64 = 1e-6;
-/// And whose distances from the mirror's middle are as near as this, in metres beside the extent of the mirror.
+/// Largest distance between such planes at the mirror's centre, relative to 1 m plus the radius of the
+/// mirror's bounding sphere.
 const SAME_PLACE: f64 = 1e-5;
 
-/// What is seen in one plane of mirrors.
+/// The view in one plane of mirrors.
 #[derive(Debug)]
 pub(crate) struct MirrorView {
-    /// The view that sees the mirrors: 0 is the camera's, 1 the first of these.
+    /// The view that sees the mirrors: 0 is the camera's, 1 is the first view in a mirror.
     pub parent: usize,
     pub view: CameraView,
     pub mirrors: Vec<MirrorSurface>,
-    /// What is drawn of it, by the objects in view.
+    /// What is drawn in it.
     pub draws: Draws,
 }
 
 impl MirrorView {
-    /// What effects are told of it, in a frame of this size.
+    /// Returns what effects need to know about it, in a frame of this size.
     pub fn shape(&self, size: [u32; 2]) -> MirrorShape {
         MirrorShape {
             parent: self.parent,
@@ -42,29 +45,32 @@ impl MirrorView {
     }
 }
 
-/// What a frame sets for all its mirrors.
+/// Settings that all mirrors of a frame share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MirrorLook {
-    /// Backs are drawn where materials ask for it.
+    /// Whether back faces are drawn where materials ask for it.
     pub two_sided: bool,
-    /// What lies behind glass is drawn.
+    /// Whether what lies behind glass is drawn.
     pub refraction: bool,
-    /// As radiance.
+    /// Background radiance.
     pub background: Vec3,
 }
 
 /// A plane of mirrors that a view sees.
 struct SeenPlane {
     plane: DVec4,
-    /// Where its mirrors are in the frame.
+    /// The part of the frame that its mirrors cover.
     window: Window,
     mirrors: Vec<MirrorSurface>,
-    /// The largest part of light that it reflects to the camera, times the part of the frame that it covers.
+    /// The largest fraction of light that it reflects to the camera, times the fraction of the frame that it
+    /// covers.
     weight: f64,
 }
 
-/// The views of what a camera sees in mirrors, and of what it sees in these, as often as `depth` says; parents before children. Draws are not in them yet. Of more than
-/// [`MOST_VIEWS`] those that matter least are left out, each with those seen in it, and said to be.
+/// Returns the views in the mirrors that the camera sees, in the mirrors that are visible in these, and so on
+/// up to `depth` reflections; parents come before children. The draws are still empty. Beyond [`MOST_VIEWS`],
+/// the views that matter least are left out together with those in them, and a message is added to
+/// `left_out`.
 pub(crate) fn mirror_views(
     objects: &Objects,
     camera: &CameraView,
@@ -73,7 +79,8 @@ pub(crate) fn mirror_views(
     left_out: &mut Vec<String>,
 ) -> Vec<MirrorView> {
     let mut views: Vec<MirrorView> = Vec::new();
-    // Of the last generation: number, view, part of its light that reaches the camera, and mirrors in whose plane it is.
+    // The last generation: number, view, fraction of its light that reaches the camera, and the mirrors in
+    // its plane.
     let mut generation = vec![(0, *camera, 1.0, Vec::new())];
     let mut without = 0;
     for _ in 0..depth {
@@ -106,7 +113,8 @@ pub(crate) fn mirror_views(
     views
 }
 
-/// The planes of the mirrors that a view sees, but for those that it is itself seen in.
+/// Returns the planes of the mirrors that a view sees, except the mirrors that the view itself is reflected
+/// in.
 fn seen_planes(
     objects: &Objects,
     view: &CameraView,
@@ -143,12 +151,12 @@ fn seen_planes(
     planes
 }
 
-/// How far an object's box reaches along the normal of a plane, from its middle.
+/// Returns how far an object's box extends from its centre along the normal of a plane.
 fn reach(object: &Object, plane: &DVec4) -> f64 {
     plane.truncate().abs().dot(object.half_size)
 }
 
-/// Whether a mirror of this object, in plane `b`, lies in plane `a`.
+/// Returns true if a mirror of this object with plane `b` lies in plane `a`.
 fn is_same_plane(a: DVec4, b: DVec4, object: &Object) -> bool {
     let apart = (a - b).dot(object.center.extend(1.0)).abs();
     a.truncate().dot(b.truncate()) > 0.0

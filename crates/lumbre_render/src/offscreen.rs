@@ -1,10 +1,10 @@
-//! Frames without a window: a texture to draw into, and its way back to memory.
+//! Frames without a window: a texture to draw into, and reading it back to memory.
 
 use glam::Vec4;
 
 use crate::{FrameTarget, Gpu, RenderError};
 
-/// The numbers that an offscreen frame keeps.
+/// Texel format of an offscreen frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OffscreenFormat {
     /// Eight bits per channel.
@@ -14,7 +14,7 @@ pub enum OffscreenFormat {
 }
 
 impl OffscreenFormat {
-    /// The texture format.
+    /// Returns the texture format.
     pub fn texture_format(self) -> wgpu::TextureFormat {
         match self {
             Self::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
@@ -31,7 +31,7 @@ pub struct Offscreen {
 }
 
 impl Offscreen {
-    /// A target of `width` x `height` texels, both at least 1.
+    /// Creates a target of `width` x `height` texels, both at least 1.
     ///
     /// # Errors
     /// [`RenderError::TargetTooLarge`].
@@ -55,17 +55,17 @@ impl Offscreen {
         Ok(Self { texture, format })
     }
 
-    /// What the renderer draws into.
+    /// Returns the target to draw into.
     pub fn target(&self) -> FrameTarget {
         FrameTarget::from_texture(&self.texture)
     }
 
-    /// Width and height in texels.
+    /// Returns width and height in texels.
     pub fn size(&self) -> (u32, u32) {
         (self.texture.width(), self.texture.height())
     }
 
-    /// The frame as RGBA bytes, top row first; linear floats are clamped and rounded.
+    /// Reads the frame as RGBA bytes, top row first. Linear floats are clamped and rounded.
     ///
     /// # Errors
     /// [`RenderError::ReadBack`].
@@ -79,7 +79,7 @@ impl Offscreen {
         })
     }
 
-    /// Writes the frame as a PNG file of eight bits; linear floats are clamped and rounded.
+    /// Writes the frame as a PNG file with eight bits per channel. Linear floats are clamped and rounded.
     ///
     /// # Errors
     /// [`RenderError::ReadBack`], [`RenderError::Picture`].
@@ -91,7 +91,7 @@ impl Offscreen {
             .map_err(|source| RenderError::Picture { path: path.to_owned(), source })
     }
 
-    /// The frame as linear RGBA, top row first.
+    /// Reads the frame as RGBA floats, top row first. Eight-bit values are divided by 255.
     ///
     /// # Errors
     /// [`RenderError::ReadBack`].
@@ -109,7 +109,7 @@ fn floats(bytes: &[u8]) -> impl Iterator<Item = f32> + '_ {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
 }
 
-/// All texels of a 2D texture of one layer with COPY_SRC usage, rows without padding.
+/// Reads all texels of a 2D texture with one layer and COPY_SRC usage, as rows without padding.
 ///
 /// # Errors
 /// [`RenderError::ReadBack`], [`RenderError::DeviceLost`].
@@ -142,7 +142,7 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>, Rende
     let slice = buffer.slice(..);
     let (sender, receiver) = std::sync::mpsc::channel();
     slice.map_async(wgpu::MapMode::Read, move |result| {
-        // The receiver waits below; if it is gone, nobody wants the answer.
+        // The receiver waits below. If it is gone, the result is no longer needed.
         let _ = sender.send(result);
     });
     gpu.device

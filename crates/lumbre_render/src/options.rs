@@ -1,17 +1,19 @@
-//! What a caller chooses for one frame. What the scene calls for is not chosen here: the census decides it.
+//! The options that a caller chooses for one frame. What the scene itself requires is not an option: it is
+//! decided from the scene's census.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::resource::Resource;
 use lumbre_optics::{FlatRule, ReflectionModel, Shading};
 
-/// How linear radiance becomes the numbers of the target.
+/// How linear radiance is converted to the values that are stored in the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Display {
-    /// The numbers as they are (after exposure).
+    /// Stores the exposed radiance as it is.
     Linear,
-    /// OpenGL's clamp to [0, 1]: per vertex before interpolation where a colour is computed per vertex, and again at the end.
+    /// Clamps to [0, 1] as OpenGL does: per vertex before interpolation where colours are computed per
+    /// vertex, and again at the end.
     Clamp,
-    /// For people: a tone curve, then the sRGB encoding.
+    /// Applies a tone curve and then the sRGB encoding, for viewing.
     #[default]
     Srgb,
 }
@@ -20,7 +22,7 @@ impl Display {
     /// Every choice.
     pub const ALL: &'static [Self] = &[Self::Linear, Self::Clamp, Self::Srgb];
 
-    /// The name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -29,66 +31,76 @@ impl Display {
         }
     }
 
-    /// The choice with that name.
+    /// Returns the choice with this name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|display| display.name() == name)
     }
 }
 
-/// What is measured. Measuring costs: queries, and merged passes that can no longer overlap.
+/// What is measured. Measuring has a cost: it adds queries, and merged passes can no longer overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Measure {
     /// Nothing.
     #[default]
     Nothing,
-    /// CPU and GPU time per pass.
+    /// CPU and GPU time of each pass.
     Time,
-    /// Times, and vertex and fragment invocations.
+    /// Times, and the number of vertex and fragment shader invocations.
     TimeAndInvocations,
-    /// The same, and how many lights each pass tests and how many of these contribute ([`LightCount`](crate::LightCount)): by shader variants of their own, which count. They draw
-    /// the same picture and take longer, so that the times are not those of the frame. A plan that is made without a frame ([`Renderer::explain`](crate::Renderer::explain)) does not
-    /// name them.
+    /// The same, and how many lights each pass tests and how many of these contribute
+    /// ([`LightCount`](crate::LightCount)). The counts come from special shader variants, which draw the same
+    /// picture but take longer, so the times are not those of a normal frame. A plan that is made without a
+    /// frame ([`Renderer::explain`](crate::Renderer::explain)) does not list these variants.
     Lights,
 }
 
-/// What becomes of a frame that calls for pipelines that are not there yet: the scene's first spot light, shadow or texture, say.
+/// What happens to a frame that needs pipelines that do not exist yet, for example for the scene's first spot
+/// light, shadow or texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum MissingPipelines {
-    /// The frame waits for them, and shows all that it should: for pictures that are kept.
+    /// The frame waits for them and shows everything that it should. For pictures that are kept.
     #[default]
     Wait,
-    /// They are made on another thread, and until they are there frames go on with those that are: a light of a kind that no earlier frame had stays dark, its
-    /// shadow out, a texture plain; and so do options that were changed. For windows. The first frame of a World or of a target's format waits all the same.
+    /// The pipelines are created on another thread, and until they are ready frames use those that exist: a
+    /// light of a kind that no earlier frame had stays dark, its shadow is missing, and a texture is not
+    /// shown. Changed options take effect only then, too. For windows. The first frame of a World, or of a
+    /// target format, waits in any case.
     Background,
 }
 
-/// By which lists a fragment finds its lights. What is drawn is the same to rounding: a light that is in no list adds nothing there.
+/// Which lists a fragment uses to find its lights. The picture is the same up to rounding, because a light
+/// that is missing from a list contributes nothing there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum LightLists {
-    /// By clusters where the scene has many lights with a range, else by objects.
+    /// Lists per cluster if the scene has many lights with a range, otherwise lists per object.
     #[default]
     Auto,
-    /// A list for each object, by its bounding box.
+    /// One list for each object, found by its bounding box.
     Objects,
-    /// A list for each cluster of pixels and depths, for lights with a range under Phong shading.
+    /// One list for each cluster of pixels and depths, for lights with a range under Phong shading.
     Clusters,
-    /// Every light for every object: brute force, to compare with.
+    /// Every light for every object: brute force, for comparison.
     Everything,
 }
 
-/// Whether surfaces are lit where they are drawn, or after all of them are drawn. What is drawn is the same to rounding, but for coplanar surfaces of both kinds.
+/// Whether surfaces are lit while they are drawn (forward) or after all of them have been drawn (deferred).
+/// The picture is the same up to rounding, except where a forward-lit and a deferred surface are coplanar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum RenderingPath {
-    /// Deferred on a software rasterizer where many lights meet small triangles, else forward: 64 lights that fragments find by clusters, and a triangle for every 16 pixels of
-    /// the frame, without lightmaps. A software rasterizer shades whole blocks of pixels for each triangle, and
-    /// small triangles fill little of a block.
+    /// Deferred on a software rasterizer if many lights meet small triangles: with at least 64 lights that
+    /// fragments find by clusters, at least one triangle for every 16 pixels of the frame, and no lightmaps.
+    /// Otherwise forward. A software rasterizer shades whole blocks of pixels for each triangle, and a small
+    /// triangle fills little of a block.
     #[default]
     Auto,
-    /// Each surface is lit where it is drawn.
+    /// Each surface is lit while it is drawn.
     Forward,
-    /// Opaque surfaces under Phong shading are drawn into a G-buffer, and what is seen of them is lit once. Those are lit forward as ever that have textures for
-    /// anything but their base colour, are cut out by alpha, have their highlights filtered, or are lit by no light or by more than 255 lightmaps; and so is every surface of a frame
-    /// with several samples per pixel. Of coplanar surfaces one that is lit forward is seen before one that is not.
+    /// Opaque surfaces under Phong shading are drawn into a G-buffer, and only what is visible of them is
+    /// lit, once. These surfaces are still lit forward: those with textures other than a base colour, those
+    /// with an alpha mask or filtered highlights, those that no light is evaluated on, those beyond the 255
+    /// combinations of shader variant and lightmap that the G-buffer can number, and all surfaces of a frame
+    /// with several samples per pixel. Of coplanar surfaces, one that is lit forward hides one that is lit
+    /// deferred.
     Deferred,
 }
 
@@ -96,7 +108,7 @@ impl RenderingPath {
     /// Every choice.
     pub const ALL: &'static [Self] = &[Self::Auto, Self::Forward, Self::Deferred];
 
-    /// The name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -105,56 +117,62 @@ impl RenderingPath {
         }
     }
 
-    /// The choice with that name.
+    /// Returns the choice with this name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|path| path.name() == name)
     }
 }
 
-/// Choices for one frame.
+/// Options of one frame.
 #[derive(Resource, Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// The camera; else the one with `ActiveCamera`, else the first.
+    /// The camera to draw from. Without one, the camera with `ActiveCamera` is used, or else the first one.
     pub camera: Option<Entity>,
-    /// Shades every object this way, whatever it or the scene says.
+    /// Shades every object this way, regardless of what the object or the scene asks for.
     pub shading: Option<Shading>,
-    /// Takes this specular model instead of the scene's.
+    /// Uses this specular model instead of the one that the object or the scene asks for.
     pub reflection: Option<ReflectionModel>,
     /// Evaluates flat shading by this rule instead of the scene's.
     pub flat_rule: Option<FlatRule>,
-    /// Filters highlights within pixels under Phong shading, or not, whatever the scene says.
+    /// Switches the filtering of highlights within pixels under Phong shading on or off, regardless of the
+    /// scene's setting.
     pub specular_antialiasing: Option<bool>,
-    /// By which lists lights are found.
+    /// Which lists lights are found by.
     pub light_lists: LightLists,
-    /// Whether opaque surfaces are lit where they are drawn, or afterwards.
+    /// Whether opaque surfaces are lit forward or deferred.
     pub rendering_path: RenderingPath,
-    /// Uses the lightmaps. Without them static lights shade lightmapped meshes like any other.
+    /// Uses the lightmaps. Without them, static lights shade lightmapped meshes like any other mesh.
     pub lightmaps: bool,
-    /// Lights what has no lightmap by the irradiance volumes of a bake, where there are any. Without them it takes the scene's ambient light.
+    /// Lights objects without a lightmap by the irradiance volumes of a bake, where there are any. Without
+    /// them, these objects take the scene's ambient light.
     pub irradiance_volumes: bool,
     /// Draws the shadows of lights that ask for them.
     pub shadows: bool,
-    /// How often light is mirrored on its way to the camera, at most, where it meets flat mirrors: 1 shows a mirror, 2 a mirror in a mirror, 0 none. What a mirror shows is
-    /// drawn like the frame; it costs as much as what is in it, in as many pixels as the mirror has.
+    /// The largest number of reflections in flat mirrors on a path of light to the camera: 0 shows none, 1
+    /// shows what a mirror reflects, 2 also shows a mirror in a mirror. The view in a mirror is drawn like
+    /// the frame itself; it costs as much as what is visible in it, over as many pixels as the mirror covers.
     pub mirror_depth: u32,
-    /// Draws what lies behind surfaces that light passes through, bent as they bend it. Without it they are opaque.
+    /// Draws what is visible through transmissive surfaces, refracted by them. Without it these surfaces are
+    /// opaque.
     pub refraction: bool,
-    /// Four samples per pixel instead of one, or not, whatever the scene says; one where neither says anything.
+    /// Uses four samples per pixel (true) or one (false) regardless of the scene's setting. One if neither
+    /// says anything.
     pub multisample: Option<bool>,
-    /// From radiance to the target's numbers.
+    /// How radiance is converted to the target's values.
     pub display: Display,
-    /// Factor on radiance, instead of the camera's.
+    /// The factor on radiance, instead of the camera's.
     pub exposure: Option<f32>,
-    /// f32 instead of f16 per channel until the display pass: for measuring, not for games.
+    /// Keeps f32 instead of f16 per channel until the display pass. For measurements, not for games.
     pub full_precision: bool,
-    /// What becomes of the frame where pipelines are missing.
+    /// What happens to the frame if pipelines are missing.
     pub missing_pipelines: MissingPipelines,
-    /// Leaves the target alone, and the GPU, where nothing has changed since this renderer's last frame and that one went into the same texture: the plan says
-    /// `Unchanged` of each pass. For targets that nobody else writes to.
+    /// Skips drawing if nothing has changed since this renderer's last frame and that frame was drawn into
+    /// the same texture. The plan then says `Unchanged` for each pass. For targets that nothing else writes
+    /// to.
     pub keep_unchanged: bool,
     /// What is measured.
     pub measure: Measure,
-    /// Looks for NaN and infinities after every pass.
+    /// Checks the result of every pass for NaN and infinities.
     pub probe: bool,
 }
 

@@ -1,4 +1,5 @@
-//! Render pipelines of the variants that draw and light surfaces, made when a draw first asks for one, at once or on the device's thread. Which draw asks for which: `draws`.
+//! Render pipelines for drawing and lighting surfaces, created when a draw first needs them, either at once
+//! or on the device's worker thread. Which draw needs which pipeline is decided in `draws`.
 
 use std::cmp::Reverse;
 use std::collections::HashMap;
@@ -17,17 +18,18 @@ use crate::target::DEPTH_FORMAT;
 use crate::texture_sets::TextureSets;
 use crate::{Gpu, RenderError};
 
-/// Everything that a pipeline is made from.
+/// Everything that a pipeline is created from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct PipelineKey {
     pub variant: Variant,
     pub format: wgpu::TextureFormat,
     pub samples: u32,
-    /// The transform turns counter-clockwise triangles clockwise.
+    /// The transform turns counter-clockwise triangles into clockwise ones.
     pub mirrored: bool,
     pub double_sided: bool,
     pub blend: bool,
-    /// The material textures that are bound: the layout of their group. An unlit variant does not read all of them.
+    /// The bound material textures, which determine the layout of their group. An unlit variant does not read
+    /// all of them.
     pub texture_mask: u8,
 }
 
@@ -36,7 +38,7 @@ pub(crate) struct PipelineKey {
 pub(crate) struct Pipeline {
     pub pipeline: wgpu::RenderPipeline,
     pub attributes: Vec<Attribute>,
-    /// Whether it draws three vertices per triangle, without indices.
+    /// Whether it draws three vertices per triangle without indices.
     pub flat: bool,
 }
 
@@ -51,10 +53,10 @@ pub(crate) struct Pipelines {
     pipelines: HashMap<PipelineKey, Deferred<Pipeline>>,
 }
 
-/// What is done on the same thread after a pipeline was made.
+/// A job that runs on the same thread after a pipeline was created.
 pub(crate) type Afterwards = Box<dyn FnOnce() + Send>;
 
-/// The modules compiled so far.
+/// The shader modules compiled so far.
 type Modules = Arc<Mutex<HashMap<Variant, wgpu::ShaderModule>>>;
 
 impl Pipelines {
@@ -69,41 +71,42 @@ impl Pipelines {
         }
     }
 
-    /// The layout of group 0 with these buffers.
+    /// Returns the layout of group 0 with these buffers.
     pub fn frame_layout(&mut self, gpu: &Gpu, bindings: FrameBindings) -> &wgpu::BindGroupLayout {
         self.frame_layouts.entry(bindings).or_insert_with(|| bindings.layout(gpu))
     }
 
-    /// The layout of group 3, of variants that read shadow maps.
+    /// Returns the layout of group 3, for variants that read shadow maps.
     pub fn shadow_layout(&self) -> &wgpu::BindGroupLayout {
         &self.shadow_layout
     }
 
-    /// The layout of group 2, of variants that read an irradiance volume.
+    /// Returns the layout of group 2, for variants that read an irradiance volume.
     pub fn volume_layout(&self) -> &wgpu::BindGroupLayout {
         &self.volume_layout
     }
 
-    /// The layout of group 1, of variants that light from the G-buffer.
+    /// Returns the layout of group 1, for variants that light from the G-buffer.
     pub fn g_buffer_layout(&self) -> &wgpu::BindGroupLayout {
         &self.g_buffer_layout
     }
 
-    /// Number of shader variants compiled so far.
+    /// Returns the number of shader variants compiled so far.
     pub fn variants(&self) -> usize {
         self.modules.lock().map_or(0, |modules| modules.len())
     }
 
-    /// Number of pipelines made so far.
+    /// Returns the number of pipelines created so far.
     pub fn made(&self) -> usize {
         self.pipelines.values().filter(|pipeline| matches!(pipeline.get(), Some(Ok(_)))).count()
     }
 
-    /// Begins to make the pipeline of a key unless it is there or on its way; whether it is there. With `wait` it is; else what `afterwards` answers with is done
-    /// before it counts as there.
+    /// Starts to create the pipeline of a key unless it exists or is being created. Returns true if it
+    /// exists, which is always the case with `wait`. Without `wait`, the job that `afterwards` returns runs
+    /// before the pipeline counts as existing.
     ///
     /// # Errors
-    /// [`RenderError::Shader`], a fault of ours.
+    /// [`RenderError::Shader`], which is a bug in this crate.
     pub fn prepare(
         &mut self,
         gpu: &Gpu,
@@ -144,13 +147,13 @@ impl Pipelines {
             .map_err(|message| RenderError::Shader { variant: key.variant.to_string(), message })
     }
 
-    /// A pipeline that `prepare` made.
+    /// Returns a pipeline that `prepare` created.
     pub fn get(&self, key: &PipelineKey) -> Option<&Pipeline> {
         self.pipelines.get(key)?.get()?.ok()
     }
 
-    /// The pipeline that comes nearest to one that is not there yet: of those that are there, for the same frame and light, the one that shows most of
-    /// the material.
+    /// Returns the existing pipeline that best stands in for one that is still being created: among those for
+    /// the same frame and light, the one that shows most of the material.
     pub fn nearest(&self, wanted: &PipelineKey) -> Option<PipelineKey> {
         let fits = |key: &&PipelineKey| {
             let plain = PipelineKey { variant: wanted.variant, texture_mask: wanted.texture_mask, ..**key };
@@ -159,14 +162,14 @@ impl Pipelines {
                 && key.variant.is_lit_as(&wanted.variant)
         };
         let there = self.pipelines.keys().filter(|key| self.get(key).is_some());
-        // Of several as near always the same.
+        // The differing bits are part of the order, so ties are always broken the same way.
         there.filter(fits).copied().max_by_key(|key| {
             (key.texture_mask == wanted.texture_mask, Reverse(key.variant.differences(&wanted.variant)))
         })
     }
 }
 
-/// The attributes that a variant reads, by shader location.
+/// Returns the attributes that a variant reads, by shader location.
 pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
     let lit = variant.has(Feature::Lit);
     Attribute::ALL
@@ -187,7 +190,7 @@ pub(crate) fn attributes(variant: &Variant) -> Vec<Attribute> {
         .collect()
 }
 
-/// Whether a variant draws three vertices per triangle: flat shading, and lit at all.
+/// Returns true if a variant draws three vertices per triangle: it is lit, with flat shading.
 pub(crate) fn is_flat(variant: &Variant) -> bool {
     variant.has(Feature::Lit) && variant.shading == Shading::Flat
 }
@@ -251,9 +254,11 @@ fn make(
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
             depth_write_enabled: Some(!key.blend && !fullscreen),
-            // Reversed-Z: nearer is greater. Equal passes: of coplanar faces the one drawn last is seen.
+            // Reversed-Z: nearer is greater. Equal depth passes, so of coplanar faces the last one drawn is
+            // visible.
             depth_compare: Some(match fullscreen {
-                // Where nothing is drawn it is behind the triangle, and nothing is run.
+                // The full-screen triangle lies behind all surfaces and in front of the cleared depth, so
+                // pixels without a surface run no fragment shader.
                 true => wgpu::CompareFunction::LessEqual,
                 false => wgpu::CompareFunction::GreaterEqual,
             }),
@@ -276,7 +281,7 @@ fn make(
     }
 }
 
-/// The module of a variant, compiled if nobody has asked for it before.
+/// Returns the shader module of a variant, compiling it if needed.
 fn module(
     device: &wgpu::Device,
     modules: &Modules,

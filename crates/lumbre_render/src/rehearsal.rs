@@ -1,6 +1,9 @@
-//! A first draw with a pipeline where no frame waits for it. A software rasterizer compiles a pipeline's shaders when it first draws with them, on the thread that draws, for
-//! half a second and more; but it keeps the code on disk (Mesa's shader cache), for every device of the machine. So what is made in the background is drawn with once on
-//! another device of the same adapter, one triangle without an area, and the first frame that draws with it finds its code. GPUs compile when a pipeline is made.
+//! Warm-up draws, on a device of their own, for pipelines that are created in the background. A software
+//! rasterizer compiles a pipeline's shaders on the first draw, on the drawing thread, which takes half a
+//! second and more. But it keeps the code on disk for every device of the machine (Mesa's shader cache). So
+//! each such pipeline first draws one degenerate triangle on another device of the same adapter, and the
+//! first frame that uses it finds the compiled code. GPUs need no warm-up: they compile when a pipeline is
+//! created.
 
 use std::fmt::Display;
 use std::sync::{Arc, Mutex};
@@ -18,23 +21,24 @@ use crate::texture_sets::{TextureSet, TextureSets};
 use crate::textures::Textures;
 use crate::{EffectError, Gpu, RenderError};
 
-/// A device to rehearse on, and what draws need on it.
+/// The warm-up device, and what draws need on it.
 #[derive(Debug)]
 struct Rehearsal {
     gpu: Gpu,
     pipelines: Pipelines,
     sets: TextureSets,
     textures: Textures,
-    /// Zeros, as large as any uniform array: a uniform and storage buffer, vertices and indices.
+    /// Zeros, as large as any uniform array: used as uniform, storage, vertex and index buffer.
     zeros: wgpu::Buffer,
 }
 
-/// Texels along the side of what is drawn into.
+/// Side of the render targets, in texels.
 const SIDE: u32 = 16;
-/// What the uniform array of lights takes.
+/// Size of the uniform array of lights.
 const ZEROS: u64 = 1 << 16;
 
-/// The rehearsals of a renderer, on a device that is opened with the first of them. Two are equal if they are the same.
+/// The warm-up device of a renderer, which is opened with the first warm-up draw. Two are equal if they are
+/// the same object.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rehearsals(Arc<Mutex<Option<Rehearsal>>>);
 
@@ -45,9 +49,10 @@ impl PartialEq for Rehearsals {
 }
 
 impl Rehearsals {
-    /// A first draw with a pipeline and the textures of a material, if the adapter compiles when it draws.
+    /// Returns a job that draws once with a pipeline and a material's textures; `None` if the adapter does
+    /// not compile on the first draw.
     pub fn of(&self, gpu: &Gpu, key: PipelineKey, textures: Option<&TextureSet>) -> Option<Afterwards> {
-        // What counts is for frames that nobody plays in.
+        // Variants that count lights are for measurements, where a long frame does not matter.
         if key.variant.has(Feature::CountLights) {
             return None;
         }
@@ -55,12 +60,13 @@ impl Rehearsals {
         self.job(gpu, move |rehearsal| rehearsal.draw(key, textures.as_ref()))
     }
 
-    /// A first draw of a shadow map.
+    /// Returns a job that draws a shadow map once.
     pub fn of_casters(&self, gpu: &Gpu) -> Option<Afterwards> {
         self.job(gpu, Rehearsal::draw_casters)
     }
 
-    /// A first draw of a pass of its own: `draw` makes what it needs on the device that it is given, and draws.
+    /// Returns a job that draws once in a pass of an effect. `draw` creates what it needs on the device that
+    /// it is given, and draws.
     pub fn of_pass(
         &self,
         gpu: &Gpu,
@@ -89,7 +95,7 @@ impl Rehearsals {
             }
             let Some(rehearsal) = &mut *rehearsal else { return };
             if let Err(error) = draw(rehearsal) {
-                // The frame that draws with it first takes longer; all else is as it would be.
+                // The first frame that uses the pipeline takes longer; nothing else is affected.
                 tracing::debug!("a pipeline was not rehearsed: {error}");
             }
         }))
@@ -97,7 +103,7 @@ impl Rehearsals {
 }
 
 impl Rehearsal {
-    /// Opens a device beside that of the frames.
+    /// Opens a second device of the adapter.
     fn new(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = Gpu::from_adapter(instance, adapter)?;
         let zeros = gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -113,10 +119,10 @@ impl Rehearsal {
         Ok(Self { gpu, pipelines, sets, textures, zeros })
     }
 
-    /// Draws with a pipeline, and waits until that is done.
+    /// Draws with a pipeline and waits until the device has finished.
     ///
     /// # Errors
-    /// What a frame with it would meet.
+    /// The errors that a frame with this pipeline would have.
     fn draw(&mut self, key: PipelineKey, textures: Option<&MaterialTextures>) -> Result<(), RenderError> {
         self.pipelines.prepare(&self.gpu, &mut self.sets, key, true, || None)?;
         let set = match textures {
@@ -147,7 +153,7 @@ impl Rehearsal {
         drawn
     }
 
-    /// Draws a caster into a map.
+    /// Draws a caster into a shadow map.
     fn draw_casters(&mut self) -> Result<(), RenderError> {
         let device = &self.gpu.device;
         let pipelines = CasterPipelines::new(device, self.gpu.reads_tables_from_textures())?;
@@ -171,7 +177,7 @@ impl Rehearsal {
         self.finish(encoder)
     }
 
-    /// Draws into a texture of a format, without depth.
+    /// Draws into a texture of this format, without a depth buffer.
     fn draw_pass(
         &self,
         format: wgpu::TextureFormat,
@@ -192,10 +198,10 @@ impl Rehearsal {
         Ok(self.finish(encoder)?)
     }
 
-    /// Hands commands over, and waits for them.
+    /// Submits commands and waits for them.
     fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<(), RenderError> {
         self.gpu.queue.submit([encoder.finish()]);
-        // A device that is lost shows in the check.
+        // `check` reports a lost device.
         let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
         self.gpu.check()
     }
@@ -251,7 +257,7 @@ impl Rehearsal {
         self.finish(encoder)
     }
 
-    /// Zeros where a table is bound: this texture on a device that reads tables from textures.
+    /// Returns zeros for a table binding: this texture on a device that keeps tables in textures.
     fn table<'a>(&'a self, texture: &'a wgpu::TextureView) -> wgpu::BindingResource<'a> {
         match self.gpu.reads_tables_from_textures() {
             true => wgpu::BindingResource::TextureView(texture),
@@ -259,7 +265,7 @@ impl Rehearsal {
         }
     }
 
-    /// Group 0.
+    /// Creates group 0.
     fn frame_group(&mut self, bindings: FrameBindings) -> wgpu::BindGroup {
         let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);
         let layout = self.pipelines.frame_layout(&self.gpu, bindings).clone();
@@ -278,13 +284,13 @@ impl Rehearsal {
         })
     }
 
-    /// Group 1 of what lights from the G-buffer.
+    /// Creates group 1 of deferred lighting.
     fn g_buffer_group(&self) -> wgpu::BindGroup {
         let surfaces = self.texture(g_buffer::FORMAT, 1);
         g_buffer::group(&self.gpu.device, self.pipelines.g_buffer_layout(), &surfaces, None)
     }
 
-    /// Group 3.
+    /// Creates group 3.
     fn shadow_group(&self) -> wgpu::BindGroup {
         let atlas = self.texture(DEPTH_FORMAT, 1);
         let table = self.texture(wgpu::TextureFormat::Rgba32Uint, 1);

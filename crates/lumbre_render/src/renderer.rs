@@ -1,5 +1,5 @@
-//! The renderer: from a World to a frame. It extracts, decides what the scene calls for, declares the graph and runs it; each of
-//! these has its own file.
+//! The renderer, which draws a World into a target. It extracts the World, decides what the frame consists
+//! of, declares the render graph and runs it. Each of these steps has its own file.
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
@@ -50,7 +50,8 @@ use crate::{
     Measure, RenderError, Statistics, Uploads,
 };
 
-/// Draws Worlds. One renderer may serve several Worlds in turn; what it keeps on the GPU belongs to the last one.
+/// Draws Worlds. One renderer may draw several Worlds in turn; what it keeps on the GPU belongs to the last
+/// one.
 #[derive(Resource)]
 pub struct Renderer {
     gpu: Gpu,
@@ -62,7 +63,7 @@ pub struct Renderer {
     lights: GrowableBuffer<LightData>,
     instances: GrowableBuffer<InstanceData>,
     light_list: GrowableBuffer<u32>,
-    /// The camera's first, then those of mirrors.
+    /// The camera's buffers first, then those of the views in mirrors.
     views: Vec<ViewBuffers>,
     shadows: ShadowMaps,
     meshes: MeshBuffers,
@@ -75,20 +76,20 @@ pub struct Renderer {
     shares: EffectShares,
     ledger: Ledger,
     light_counter: LightCounter,
-    /// Pipelines of lit surfaces that there were at the end of the last frame.
+    /// Number of pipelines of lit surfaces at the end of the last frame.
     pipelines_before: usize,
     needs: ShadingByNeed,
     watch: WorldWatch,
     decisions: Decisions,
-    /// None after a frame that failed.
+    /// `None` after a frame that failed.
     last: Option<LastFrame>,
-    /// Of the last frame.
+    /// Messages of the last frame.
     left_out: Vec<String>,
-    /// Of the last frame: variants with the objects that each drew, in the order of the draws.
+    /// Variants of the last frame, each with the number of objects that it drew, in the order of the draws.
     drawn: Vec<(Variant, usize)>,
 }
 
-/// What a renderer is made of beside its own effects.
+/// Builds a renderer with effects of a program, or without some of the built-in ones.
 #[derive(Default)]
 pub struct RendererBuilder {
     effects: Vec<Box<dyn Effect>>,
@@ -96,21 +97,21 @@ pub struct RendererBuilder {
 }
 
 impl RendererBuilder {
-    /// Adds an effect. Among those of one [`Stage`] the order is that of these calls, after the renderer's own.
+    /// Adds an effect. Effects of the same [`Stage`] keep the order of these calls, after the built-in ones.
     #[must_use]
     pub fn with(mut self, effect: impl Effect + 'static) -> Self {
         self.effects.push(Box::new(effect));
         self
     }
 
-    /// Leaves out an effect of the renderer's own.
+    /// Leaves out a built-in effect.
     #[must_use]
     pub fn without(mut self, effect: BuiltIn) -> Self {
         self.without.push(effect);
         self
     }
 
-    /// The renderer on a device.
+    /// Creates the renderer on a device.
     #[must_use]
     pub fn build(self, gpu: &Gpu) -> Renderer {
         let mut renderer = Renderer::new(gpu);
@@ -123,12 +124,12 @@ impl RendererBuilder {
 }
 
 impl Renderer {
-    /// Begins a renderer with effects of a program's own.
+    /// Starts to build a renderer with a program's own effects.
     pub fn builder() -> RendererBuilder {
         RendererBuilder::default()
     }
 
-    /// A renderer on a device, without effects but its own.
+    /// Creates a renderer with the built-in effects only.
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             gpu: gpu.clone(),
@@ -165,7 +166,8 @@ impl Renderer {
     /// Draws one frame of `world` into `target` and submits it. Transforms are propagated first.
     ///
     /// # Errors
-    /// No camera or a bad one, too many objects for the device, a lost device, faults of shaders or the graph.
+    /// Returns an error if there is no valid camera, the viewport does not fit, the scene exceeds the
+    /// device's limits, the device is lost, an effect fails, or a shader or the graph is invalid.
     pub fn render(
         &mut self,
         world: &mut World,
@@ -175,7 +177,8 @@ impl Renderer {
         self.draw(world, target, options, None)
     }
 
-    /// As [`render`](Self::render), with a last pass that draws an overlay (a user interface) over the finished frame.
+    /// Like [`render`](Self::render), with a last pass that draws an overlay (a user interface) over the
+    /// finished frame.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -189,10 +192,11 @@ impl Renderer {
         self.draw(world, target, options, Some(Box::new(overlay)))
     }
 
-    /// Waits until the GPU has finished and answers with the last frame's measurements, if any were asked for.
+    /// Waits until the GPU has finished, and returns the last frame's measurements if any were asked for.
     ///
     /// # Errors
-    /// [`RenderError::Run`] if the device was lost.
+    /// [`RenderError::Run`] if reading the measurements fails, [`RenderError::DeviceLost`] or
+    /// [`RenderError::Refused`] if the device reported an error.
     pub fn wait(&mut self) -> Result<Option<&lumbre_graph::GraphReport>, RenderError> {
         let since = Instant::now();
         self.executor.timings_blocking(&self.gpu.device, &self.gpu.queue)?;
@@ -202,12 +206,14 @@ impl Renderer {
         Ok(self.executor.latest_report())
     }
 
-    /// The account of the newest measured frame of which all has arrived: after [`wait`](Self::wait) of the last one.
+    /// Returns the account of the newest measured frame whose results have all arrived. After
+    /// [`wait`](Self::wait), this is the last frame.
     pub fn accounting(&self) -> Option<&Accounting> {
         self.ledger.newest().map(Arc::as_ref)
     }
 
-    /// Settles the accounts of frames whose numbers have arrived. With `waited`, since when the last frame was waited for.
+    /// Completes the accounts of frames whose results have arrived. `waited` is the time at which waiting for
+    /// the last frame began, if it was waited for.
     fn settle(&mut self, waited: Option<Instant>) {
         if let Some(report) = self.executor.latest_report() {
             self.ledger.note_report(report);
@@ -218,7 +224,8 @@ impl Renderer {
         self.ledger.settle(waited);
     }
 
-    /// The shader variants of the last frame, by their features, with the number of objects that each drew.
+    /// Returns the shader variants of the last frame by their features, each with the number of objects that
+    /// it drew.
     pub fn drawn_variants(&self) -> BTreeMap<String, usize> {
         let mut variants = BTreeMap::new();
         for (variant, count) in &self.drawn {
@@ -227,19 +234,19 @@ impl Renderer {
         variants
     }
 
-    /// The options of a frame without what this renderer was built without.
+    /// Returns the options without what this renderer was built without.
     pub(crate) fn possible(&self, options: &FrameOptions) -> FrameOptions {
         let mut possible = options.clone();
         self.without.iter().for_each(|effect| effect.switch_off(&mut possible));
         possible
     }
 
-    /// The device that it draws on.
+    /// Returns the device that it draws on.
     pub(crate) fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// Its effects, in the order of their stages.
+    /// Returns the effects in the order of their stages.
     pub(crate) fn effects_mut(&mut self) -> &mut [Box<dyn Effect>] {
         &mut self.effects
     }
@@ -253,7 +260,7 @@ impl Renderer {
     ) -> Result<FrameReport, RenderError> {
         let drawn = self.draw_frame(world, target, &self.possible(options), overlay);
         if drawn.is_err() {
-            // What was to be drawn into the shadow maps may not have been.
+            // The frame may have failed before the shadow maps were drawn.
             self.shadows.forget();
         }
         drawn
@@ -294,15 +301,16 @@ impl Renderer {
         self.encode(frame, target, options, overlay, &mut clock)
     }
 
-    /// Whether nothing has changed since the last frame that this renderer or an effect of it would see.
+    /// Returns true if nothing that this renderer or one of its effects would notice has changed since the
+    /// last frame.
     fn is_still(&mut self, world: &mut World) -> bool {
-        // Each is asked: each looks from now on.
+        // No short-circuit: each call also resets what it compares with next time.
         let still = self.watch.is_still(world);
         let effects = self.effects.iter_mut().zip(&mut self.shares.ms);
         effects.fold(still, |still, (effect, ms)| timed(ms, || effect.is_still(world)) && still)
     }
 
-    /// What there is to say of a frame that is not drawn, since the target holds it.
+    /// Returns the report of a frame that is not drawn because the target already holds it.
     fn report_unchanged(&mut self, last: LastFrame, plan: Plan, clock: &StageClock) -> FrameReport {
         let statistics = Statistics { uploads: Uploads::default(), cpu: clock.stages(), ..last.statistics };
         let census = Arc::clone(&last.decided.census);
@@ -317,7 +325,8 @@ impl Renderer {
         }
     }
 
-    /// All that comes before the passes of a frame: what changed in the World, what follows from it, and its way to the GPU.
+    /// Does everything that comes before the passes of a frame: extracts what changed in the World, decides
+    /// what is drawn, and uploads it.
     fn prepare(
         &mut self,
         world: &mut World,
@@ -330,7 +339,7 @@ impl Renderer {
         let _ = world.run_system_cached(propagate_transforms);
         clock.lap(|cpu| &mut cpu.transforms_ms);
         let mut settings = world.get_resource::<SceneSettings>().copied().unwrap_or_default();
-        // As lights, a fog made in code whose numbers no file may have is left out.
+        // Like a light, a fog that was created in code with invalid numbers is left out.
         let fog_fault = settings.fog.and_then(|fog| fog.validate("scene").err());
         let mut left_out: Vec<String> = fog_fault.iter().map(ToString::to_string).collect();
         if fog_fault.is_some() {
@@ -356,7 +365,8 @@ impl Renderer {
         let mut decided = self.decide(world, &seen, (options, &settings), None, &mut left_out, clock)?;
         self.warn_once(&left_out);
         let former = self.decisions.former(world, target, options);
-        // A frame cannot go on with light that has left the World.
+        // A frame cannot use the decision of an earlier one if the irradiance volumes that it uses have left
+        // the World.
         let former = former.filter(|former| !former.features.irradiance_volumes || self.volumes.len() > 0);
         let awaited = self.make_pipelines(&mut decided, &seen, former.is_none())?;
         clock.lap(|cpu| &mut cpu.pipelines_ms);
@@ -375,8 +385,9 @@ impl Renderer {
         Ok(LastFrame { asked, decided, statistics, view, exposure, waits: awaited > 0, drawn: None })
     }
 
-    /// Decides what the frame is, from the World as these options and settings show it; or, with a former decision, as that one can show it with the pipelines that
-    /// are there.
+    /// Decides what the frame consists of. Without `former`, this follows from the World, options and
+    /// settings; with a former decision, it is what that decision can show of the World with the existing
+    /// pipelines.
     fn decide(
         &mut self,
         world: &mut World,
@@ -417,7 +428,7 @@ impl Renderer {
         let (objects, volumes) = (&self.objects.census, self.volumes.len());
         let mut facts = SceneFacts::new(objects, &lights.set, volumes, settings, options, device);
         if let Some(former) = former {
-            // What draws surfaces stays what it was.
+            // Surfaces are drawn the way they were in the former frame.
             facts.g_buffer = former.features.g_buffer;
         }
         clock.lap(|cpu| &mut cpu.census_ms);
@@ -501,7 +512,7 @@ impl Renderer {
                 background: radiance(SceneSettings::shown_background(settings)),
             };
             mirrors = mirror_views(&self.objects, &seen.view, look, options.mirror_depth, left_out);
-            // Counts are of the passes that have a row in the account.
+            // Lights are counted only in passes that have a row in the account.
             let counted = CountedStages::default();
             let features = FrameFeatures { counted, g_buffer: None, ..decision.features };
             let mut instances = draws.instances.len();
@@ -540,7 +551,8 @@ impl Renderer {
         })
     }
 
-    /// Makes the pipelines of a frame that are not there yet, or begins to; how many are on their way. With `wait` none is.
+    /// Creates the missing pipelines of a frame, or starts to. Returns how many are still being created,
+    /// which is 0 with `wait`.
     fn make_pipelines(
         &mut self,
         decided: &mut Decided,
@@ -567,7 +579,7 @@ impl Renderer {
         Ok(count)
     }
 
-    /// By effect, whether it can be drawn without waiting for it.
+    /// Returns for each effect whether it can be drawn without waiting.
     fn ready_effects(&mut self, decided: &Decided, seen: &Seen<'_>) -> Result<Vec<bool>, RenderError> {
         let mut shape = decided.decision.shape(seen);
         shape.rehearsals = Some(self.rehearsals.clone());
@@ -580,7 +592,8 @@ impl Renderer {
         ready.collect()
     }
 
-    /// Leaves effects out of a frame that goes on as a former one, if that one could not show them.
+    /// Leaves out effects that are not ready, or that need radiance where the former decision does not keep
+    /// it.
     fn leave_out_effects(&mut self, decided: &mut Decided, seen: &Seen<'_>) -> Result<(), RenderError> {
         decided.declared = self.ready_effects(decided, seen)?;
         let linear = decided.decision.plan.ending == Ending::DisplayPass;
@@ -597,7 +610,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Brings what a frame reads to the GPU.
+    /// Uploads what the frame reads, and returns its statistics.
     fn upload(
         &mut self,
         decided: &Decided,
@@ -697,7 +710,7 @@ impl Renderer {
         })
     }
 
-    /// Declares a frame's passes, records them and hands them to the GPU.
+    /// Declares the passes of a frame, records them and submits them.
     fn encode(
         &mut self,
         mut frame: LastFrame,
@@ -745,7 +758,7 @@ impl Renderer {
         let effects = (self.effects.as_slice(), decided.declared.as_slice(), &decided.decision.plan);
         let light = decided.bindings().light_resources();
         let shared = self.shared_buffers();
-        // What is in a texture is of no pass of the graph.
+        // Tables in textures are not resources of the graph.
         let bound = |buffer| match self.views[0].bound(buffer, None, &shared) {
             Some(wgpu::BindingResource::Buffer(bound)) => Some(bound.buffer.clone()),
             _ => None,
@@ -767,7 +780,7 @@ impl Renderer {
         let census = Arc::clone(&frame.decided.census);
         frame.statistics.cpu = clock.stages();
         match options.measure {
-            // Another frame, metered say, may come between two that are measured.
+            // An unmeasured frame, for example a metered one, may come between two measured frames.
             Measure::Nothing => self.ledger.pass_over(),
             measure => {
                 let shares = FrameShares {
@@ -804,7 +817,7 @@ impl Renderer {
         Ok(report)
     }
 
-    /// The surfaces in view that light passes through.
+    /// Returns the transmissive surfaces in view.
     fn refractors(&self, decided: &Decided, view: &CameraView) -> Vec<RefractorSurface> {
         let background = radiance(SceneSettings::shown_background(&decided.decision.settings));
         let parallel = view.viewer().w == 0.0;
@@ -821,7 +834,7 @@ impl Renderer {
         surfaces.collect()
     }
 
-    /// Logs what is left out now and was not in the frame before.
+    /// Logs the messages that the previous frame did not have.
     fn warn_once(&mut self, left_out: &[String]) {
         for fault in left_out.iter().filter(|fault| !self.left_out.contains(fault)) {
             tracing::warn!("left out of the frame: {fault}");
@@ -829,7 +842,7 @@ impl Renderer {
         left_out.clone_into(&mut self.left_out);
     }
 
-    /// Uploads the components that changed; answers with their bytes.
+    /// Uploads the components that changed, and returns the uploaded bytes.
     fn upload_buffers(
         &mut self,
         decided: &Decided,
@@ -862,7 +875,7 @@ impl Renderer {
             }
         }
         if renewed.iter().any(|renewed| !matches!(renewed, Ok(false))) {
-            // Whatever fails below, the old groups name buffers that are gone.
+            // Even if an upload failed, the old bind groups refer to buffers that no longer exist.
             self.views.iter_mut().for_each(ViewBuffers::forget_groups);
         }
         renewed.into_iter().collect::<Result<Vec<bool>, _>>()?;
@@ -874,7 +887,7 @@ impl Renderer {
         Ok(uploads)
     }
 
-    /// The buffers of group 0 that all views share.
+    /// Returns the buffers of group 0 that all views share.
     fn shared_buffers(&self) -> SharedBuffers<'_> {
         SharedBuffers {
             objects: self.objects.transforms.bound(),
@@ -886,7 +899,7 @@ impl Renderer {
         }
     }
 
-    /// Makes the groups 0 of a frame's draws that are not there yet.
+    /// Creates the missing bind groups 0 of a frame's draws.
     fn make_groups(&mut self, decided: &Decided) {
         let mut views = std::mem::take(&mut self.views);
         for (draws, buffers) in decided.every_draws().zip(&mut views) {
@@ -899,7 +912,7 @@ impl Renderer {
     }
 }
 
-/// The views of a frame and what is drawn of each: the camera's first, then those of mirrors.
+/// Returns the views of a frame and what is drawn in each: the camera's view first, then those in mirrors.
 fn views_of<'a>(
     decided: &'a Decided,
     seen: &Seen<'_>,

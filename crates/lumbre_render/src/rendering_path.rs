@@ -1,4 +1,5 @@
-//! Whether opaque surfaces of a frame are lit where they are drawn or afterwards, and why. How the latter is done is `g_buffer`'s.
+//! Chooses whether opaque surfaces of a frame are lit forward or deferred, and says why. How deferred shading
+//! works is described in `g_buffer`.
 
 use std::fmt::{Display, Formatter};
 
@@ -8,32 +9,35 @@ use lumbre_scene::{ObjectCensus, SceneSettings};
 use crate::extract::LightSet;
 use crate::{FrameOptions, RenderingPath};
 
-/// From so many lights with a range on, a software rasterizer gains by deferred shading: under fewer, drawing the G-buffer costs about what it saves.
+/// With at least this many lights with a range, a software rasterizer gains by deferred shading. With fewer,
+/// drawing the G-buffer costs about what it saves.
 const ENOUGH_LIGHTS: u32 = 64;
-/// Pixels of the frame for each triangle of the scene up to which it gains: blocks of 16 pixels are shaded for each triangle, and larger triangles fill them.
+/// Most pixels of the frame per triangle of the scene at which it gains. Blocks of 16 pixels are shaded for
+/// each triangle, and larger triangles fill them.
 const MOST_PIXELS: u64 = 16;
 
-/// The path of a frame, by what decided it.
+/// The rendering path of a frame, by the reason for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ChosenPath {
-    /// The options.
+    /// The options chose it.
     Asked(RenderingPath),
-    /// Several samples of a pixel, of which the G-buffer would hold one.
+    /// Several samples per pixel, of which the G-buffer would hold only one.
     SeveralSamples,
-    /// Surfaces that are lit at vertices, or whose highlights are filtered within pixels: the G-buffer would be empty.
+    /// Surfaces are lit at vertices, or their highlights are filtered within pixels, so the G-buffer would be
+    /// empty.
     NotDeferrable,
-    /// A light loop that is short.
+    /// The light loop is short.
     FewLights(u32),
-    /// Triangles of the scene that are large in a frame of so many pixels.
+    /// The triangles of the scene are large in a frame with this many pixels.
     LargeTriangles { triangles: usize, pixels: u64 },
-    /// Lightmaps, each of which would be lit apart.
+    /// This many objects have lightmaps, each of which would have to be lit separately.
     Lightmaps(usize),
-    /// Small triangles under many lights: a software rasterizer defers.
+    /// Small triangles under many lights: deferred on a software rasterizer.
     ManyLights { lights: u32, triangles: usize, software: bool },
 }
 
 impl ChosenPath {
-    /// The path of a frame of this size.
+    /// Chooses the path of a frame of this size.
     pub fn new(
         (options, settings): (&FrameOptions, &SceneSettings),
         lights: &LightSet,

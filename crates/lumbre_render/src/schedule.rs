@@ -1,27 +1,29 @@
-//! The renderer in a schedule: one system, and the resources that it takes. Whoever calls `Renderer::render` needs none of it.
+//! The renderer in a bevy_ecs schedule: one system, and the resources that it uses. Not needed by a program
+//! that calls `Renderer::render`.
 
 use bevy_ecs::prelude::*;
 
 use crate::{FrameOptions, FrameReport, FrameTarget, RenderError, Renderer};
 
-/// What the next frame is drawn into. [`render_frame`] takes it: a window's texture is another one each frame, and an offscreen target is given
-/// again.
+/// The target of the next frame. [`render_frame`] removes it: a window has another texture each frame, and an
+/// offscreen target is inserted again.
 #[derive(Resource, Clone, Debug)]
 pub struct CurrentTarget(pub FrameTarget);
 
-/// What became of the last frame that [`render_frame`] drew.
+/// The result of the last frame that [`render_frame`] drew.
 #[derive(Resource, Debug)]
 pub struct LastFrame(pub Result<FrameReport, RenderError>);
 
-/// Systems of a frame, for ordering others before and after.
+/// System sets of a frame, for ordering other systems before and after.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RenderSet {
     /// [`render_frame`].
     Draw,
 }
 
-/// Draws a frame with the World's [`Renderer`] and [`FrameOptions`] (default ones if there are none) into its [`CurrentTarget`], and leaves [`LastFrame`]. Does
-/// nothing without a renderer or a target. An exclusive system: an effect may take from the World whatever it likes.
+/// Draws a frame with the World's [`Renderer`] and [`FrameOptions`] (the default ones if there are none) into
+/// its [`CurrentTarget`], and inserts [`LastFrame`]. Does nothing without a renderer or a target. This is an
+/// exclusive system, because an effect may read anything in the World.
 ///
 /// ```
 /// # use std::sync::Arc;

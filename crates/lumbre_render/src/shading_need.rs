@@ -1,16 +1,17 @@
-//! What shading by need chose, and why, object by object and grouped for people: plain data. Not the choice, which is `shading_by_need`.
+//! What shading by need chose, and why, for each object and grouped for reports. Plain data; the choice
+//! itself is made in `shading_by_need`.
 
 use std::collections::BTreeMap;
 
 use lumbre_optics::Shading;
 
-/// Why an object's error is known, or is not.
+/// Why the error of an object was predicted, or why it was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Reason {
-    /// It follows from mesh, lights and viewer.
+    /// It was predicted from mesh, lights and viewer.
     #[default]
     Predicted,
-    /// Nothing is cheaper than Phong shading.
+    /// The object covers so few pixels that nothing is cheaper than Phong shading.
     FewPixels,
     NoLight,
     Unlit,
@@ -39,18 +40,18 @@ impl Reason {
     }
 }
 
-/// What an object takes.
+/// What was chosen for an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Chosen {
     pub shading: Shading,
     pub reason: Reason,
     /// Predicted errors of flat and of Gouraud shading, in exposed radiance.
     pub errors: [f64; 2],
-    /// Of the one that is taken.
+    /// Error of the chosen shading.
     pub error: f64,
 }
 
-/// What the objects in view that are shaded by need take, counted.
+/// Counts of what was chosen for the objects in view that are shaded by need.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ShadingNeeds {
     /// Objects shaded once per polygon.
@@ -59,7 +60,8 @@ pub struct ShadingNeeds {
     pub gouraud: usize,
     /// Objects shaded at every fragment.
     pub phong: usize,
-    /// The largest predicted error of any of them: no pixel and channel is farther from Phong shading, in exposed linear radiance between 0 and 1.
+    /// The largest predicted error of any of them. No pixel and channel differs from Phong shading by more,
+    /// in exposed linear radiance between 0 and 1.
     pub predicted_error: f64,
 }
 
@@ -74,24 +76,25 @@ impl ShadingNeeds {
     }
 }
 
-/// Objects that take the same for the same reason.
+/// Objects for which the same was chosen for the same reason.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ShadingNeed {
-    /// What they take: `flat`, `gouraud` or `phong`.
+    /// The chosen shading: `flat`, `gouraud` or `phong`.
     pub shading: &'static str,
-    /// Objects, in view or not.
+    /// Number of objects, in view or not.
     pub objects: usize,
-    /// Why.
+    /// Why it was chosen.
     pub reason: String,
-    /// The smallest and the largest predicted error of Gouraud shading on them, in exposed linear radiance between 0 and 1; absent where it is not predicted. What is beyond the
-    /// bound may be farther beyond it: then nobody looks any longer.
+    /// The smallest and the largest predicted error of Gouraud shading on these objects, in exposed linear
+    /// radiance between 0 and 1; `None` if it is not predicted. An error above the bound may be larger than
+    /// stated, because the prediction stops there.
     pub gouraud_error: Option<[f64; 2]>,
-    /// The same of flat shading.
+    /// The same for flat shading.
     pub flat_error: Option<[f64; 2]>,
 }
 
 impl ShadingNeed {
-    /// Groups what objects take.
+    /// Groups the choices of objects.
     pub(crate) fn group(chosen: &[Chosen]) -> Vec<Self> {
         let mut groups: BTreeMap<(&'static str, Reason), Vec<&Chosen>> = BTreeMap::new();
         for one in chosen {
@@ -101,7 +104,7 @@ impl ShadingNeed {
             let range = |which: usize| {
                 let least = chosen.iter().map(|one| one.errors[which]).fold(f64::INFINITY, f64::min);
                 let most = chosen.iter().map(|one| one.errors[which]).fold(0.0, f64::max);
-                // More than white is white.
+                // Radiance above white is shown as white.
                 (least.is_finite() && reason == Reason::Predicted).then_some([least.min(1.0), most.min(1.0)])
             };
             let (gouraud_error, flat_error) = (range(1), range(0));
@@ -111,7 +114,7 @@ impl ShadingNeed {
         groups.into_iter().map(group).collect()
     }
 
-    /// A line for people.
+    /// Formats it as one line of text.
     pub fn line(&self) -> String {
         let objects = if self.objects == 1 { "1 object" } else { &format!("{} objects", self.objects) };
         let range = |name: &str, error: Option<[f64; 2]>| match error {

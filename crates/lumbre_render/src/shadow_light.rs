@@ -1,30 +1,31 @@
-//! Lights that cast shadows, as their records and their maps both know them: how many views each kind has. What the views show is `shadows`.
+//! Lights that cast shadows, and how many views each kind of light has, for both the light records and the
+//! shadow maps. What the views show is decided in `shadows`.
 
 use bevy_ecs::entity::Entity;
 use glam::DVec3;
 use lumbre_optics::{Light, LightKind};
 use lumbre_scene::GlobalTransform;
 
-/// Most views of all lights of a frame.
+/// Largest number of views of all lights of a frame.
 pub(crate) const MOST_VIEWS: usize = 128;
-/// Cascades of a directional light.
+/// Number of cascades of a directional light.
 pub(crate) const CASCADES: usize = 3;
-/// A cone with a wider half angle than this, in radians, has the six views of a point light.
+/// A spotlight with a larger half angle than this, in radians, has six views like a point light.
 pub(crate) const WIDEST_CONE: f64 = 1.2;
 
-/// How a light's views are chosen among.
+/// How a shader chooses one of a light's views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ShadowKind {
     /// One view.
     Cone,
     /// The face that the direction from the light points through: +X, -X, +Y, -Y, +Z, -Z.
     Cube,
-    /// The first cascade that holds the depth.
+    /// The first cascade that contains the depth.
     Cascades,
 }
 
 impl ShadowKind {
-    /// Of a light; an ambient one casts none.
+    /// Returns the kind of a light; `None` for an ambient one, which casts no shadow.
     pub fn of(light: &Light) -> Option<Self> {
         match (light.kind, light.spot.filter(|cone| !cone.is_everywhere())) {
             (LightKind::Ambient, _) => None,
@@ -46,7 +47,7 @@ impl ShadowKind {
 /// A light that casts shadows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowLight {
-    /// Its number among the views, and how it chooses among its own.
+    /// Index of its first view among all views, and how one of its views is chosen.
     pub first_view: u32,
     pub kind: ShadowKind,
     pub entity: Entity,
@@ -54,12 +55,12 @@ pub(crate) struct ShadowLight {
     pub axis: DVec3,
     pub cone: f64,
     pub range: f64,
-    /// Radius in metres; of a directional light the tangent of half its angle.
+    /// Radius in metres; for a directional light the tangent of half its angle.
     pub size: f64,
 }
 
 impl ShadowLight {
-    /// A light that asks for a shadow, if there is room for its views.
+    /// Creates the shadow of a light that asks for one; `None` if there is no room for its views.
     pub fn new(
         entity: Entity,
         light: &Light,
@@ -74,7 +75,7 @@ impl ShadowLight {
             light.spot.filter(|cone| !cone.is_everywhere()).map_or(0.0, |cone| cone.cosines().outer.acos());
         let size = light_size(kind, light);
         Some(Self {
-            // Fewer than MOST_VIEWS.
+            // Less than MOST_VIEWS.
             first_view: first_view as u32,
             kind,
             entity,
@@ -90,7 +91,7 @@ impl ShadowLight {
         self.kind.views()
     }
 
-    /// What the shaders find in a light's record: how its views are chosen among, and the first of them.
+    /// Returns the shadow flags of a light's record: how one of its views is chosen, and its first view.
     pub fn flags(&self) -> u32 {
         let kind = match self.kind {
             ShadowKind::Cone => 1,
@@ -101,7 +102,8 @@ impl ShadowLight {
     }
 }
 
-/// The radius of a light in metres, or the tangent of half the angle of a directional one: shadows of a light that has a size have a penumbra.
+/// Returns the radius of a light in metres, or the tangent of half the angle of a directional one. A light
+/// with a size has shadows with a penumbra.
 pub(crate) fn light_size(kind: ShadowKind, light: &Light) -> f64 {
     match kind {
         ShadowKind::Cascades => (0.5 * f64::from(light.angle)).tan(),

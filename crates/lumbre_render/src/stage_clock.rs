@@ -1,4 +1,5 @@
-//! Times the stages of a frame on the CPU: each begins where the one before ended, so that nothing lies between them.
+//! Times the CPU stages of a frame. Each stage begins where the previous one ended, so no time is lost
+//! between them.
 
 use std::time::{Duration, Instant};
 
@@ -17,25 +18,25 @@ impl StageClock {
         Self { begun, last: begun, stages: CpuStages::default() }
     }
 
-    /// Adds what has passed since the last call to a stage.
+    /// Adds the time since the last call to a stage.
     pub fn lap(&mut self, stage: impl FnOnce(&mut CpuStages) -> &mut f64) {
         let now = Instant::now();
         *stage(&mut self.stages) += milliseconds(now - self.last);
         self.last = now;
     }
 
-    /// Notes what the stage of encoding consists of.
+    /// Stores the parts of the encoding stage.
     pub fn note_execution(&mut self, execution: lumbre_graph::ExecutionStages) {
         self.stages.execution = execution;
     }
 
-    /// The stages until now, with all of the time.
+    /// Returns the stages so far and the total time.
     pub fn stages(&self) -> CpuStages {
         CpuStages { total_ms: milliseconds(self.begun.elapsed()), ..self.stages }
     }
 }
 
-/// Runs something and adds the time that it took, in milliseconds.
+/// Runs a closure and adds the time that it took, in milliseconds, to `sum`.
 pub(crate) fn timed<T>(sum: &mut f64, run: impl FnOnce() -> T) -> T {
     let begun = Instant::now();
     let result = run();

@@ -1,4 +1,4 @@
-//! What a frame was made of: counts, uploads, and the stages of the CPU. Data only.
+//! Statistics of a frame: counts, uploaded bytes, and the time of each CPU stage. Plain data.
 
 use lumbre_graph::ExecutionStages;
 
@@ -7,12 +7,14 @@ use crate::shading_need::ShadingNeeds;
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
-    /// Lights that are on, ambient ones apart. Each face of an emissive object that lights others is one.
+    /// Lights that are switched on, except ambient ones. Each face of an emissive object that lights others
+    /// counts as one.
     pub lights: u32,
-    /// Of these, the static ones: a lightmapped mesh takes their highlights only. 0 while lightmaps are switched off.
+    /// How many of these are static: a lightmapped mesh does not take their diffuse part. 0 while lightmaps
+    /// are switched off.
     pub static_lights: u32,
-    /// Lights in the list of an object in view, on average: what each of its vertices or fragments loops over. Where fragments find
-    /// lights with a range by clusters, these are not in it.
+    /// Average length of the light list of an object in view, which each of its vertices or fragments loops
+    /// over. Lights that fragments find by clusters are not included.
     pub lights_per_object: f32,
     /// Objects in view.
     pub objects: usize,
@@ -22,45 +24,47 @@ pub struct Statistics {
     pub triangles: usize,
     /// Draw calls.
     pub draws: usize,
-    /// Views that mirrors in sight call for, beside the camera's.
+    /// Views that visible mirrors need, in addition to the camera's.
     pub mirror_views: usize,
-    /// Forward shader variants compiled so far.
+    /// Shader variants of lit surfaces compiled so far.
     pub variants: usize,
-    /// Pipelines made so far.
+    /// Pipelines of lit surfaces created so far.
     pub pipelines_made: usize,
-    /// Pipelines, and effects, that this frame called for and that are still being made: it went on as one before it
+    /// Pipelines and effects that this frame needed and that are still being created. The frame was then
+    /// drawn with the decisions of an earlier one
     /// ([`MissingPipelines::Background`](crate::MissingPipelines)).
     pub pipelines_awaited: usize,
-    /// What the objects in view take that are shaded by need.
+    /// What was chosen for the objects in view that are shaded by need.
     pub shading_by_need: ShadingNeeds,
     /// How fragments and vertices find their lights.
     pub light_lists: LightListing,
-    /// What the passes that draw lit surfaces draw and test, each its own; zeros where nothing is measured, since every object's list is counted for it.
+    /// What each pass over lit surfaces draws, and the lights that it tests. Zeros unless the frame is
+    /// measured, because every object's list has to be counted.
     pub lit_passes: LitPasses,
-    /// What the CPU did, stage by stage.
+    /// Time of each CPU stage.
     pub cpu: CpuStages,
-    /// What was uploaded for this frame, by what it is.
+    /// What was uploaded for this frame, by kind.
     pub uploads: Uploads,
 }
 
-/// Bytes brought to the GPU for one frame. The uniform of the frame itself, some two hundred bytes, is not counted.
+/// Bytes uploaded to the GPU for one frame. The frame's own uniform, some two hundred bytes, is not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Uploads {
     /// Matrices of objects.
     pub transforms: u64,
     /// Records of materials.
     pub materials: u64,
-    /// What each draw's instances are.
+    /// Instances of the draws.
     pub instances: u64,
     /// Records of lights.
     pub lights: u64,
-    /// Lists of the lights that reach objects.
+    /// Light lists of objects.
     pub light_lists: u64,
     /// Clusters: their grid, their lists, and the records of inverse-square lights.
     pub clusters: u64,
     /// Views of shadow maps.
     pub shadows: u64,
-    /// Attributes and indices of meshes, those of casters of shadows too.
+    /// Attributes and indices of meshes, including those of shadow casters.
     pub meshes: u64,
     /// Textures of materials with their mip levels.
     pub textures: u64,
@@ -68,12 +72,12 @@ pub struct Uploads {
     pub lightmaps: u64,
     /// Irradiance volumes: their light.
     pub irradiance_volumes: u64,
-    /// What effects brought themselves, as [`Effect::work`](crate::effects::Effect::work) counts it.
+    /// What effects uploaded themselves, as reported by [`Effect::work`](crate::effects::Effect::work).
     pub effects: u64,
 }
 
 impl Uploads {
-    /// All of them.
+    /// Returns the sum of all bytes.
     pub fn total(&self) -> u64 {
         self.components()
             + self.meshes
@@ -83,7 +87,7 @@ impl Uploads {
             + self.effects
     }
 
-    /// What follows from components of the World, meshes, pictures and volumes apart.
+    /// Returns the bytes that follow from components of the World, without meshes, images and volumes.
     pub fn components(&self) -> u64 {
         let Self { transforms, materials, instances, lights, light_lists, clusters, shadows, .. } = self;
         transforms + materials + instances + lights + light_lists + clusters + shadows
@@ -97,14 +101,14 @@ pub struct LitPasses {
     pub lightmap: PassLights,
     /// Opaque surfaces without one.
     pub forward: PassLights,
-    /// Surfaces that light passes through.
+    /// Transmissive surfaces.
     pub refraction: PassLights,
-    /// Surfaces that are blended.
+    /// Blended surfaces.
     pub transparent: PassLights,
 }
 
 impl LitPasses {
-    /// Those of the pass of this name, if it draws lit surfaces.
+    /// Returns the entry of the pass with this name, if that pass draws lit surfaces.
     pub fn of(&self, pass: &str) -> Option<&PassLights> {
         match pass {
             "lightmap" => Some(&self.lightmap),
@@ -123,68 +127,73 @@ pub struct PassLights {
     pub objects: usize,
     /// Draw calls.
     pub draws: usize,
-    /// Different lights in the lists of its objects, and in those of clusters where its fragments read them.
+    /// Number of different lights in the lists of its objects, and in the clusters' lists where its fragments
+    /// read those.
     pub lights: u32,
-    /// Lights in the list of one of its objects, on average; without those that its fragments find by clusters.
+    /// Average length of the light lists of its objects, without the lights that fragments find by clusters.
     pub lights_per_object: f32,
 }
 
-/// By which lists lights are found, with their sizes.
+/// Which lists lights are found by, and the size of these lists.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct LightListing {
-    /// Whether Phong fragments find lights with a range by clusters.
+    /// Whether Phong-shaded fragments find lights with a range by clusters.
     pub clustered: bool,
-    /// Columns, rows and slices of depth of the clusters; 0 without.
+    /// Columns, rows and depth slices of the cluster grid; 0 without clusters.
     pub clusters: [u32; 3],
-    /// Pixels along the side of a cluster's tile; 0 without.
+    /// Side of a cluster's tile in pixels; 0 without clusters.
     pub tile_side: u32,
-    /// Entries of all clusters' lists.
+    /// Number of entries in the lists of all clusters.
     pub entries: usize,
-    /// Of these, the inverse-square lights of one colour, which have lean records.
+    /// Inverse-square lights of one colour, which have compact records.
     pub inverse_square_lights: u32,
-    /// Other lights with a range: with a cone, an attenuation of their own, several colours.
+    /// Other lights with a range: with a cone, a different attenuation or several colours.
     pub other_ranged_lights: u32,
-    /// Lights without a range, directional and polygon lights: they are in the lists of objects always.
+    /// Lights without a range, directional lights and polygon lights. These are always in the lists of
+    /// objects.
     pub unbounded_lights: u32,
 }
 
-/// Milliseconds of a frame on the CPU, from the call of `render` until it was submitted. The stages follow each other without a gap.
+/// CPU time of a frame in milliseconds, from the call of `render` until submission. The stages follow each
+/// other without a gap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct CpuStages {
-    /// Looking whether anything has changed at all since the last frame.
+    /// Checking whether anything has changed since the last frame.
     pub changes_ms: f64,
-    /// Transforms carried down the hierarchy.
+    /// Propagating transforms down the hierarchy.
     pub transforms_ms: f64,
-    /// Changed objects and their bounds, counted as they change.
+    /// Updating changed objects, their bounds and their counts.
     pub objects_ms: f64,
-    /// Lights and their records.
+    /// Updating lights and their records.
     pub lights_ms: f64,
-    /// The census and the facts that follow from it.
+    /// The census and the facts derived from it.
     pub census_ms: f64,
-    /// What effects take from the World, and what they prepare on the GPU.
+    /// What effects extract from the World, and what they prepare on the GPU.
     pub effects_ms: f64,
-    /// Which objects are in view, and which shader variant draws each.
+    /// Finding the objects in view and the shader variant of each.
     pub visibility_ms: f64,
-    /// Sorting, batches, and the lists of objects.
+    /// Sorting, batching, and the light lists of objects.
     pub draws_ms: f64,
-    /// Pipelines that were made, begun, or found to be there.
+    /// Creating or requesting pipelines, or finding existing ones.
     pub pipelines_ms: f64,
-    /// The lists of clusters.
+    /// Building the light lists of clusters.
     pub clusters_ms: f64,
-    /// Views of shadow maps, and which of them changed.
+    /// Choosing the views of shadow maps and finding out which maps changed.
     pub shadows_ms: f64,
-    /// Buffers, meshes, textures, irradiance volumes and bind groups.
+    /// Uploading buffers, meshes, textures and irradiance volumes, and creating bind groups.
     pub upload_ms: f64,
-    /// The graph, its passes' commands, and their submission.
+    /// Declaring and executing the graph: recording the commands of its passes and submitting them.
     pub encoding_ms: f64,
-    /// What encoding consists of, where times are measured: the rest of it is the declaration of the passes. Zeros elsewhere.
+    /// The parts of encoding, where times are measured; zeros otherwise. The rest of encoding is the
+    /// declaration of the passes.
     pub execution: ExecutionStages,
-    /// All of it.
+    /// The whole frame.
     pub total_ms: f64,
 }
 
 impl CpuStages {
-    /// Each stage by its name, in the order in which a frame goes through them: with [`remainder_ms`](Self::remainder_ms) they sum to the whole.
+    /// Returns the name and time of each stage, in the order of a frame. Together with
+    /// [`remainder_ms`](Self::remainder_ms) they sum to the total.
     pub fn named(&self) -> [(&'static str, f64); 19] {
         let within = &self.execution;
         [
@@ -210,7 +219,7 @@ impl CpuStages {
         ]
     }
 
-    /// Milliseconds of the whole that belong to no stage.
+    /// Returns the milliseconds of the total that belong to no stage.
     pub fn remainder_ms(&self) -> f64 {
         self.total_ms - self.named().iter().map(|(_, ms)| ms).sum::<f64>()
     }

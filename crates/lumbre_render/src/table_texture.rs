@@ -1,20 +1,21 @@
-//! A table in a texture, for devices whose shaders fetch texels faster than they read storage buffers: software rasterizers. Texel after texel in rows; which rows and columns an entry
-//! stands in is `table_place` of shaders/frame.wesl. What stands in a table is its owner's.
+//! A table in a texture, for devices whose shaders fetch texels faster than they read storage buffers, which
+//! are software rasterizers. Texels are stored in rows; `table_place` of shaders/frame.wesl finds the row and
+//! column of one. What a table holds is decided by its owner.
 
 use std::ops::Range;
 
 use crate::{Gpu, RenderError};
 
-/// Texels in a row.
+/// Texels per row.
 const WIDTH: usize = 1024;
 
-/// A texture of texels of four words, or of one.
+/// A texture with texels of four words or of one.
 #[derive(Debug)]
 pub(crate) struct TableTexture {
     texture: Option<(wgpu::Texture, wgpu::TextureView)>,
 }
 
-/// How a table is bound, whatever it holds: as a texture or as a storage buffer.
+/// Returns how a table is bound: as a texture or as a storage buffer.
 pub(crate) fn table_binding(in_texture: bool) -> wgpu::BindingType {
     match in_texture {
         true => wgpu::BindingType::Texture {
@@ -30,7 +31,7 @@ pub(crate) fn table_binding(in_texture: bool) -> wgpu::BindingType {
     }
 }
 
-/// Bytes that a table of words holds at most, in a texture or in a storage buffer.
+/// Returns the largest size in bytes of a table of words, in a texture or in a storage buffer.
 pub(crate) fn most_bytes_of_words(gpu: &Gpu) -> u64 {
     let limits = gpu.device.limits();
     match gpu.reads_tables_from_textures() {
@@ -39,7 +40,7 @@ pub(crate) fn most_bytes_of_words(gpu: &Gpu) -> u64 {
     }
 }
 
-/// Bytes of a texel, as large as the entries of a table allow: 16 or 4.
+/// Returns the bytes of a texel, 16 if the entries are a multiple of that, else 4.
 fn texel_size(entry_size: usize) -> usize {
     if entry_size.is_multiple_of(16) { 16 } else { 4 }
 }
@@ -49,12 +50,13 @@ impl TableTexture {
         Self { texture: None }
     }
 
-    /// What is bound, once there is room.
+    /// Returns the view to bind, once there is room.
     pub fn view(&self) -> Option<&wgpu::TextureView> {
         self.texture.as_ref().map(|(_, view)| view)
     }
 
-    /// Makes room for so many entries of a size, a multiple of 4; true if it is another texture than before.
+    /// Makes room for this many entries of this size, a multiple of 4. Returns true if the texture was
+    /// replaced.
     ///
     /// # Errors
     /// [`RenderError::BufferTooLarge`].
@@ -94,7 +96,7 @@ impl TableTexture {
         Ok(true)
     }
 
-    /// Sends the entries in a range of those that there is room for; `bytes` are those of all entries.
+    /// Uploads a range of entries, for which there must be room. `bytes` holds all entries.
     pub fn write(&self, gpu: &Gpu, bytes: &[u8], entry_size: usize, entries: Range<usize>) {
         let Some((texture, _)) = &self.texture else { return };
         let size = texel_size(entry_size);
@@ -126,14 +128,15 @@ impl TableTexture {
     }
 }
 
-/// Texels that are a rectangle of the texture.
+/// Texels that form a rectangle of the texture.
 #[derive(Debug, PartialEq)]
 struct Block {
     texels: Range<usize>,
     width: usize,
 }
 
-/// A range of texels as at most three rectangles: the rest of a row, whole rows, and the begin of one.
+/// Splits a range of texels into at most three rectangles: the rest of a row, whole rows, and the beginning
+/// of a row.
 fn blocks(texels: Range<usize>) -> Vec<Block> {
     let first_row = texels.start.next_multiple_of(WIDTH).min(texels.end);
     let last_row = (texels.end / WIDTH * WIDTH).max(first_row);

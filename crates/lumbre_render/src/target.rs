@@ -1,17 +1,19 @@
-//! Where a frame goes: any colour texture, a window's or our own, or a part of it. Not how it is shown.
+//! The texture that a frame is drawn into: any colour texture, of a window or created by the program, or a
+//! part of it. Presenting it is not done here.
 
 use crate::RenderError;
 
-/// Format of the depth buffer: reversed-Z wants floats. 1 is at the near plane, 0 at infinity.
+/// Format of the depth buffer. Depth is reversed-Z, which needs a float format: 1 at the near plane, 0 at
+/// infinity.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// A colour texture that a frame ends in.
+/// A colour texture that a frame is drawn into.
 #[derive(Clone, Debug)]
 pub struct FrameTarget {
     pub(crate) texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
     pub(crate) format: wgpu::TextureFormat,
-    /// Of the frame: of the viewport, if there is one.
+    /// Size of the frame: of the viewport if there is one.
     pub(crate) width: u32,
     pub(crate) height: u32,
     pub(crate) viewport: Option<Viewport>,
@@ -20,16 +22,18 @@ pub struct FrameTarget {
 /// The part of a target that a frame fills, in texels from the upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewport {
-    /// Column and row of its first texel.
+    /// Column and row of the first texel.
     pub origin: [u32; 2],
-    /// Width and height, 1 or more.
+    /// Width and height, at least 1.
     pub size: [u32; 2],
-    /// What becomes of the target around it: cleared to this colour, as the target holds it, before the frame is drawn, or kept as it is.
+    /// What happens to the target around the viewport: cleared to this colour, given as the target stores it,
+    /// before the frame is drawn, or kept if `None`.
     pub clear: Option<wgpu::Color>,
 }
 
 impl Viewport {
-    /// A part of a target, around which everything is kept: for split screens, or a picture in an interface.
+    /// Creates a viewport that leaves the rest of the target as it is, for split screens or a picture in a
+    /// user interface.
     pub fn new(origin: [u32; 2], size: [u32; 2]) -> Self {
         Self { origin, size, clear: None }
     }
@@ -42,7 +46,7 @@ impl Viewport {
 }
 
 impl FrameTarget {
-    /// The first layer and mip level of a texture with RENDER_ATTACHMENT usage.
+    /// Creates a target from the first layer and mip level of a texture with RENDER_ATTACHMENT usage.
     pub fn from_texture(texture: &wgpu::Texture) -> Self {
         Self {
             view: texture.create_view(&wgpu::TextureViewDescriptor {
@@ -59,31 +63,31 @@ impl FrameTarget {
         }
     }
 
-    /// The same texture, for a frame that fills a part of it. Such a frame has a display pass. A viewport that does not lie within the texture is
-    /// [`RenderError::Viewport`] of the frame that is drawn into it. Overlays, and effects at [`Stage::Picture`](crate::effects::Stage::Picture), draw over
-    /// the whole texture.
+    /// Restricts the frame to a part of the texture. Such a frame always has a display pass. Drawing into a
+    /// viewport that does not lie within the texture fails with [`RenderError::Viewport`]. Overlays and
+    /// effects at [`Stage::Picture`](crate::effects::Stage::Picture) draw over the whole texture.
     #[must_use]
     pub fn with_viewport(self, viewport: Viewport) -> Self {
         let [width, height] = viewport.size;
         Self { width, height, viewport: Some(viewport), ..self }
     }
 
-    /// Width divided by height, of the viewport if there is one.
+    /// Returns width divided by height, of the viewport if there is one.
     pub fn aspect(&self) -> f64 {
         f64::from(self.width) / f64::from(self.height)
     }
 
-    /// Width and height of the frame in texels: of the viewport if there is one.
+    /// Returns width and height of the frame in texels, of the viewport if there is one.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
-    /// Texel format.
+    /// Returns the texel format.
     pub fn format(&self) -> wgpu::TextureFormat {
         self.format
     }
 
-    /// Whether the frame lies within the texture.
+    /// Checks that the viewport lies within the texture.
     ///
     /// # Errors
     /// [`RenderError::Viewport`].

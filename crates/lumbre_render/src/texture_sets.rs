@@ -1,4 +1,5 @@
-//! Bind groups of a material's textures and of lightmaps. A set binds only the textures that its material has.
+//! Bind groups of a material's textures, and of lightmaps. A set binds only the textures that its material
+//! has.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -12,7 +13,8 @@ use crate::shader::Feature;
 use crate::textures::{Texels, Textures};
 use crate::{Gpu, RenderError};
 
-/// The slots of a set in binding order, which is that of `MaterialTextures::slots`: the feature that reads it, and what its texels are.
+/// The texture slots of a material in binding order, which is that of `MaterialTextures::slots`: the feature
+/// that reads it, and what its texels are.
 const SLOTS: [(Feature, Texels); MaterialTextures::SLOTS] = [
     (Feature::BaseColorTexture, Texels::Colors),
     (Feature::EmissiveTexture, Texels::Colors),
@@ -21,17 +23,17 @@ const SLOTS: [(Feature, Texels); MaterialTextures::SLOTS] = [
     (Feature::OcclusionTexture, Texels::Numbers),
 ];
 
-/// A bind group of some of the material textures.
+/// A bind group with some of the material textures.
 #[derive(Debug)]
 pub(crate) struct TextureSet {
-    /// Bit i: slot i is bound.
+    /// Bit i is set if slot i is bound.
     pub mask: u8,
     pub bind_group: wgpu::BindGroup,
-    /// The material's textures, made small.
+    /// Small black textures in place of the material's, for warm-up draws.
     pub stand_ins: MaterialTextures,
 }
 
-/// The images with their samplers, and the bytes of the maps' numbers.
+/// The images with their samplers, and the bytes of the surface maps' uniform.
 type SetKey = ([Option<(usize, Sampler)>; SLOTS.len()], Option<[u8; size_of::<SurfaceMapsData>()]>);
 
 /// All sets in use.
@@ -43,13 +45,13 @@ pub(crate) struct TextureSets {
     lightmaps: HashMap<usize, Arc<wgpu::BindGroup>>,
 }
 
-/// The features that go with a mask.
+/// Returns every texture feature, and whether a mask contains it.
 pub(crate) fn features(mask: u8) -> impl Iterator<Item = (Feature, bool)> {
     SLOTS.iter().enumerate().map(move |(i, (feature, _))| (*feature, mask & (1 << i) != 0))
 }
 
-/// The textures of a material as small as they may be for a software rasterizer to make the same code of them, which depends on whether sides are powers of two, and
-/// on samplers.
+/// Returns black textures in place of a material's, as small as possible while a software rasterizer still
+/// generates the same code for them. That depends on the samplers and on whether the sides are powers of two.
 fn stand_ins(textures: &MaterialTextures) -> MaterialTextures {
     let mut small = textures.clone();
     for reference in small.references_mut() {
@@ -62,12 +64,12 @@ fn stand_ins(textures: &MaterialTextures) -> MaterialTextures {
 }
 
 impl TextureSets {
-    /// The layout for a mask; none for no textures.
+    /// Returns the layout for a mask; `None` if the mask is empty.
     pub fn layout(&mut self, gpu: &Gpu, mask: u8) -> Option<wgpu::BindGroupLayout> {
         (mask != 0).then(|| self.layouts.entry(mask).or_insert_with(|| make_layout(gpu, mask)).clone())
     }
 
-    /// The set of a material; none without textures.
+    /// Returns the set of a material; `None` if it has no textures.
     pub fn set(
         &mut self,
         gpu: &Gpu,
@@ -99,12 +101,12 @@ impl TextureSets {
         Ok(Some(set))
     }
 
-    /// The layout of a lightmap's group.
+    /// Returns the layout of a lightmap's group.
     pub fn lightmap_layout(&mut self, gpu: &Gpu) -> wgpu::BindGroupLayout {
         self.lightmap_layout.get_or_insert_with(|| layout_of(gpu, &[0], false)).clone()
     }
 
-    /// The group of a lightmap.
+    /// Returns the group of a lightmap.
     pub fn lightmap(
         &mut self,
         gpu: &Gpu,
@@ -125,7 +127,8 @@ impl TextureSets {
         Ok(group)
     }
 
-    /// Forgets what no object holds. Before `Textures::sweep`, which the groups would keep from forgetting.
+    /// Drops bind groups that no object uses. They keep textures alive on the GPU, so `Textures::sweep` alone
+    /// would not free these.
     pub fn sweep(&mut self) {
         self.sets.retain(|_, set| Arc::strong_count(set) > 1);
         self.lightmaps.retain(|_, group| Arc::strong_count(group) > 1);
@@ -139,10 +142,11 @@ fn make_layout(gpu: &Gpu, mask: u8) -> wgpu::BindGroupLayout {
     layout_of(gpu, &first, features(mask).any(reads_maps))
 }
 
-/// Where `SurfaceMaps` is bound, behind all textures.
+/// Binding of `SurfaceMaps`, after all textures.
 const SURFACE_MAPS_BINDING: u32 = 10;
 
-/// A texture and a sampler at each of these bindings, and the numbers of the maps if there are any.
+/// Creates a layout with a texture and a sampler at each of these bindings, and the uniform of the surface
+/// maps if there are any.
 fn layout_of(gpu: &Gpu, first: &[u32], maps: bool) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,

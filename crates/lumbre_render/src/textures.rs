@@ -1,4 +1,5 @@
-//! GPU copies of images: material textures with mip levels, and lightmaps. Which material uses which is decided in `extract`.
+//! GPU copies of images: material textures with mip levels, and lightmaps. Which material uses which is
+//! decided in `extract`.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,14 +12,14 @@ use crate::mip_level::{MipLevel, box_filter_2d};
 use crate::normal_map::normal_levels;
 use crate::{Gpu, RenderError};
 
-/// What the bytes of an image are.
+/// How the bytes of an image are interpreted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Texels {
     /// sRGB-encoded colours.
     Colors,
-    /// Linear numbers.
+    /// Linear values.
     Numbers,
-    /// The vectors of a normal map.
+    /// Vectors of a normal map.
     Normals,
 }
 
@@ -28,13 +29,13 @@ pub(crate) struct Textures {
     images: HashMap<(usize, Texels), (Arc<Image>, wgpu::TextureView)>,
     lightmaps: HashMap<usize, (Arc<LightmapImage>, wgpu::TextureView)>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
-    /// Bytes uploaded since somebody last asked: of textures, and of lightmaps.
+    /// Bytes of textures and of lightmaps that were uploaded since `take_uploaded` was last called.
     uploaded: u64,
     uploaded_lightmaps: u64,
 }
 
 impl Textures {
-    /// The view of an image.
+    /// Returns the view of an image.
     pub fn image(
         &mut self,
         gpu: &Gpu,
@@ -52,7 +53,7 @@ impl Textures {
         Ok(entry.or_insert_with(new).1.clone())
     }
 
-    /// The view of a lightmap: E/π, f16 per channel.
+    /// Returns the view of a lightmap, which stores E/π with f16 per channel.
     pub fn lightmap(
         &mut self,
         gpu: &Gpu,
@@ -73,24 +74,24 @@ impl Textures {
         Ok(entry.or_insert_with(new).1.clone())
     }
 
-    /// A sampler.
+    /// Returns a sampler.
     pub fn sampler(&mut self, gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
         self.samplers.entry(*sampler).or_insert_with(|| make_sampler(gpu, sampler)).clone()
     }
 
-    /// Bytes of textures and of lightmaps uploaded since the last call.
+    /// Returns the bytes of textures and of lightmaps that were uploaded since the last call.
     pub fn take_uploaded(&mut self) -> [u64; 2] {
         [std::mem::take(&mut self.uploaded), std::mem::take(&mut self.uploaded_lightmaps)]
     }
 
-    /// Forgets images that nothing else holds.
+    /// Drops images that nothing else uses.
     pub fn sweep(&mut self) {
         self.images.retain(|_, (image, _)| Arc::strong_count(image) > 1);
         self.lightmaps.retain(|_, (image, _)| Arc::strong_count(image) > 1);
     }
 }
 
-/// Whether an image made in code holds what its size says.
+/// Checks that the data of an image that was created in code matches its size.
 fn check(name: &str, width: u32, height: u32, found: usize, per_texel: u64) -> Result<(), RenderError> {
     let expected = u64::from(width) * u64::from(height) * per_texel;
     if expected == 0 || found as u64 != expected {
@@ -116,14 +117,15 @@ fn make_sampler(gpu: &Gpu, sampler: &Sampler) -> wgpu::Sampler {
             Mipmap::Linear => wgpu::MipmapFilterMode::Linear,
             Mipmap::None | Mipmap::Nearest => wgpu::MipmapFilterMode::Nearest,
         },
-        // Without mip levels: at level 0 exactly the filter for magnification would be taken, so the clamp stands a little above, where
-        // the nearest level is still the first (the Vulkan specification's way to OpenGL's filters without mip levels).
+        // Without mip levels, a clamp at level 0 would always select the magnification filter. The clamp is a
+        // little higher, where the nearest level is still the first one. The Vulkan specification describes
+        // this way to emulate OpenGL's filters without mip levels.
         lod_max_clamp: if sampler.mipmap == Mipmap::None { 0.25 } else { 32.0 },
         ..Default::default()
     })
 }
 
-/// The view of an image's copy, and the bytes of its levels.
+/// Returns the view of an image's copy, and the bytes of its levels.
 fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> (wgpu::TextureView, u64) {
     let mut levels = match texels {
         Texels::Colors => color_levels(image, true),
@@ -131,7 +133,7 @@ fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> (wgpu::TextureView, u64) 
         Texels::Normals => normal_levels(image),
     };
     let limit = gpu.device.limits().max_texture_dimension_2d;
-    // Beyond the device's limit the largest mip level that fits stands in.
+    // If the image exceeds the device's limit, the largest mip level that fits becomes the first.
     levels.retain(|level| level.width <= limit && level.height <= limit);
     let format = match texels {
         Texels::Colors => wgpu::TextureFormat::Rgba8UnormSrgb,
@@ -146,9 +148,9 @@ fn upload(gpu: &Gpu, image: &Image, texels: Texels) -> (wgpu::TextureView, u64) 
     (texture.create_view(&Default::default()), bytes as u64)
 }
 
-/// The view of a lightmap's copy, and its bytes.
+/// Returns the view of a lightmap's copy, and its bytes.
 fn upload_lightmap(gpu: &Gpu, image: &LightmapImage) -> (wgpu::TextureView, u64) {
-    // f16 ends at 65504; a texel beyond it is a lamp, and as white as the largest number.
+    // The largest f16 is 65504. A brighter texel belongs to a lamp and is clamped to that.
     let half = |value: f32| f16::from_f32(value.clamp(0.0, f16::MAX.to_f32())).to_bits();
     let texels: Vec<u16> =
         image.texels.iter().flat_map(|t| [half(t.x), half(t.y), half(t.z), half(1.0)]).collect();
@@ -193,7 +195,7 @@ fn write(
     );
 }
 
-/// The levels of an image of colours or of numbers, the first one as it is.
+/// Returns the mip levels of an image of colours or of values. The first one is the image itself.
 fn color_levels(image: &Image, srgb: bool) -> Vec<MipLevel> {
     let first = MipLevel { width: image.width, height: image.height, rgba: image.rgba.clone() };
     let count = 32 - image.width.max(image.height).leading_zeros();
@@ -201,7 +203,8 @@ fn color_levels(image: &Image, srgb: bool) -> Vec<MipLevel> {
     std::iter::successors(Some(first), next).take(count as usize).collect()
 }
 
-/// The next mip level: a box filter in linear light, so that a minified wall keeps its brightness.
+/// Computes the next mip level with a box filter in linear light, so that a minified wall keeps its
+/// brightness.
 fn halved(level: &MipLevel, srgb: bool) -> MipLevel {
     let MipLevel { width, height, rgba: texels } = level;
     let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));

@@ -1,5 +1,6 @@
-//! The buffers that one view of a frame has for itself: its matrices, its clusters of lights, and the groups 0 that name them. What all views of a frame share
-//! (objects, materials, lights) is the renderer's.
+//! The buffers that one view of a frame has for itself: its matrices, its clusters of lights, and the bind
+//! groups 0 that refer to them. What all views of a frame share (objects, materials, lights) belongs to the
+//! renderer.
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,18 +16,18 @@ use crate::layout::{FrameData, radiance};
 use crate::light_counter::LightCounter;
 use crate::shader::Variant;
 
-/// The buffers of group 0 that all views of a frame share, as far as they are there.
+/// The buffers of group 0 that all views of a frame share, as far as they exist.
 pub(crate) struct SharedBuffers<'a> {
     pub objects: Option<wgpu::BindingResource<'a>>,
     pub materials: Option<wgpu::BindingResource<'a>>,
     pub instances: Option<wgpu::BindingResource<'a>>,
     pub lights: Option<wgpu::BindingResource<'a>>,
     pub light_list: Option<wgpu::BindingResource<'a>>,
-    /// Where lights are counted.
+    /// The buffers that lights are counted in.
     pub counter: &'a LightCounter,
 }
 
-/// A group 0: the buffers that are bound in it, and for which pass, where lights are counted by pass.
+/// Identifies a bind group 0: its buffers, and the pass if lights are counted, which is done by pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FrameGroup {
     pub bindings: FrameBindings,
@@ -34,19 +35,19 @@ pub(crate) struct FrameGroup {
 }
 
 impl FrameGroup {
-    /// What a variant is bound in a pass.
+    /// Returns the group that a variant needs in a pass.
     pub fn of(variant: &Variant, pass: LitPass) -> Self {
         let bindings = FrameBindings::of(variant);
         Self { bindings, counted_in: bindings.count_lights().then_some(pass) }
     }
 
-    /// What a variant that draws into the G-buffer is bound.
+    /// Returns the group of a variant that draws into the G-buffer.
     pub fn of_geometry(variant: &Variant) -> Self {
         Self { bindings: FrameBindings::of(variant), counted_in: None }
     }
 }
 
-/// A view on the GPU.
+/// The buffers of a view on the GPU.
 #[derive(Debug)]
 pub(crate) struct ViewBuffers {
     frame: wgpu::Buffer,
@@ -65,7 +66,8 @@ impl ViewBuffers {
         Self { frame, clusters: ClusterBuffers::new(), groups: HashMap::new() }
     }
 
-    /// Sends the matrices of a view, and what its shaders need to know of the scene; `origin` is that of frame space.
+    /// Uploads the matrices of a view and what its shaders need to know of the scene. `origin` is the origin
+    /// of frame space.
     pub fn write(
         &self,
         gpu: &Gpu,
@@ -97,7 +99,7 @@ impl ViewBuffers {
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&data));
     }
 
-    /// A buffer of group 0, once it is there; what a pass counts lights in is its own.
+    /// Returns a binding of group 0, once it exists. Each pass has its own light counts.
     pub fn bound<'a>(
         &'a self,
         buffer: FrameBuffer,
@@ -118,22 +120,22 @@ impl ViewBuffers {
         }
     }
 
-    /// What shaders know of the view.
+    /// Returns the uniform buffer of the view.
     pub fn frame(&self) -> &wgpu::Buffer {
         &self.frame
     }
 
-    /// Forgets the groups: a buffer that they name is another one.
+    /// Drops the bind groups, because a buffer that they refer to was replaced.
     pub fn forget_groups(&mut self) {
         self.groups.clear();
     }
 
-    /// The group 0 of some draws, once it is made.
+    /// Returns a bind group 0, once it has been created.
     pub fn group(&self, wanted: &FrameGroup) -> Option<&wgpu::BindGroup> {
         self.groups.get(wanted)
     }
 
-    /// The groups 0 of these draws that are not there yet.
+    /// Returns the bind groups 0 that these draws need and that do not exist yet.
     pub fn missing_groups(&self, draws: &Draws) -> HashSet<FrameGroup> {
         let of_geometry = draws.geometry.iter().map(|batch| FrameGroup::of_geometry(&batch.pipeline.variant));
         let groups = LitPass::ALL.into_iter().flat_map(|pass| {
@@ -144,7 +146,7 @@ impl ViewBuffers {
         of_geometry.chain(groups).filter(|wanted| !self.groups.contains_key(wanted)).collect()
     }
 
-    /// Makes a group 0.
+    /// Creates a bind group 0.
     pub fn make_group(
         &mut self,
         gpu: &Gpu,

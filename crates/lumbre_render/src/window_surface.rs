@@ -1,4 +1,5 @@
-//! Frames in a window: the surface, its size and its moods. Which library made the window is not known here.
+//! Frames in a window: the surface, its size, and what to do when it is occluded, outdated or lost.
+//! Independent of the library that created the window.
 
 use crate::{FrameTarget, Gpu, RenderError};
 
@@ -10,34 +11,36 @@ pub struct WindowSurface {
     configured: bool,
 }
 
-/// One image of the surface, to draw into and present.
+/// One image of the surface, to draw into and to present.
 #[derive(Debug)]
 pub struct SurfaceFrame {
-    /// What the renderer draws into.
+    /// The target to draw into.
     pub target: FrameTarget,
     texture: wgpu::SurfaceTexture,
 }
 
 impl SurfaceFrame {
-    /// Shows it.
+    /// Presents the image in the window.
     pub fn present(self, gpu: &Gpu) {
         gpu.queue.present(self.texture);
     }
 }
 
-/// What a surface answers when it is asked for an image.
+/// The result of acquiring the next image of a surface.
 #[derive(Debug)]
 pub enum Acquired {
-    /// Draw and present.
+    /// An image to draw into and present.
     Frame(Box<SurfaceFrame>),
-    /// Nothing to draw on at the moment (minimised, covered, or a configuration just renewed): try again at the next redraw.
+    /// Nothing to draw into at the moment (minimised, covered, or just reconfigured). Try again at the next
+    /// redraw.
     Skip,
-    /// The surface is lost: make a new one from the window.
+    /// The surface is lost. Create a new one from the window.
     Lost,
 }
 
 impl WindowSurface {
-    /// Takes a surface that `gpu` can present to. A size of zero (minimised) is allowed: no frame is given until `resize`.
+    /// Configures a surface that `gpu` can present to. A size of zero (minimised) is allowed; no frame is
+    /// acquired until `resize`.
     ///
     /// # Errors
     /// [`RenderError::SurfaceUnsupported`].
@@ -49,7 +52,8 @@ impl WindowSurface {
     ) -> Result<Self, RenderError> {
         let unsupported = || RenderError::SurfaceUnsupported { adapter: gpu.adapter.get_info().name };
         let capabilities = surface.get_capabilities(&gpu.adapter);
-        // The display pass encodes sRGB itself, so that screen and file agree to the bit: a format that would do it again is second.
+        // The display pass encodes sRGB itself, so that window and file match exactly. A format that encodes
+        // once more is only the second choice.
         let format = capabilities
             .formats
             .iter()
@@ -68,7 +72,7 @@ impl WindowSurface {
         Ok(this)
     }
 
-    /// Follows the window's size in physical pixels.
+    /// Sets the size of the images to the window's size in physical pixels.
     pub fn resize(&mut self, gpu: &Gpu, width: u32, height: u32) {
         self.configured = false;
         let limit = gpu.device.limits().max_texture_dimension_2d;
@@ -84,17 +88,17 @@ impl WindowSurface {
         }
     }
 
-    /// Texel format of the images.
+    /// Returns the texel format of the images.
     pub fn format(&self) -> wgpu::TextureFormat {
         self.configuration.format
     }
 
-    /// Width and height in pixels; zero while minimised.
+    /// Returns width and height in pixels; zero while minimised.
     pub fn size(&self) -> (u32, u32) {
         (self.configuration.width, self.configuration.height)
     }
 
-    /// Asks for the next image.
+    /// Acquires the next image.
     pub fn acquire(&mut self, gpu: &Gpu) -> Acquired {
         if !self.configured {
             return Acquired::Skip;

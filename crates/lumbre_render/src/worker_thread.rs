@@ -1,4 +1,4 @@
-//! A thread for what no frame waits for. What is made on it is `deferred`.
+//! A worker thread for jobs that no frame waits for. What is created on it is described in `deferred`.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -7,20 +7,21 @@ use std::thread::JoinHandle;
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// The thread, started when there is something to do.
+/// The thread, which is started with the first job.
 #[derive(Debug, Default)]
 pub(crate) struct WorkerThread(Mutex<Option<Running>>);
 
 #[derive(Debug)]
 struct Running {
     jobs: Sender<Job>,
-    /// What is still to be done is wanted by nobody.
+    /// Set on drop: the queued jobs are no longer needed.
     ends: Arc<AtomicBool>,
     thread: JoinHandle<()>,
 }
 
 impl WorkerThread {
-    /// Does it after what was handed over before; here, where there can be no thread.
+    /// Runs a job on the thread after those that were queued before, or on this thread if no thread can be
+    /// started.
     pub fn run(&self, job: Job) {
         let Ok(mut worker) = self.0.lock() else { return job() };
         if worker.is_none() {
@@ -31,7 +32,7 @@ impl WorkerThread {
             None => Some(job),
         };
         drop(worker);
-        // There is no thread: it is done here.
+        // There is no thread.
         if let Some(job) = refused {
             job();
         }
@@ -45,7 +46,8 @@ impl Drop for WorkerThread {
         };
         ends.store(true, Ordering::Relaxed);
         drop(jobs);
-        // A program that ends while a driver compiles may end badly. The last to hold the device may be the thread itself.
+        // Wait, because a process that exits while a driver compiles may crash. But if the thread itself held
+        // the last reference to the device, it cannot join itself.
         if thread.thread().id() != std::thread::current().id() {
             let _ = thread.join();
         }

@@ -1,4 +1,5 @@
-//! Whether anything of a World has changed that a frame is drawn from, by bevy_ecs's own marks: no component is read. What changed is found by `extract`.
+//! Detects whether anything in a World has changed that a frame is drawn from, by bevy_ecs's change
+//! detection. No component is read; what changed is found in `extract`.
 
 use bevy_ecs::archetype::ArchetypeId;
 use bevy_ecs::prelude::*;
@@ -10,7 +11,7 @@ use lumbre_scene::{
     IrradianceVolume, Lightmap, MaterialTextures, Medium, Mesh, Name, SceneSettings, StaticObject, Transform,
 };
 
-/// What changed in any way that a frame may show.
+/// Filter for changes that a frame may show.
 type Changes = Or<(
     Or<(Changed<Mesh>, Changed<Material>, Changed<MaterialTextures>, Changed<Lightmap>)>,
     Or<(Changed<Shading>, Changed<ReflectionModel>, Changed<EmissiveLight>, Changed<Hidden>)>,
@@ -25,12 +26,13 @@ type Watch = SystemState<Query<'static, 'static, (), Changes>>;
 pub(crate) struct WorldWatch {
     state: Option<(WorldId, Watch)>,
     settings: Option<SceneSettings>,
-    /// How many entities have which components: what is removed, or an entity that is gone, leaves no other mark.
+    /// How many entities have which components. Removed components and despawned entities leave no other
+    /// trace.
     populations: Vec<(ArchetypeId, u32)>,
 }
 
 impl WorldWatch {
-    /// Whether nothing has changed since this was asked last; false of a World that it was not asked of before.
+    /// Returns true if nothing has changed since the last call; false if the last call was for another World.
     pub fn is_still(&mut self, world: &mut World) -> bool {
         let known = self.state.as_ref().is_some_and(|(id, _)| *id == world.id());
         if !known {
@@ -41,7 +43,7 @@ impl WorldWatch {
         let populations: Vec<_> = archetypes.map(|archetype| (archetype.id(), archetype.len())).collect();
         let same = settings == self.settings && populations == self.populations;
         (self.settings, self.populations) = (settings, populations);
-        // Asked in any case, so that it knows from when on to look next time.
+        // Run the query in any case, because it resets what the next call compares with.
         let unmarked = match &mut self.state {
             Some((_, state)) => state.get(world).is_ok_and(|changes| changes.is_empty()),
             None => false,

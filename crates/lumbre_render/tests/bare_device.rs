@@ -1,4 +1,5 @@
-//! Lights are counted where a device can: one that cannot says why, and draws the frame all the same.
+//! Lights are counted where the device supports it. A device that does not says why, and still draws the
+//! frame.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -14,7 +15,7 @@ use lumbre_scene::{Camera, Mesh, Transform};
 const SIDE: u32 = 32;
 const PIXELS: u64 = (SIDE * SIDE) as u64;
 
-/// The device of the tests' machine with these features, and so many storage buffers in a shader.
+/// Opens the test machine's device with these features and this many storage buffers per shader stage.
 fn device(features: wgpu::Features, storage_buffers: u32) -> Gpu {
     let whole = Gpu::headless().unwrap();
     let required_limits =
@@ -25,7 +26,7 @@ fn device(features: wgpu::Features, storage_buffers: u32) -> Gpu {
     Gpu::from_parts(whole.instance.clone(), whole.adapter.clone(), device, queue).unwrap()
 }
 
-/// A wall that fills the view under one light, and another behind it that is hidden.
+/// Draws a wall that fills the view under one light, and a second wall hidden behind it. Returns the account.
 fn account(gpu: &Gpu, shading: Shading) -> Accounting {
     let mut world = World::new();
     for z in [0.0, -1.0] {
@@ -63,7 +64,7 @@ fn without_room_for_one_more_buffer_nothing_is_counted() {
         let accounting = account(&gpu, shading);
         assert_eq!(forward(&accounting), None);
         assert!(says(&accounting, "one storage buffer more"), "{:?}", accounting.notes);
-        // Nor are there timestamps: waiting stands for the passes.
+        // There are no timestamps either, so the time of waiting stands for the passes.
         assert!(says(&accounting, "TIMESTAMP_QUERY") && accounting.passes_ms.is_none());
         assert!(accounting.remainder_ms().unwrap() < accounting.wall_ms.unwrap());
     }
@@ -77,7 +78,7 @@ fn without_writes_in_vertices_fragments_count_and_without_early_tests_hidden_one
     assert!((PIXELS..=2 * PIXELS).contains(&tested), "{tested}");
     assert!(says(&phong, "VERTEX_WRITABLE_STORAGE") && says(&phong, "SHADER_EARLY_DEPTH_TEST"));
     assert_eq!(forward(&account(&bare, Shading::Gouraud)), None);
-    // With both, nothing is to be said of it.
+    // With both features there is nothing to report.
     let features = wgpu::Features::VERTEX_WRITABLE_STORAGE | wgpu::Features::SHADER_EARLY_DEPTH_TEST;
     let whole = device(features, 9);
     let phong = account(&whole, Shading::Phong);

@@ -1,4 +1,5 @@
-//! What effects cost and give: known answers for what pictures owe to them.
+//! Measured costs and contributions of effects, with known answers for how much each contributes to the
+//! picture.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, which clippy does not count as tests")]
 
@@ -11,7 +12,7 @@ use lumbre_optics::{AlphaMode, Fog, FogMode, Light, Material, Surface};
 use lumbre_render::{FrameOptions, Gpu, RenderError, effect_costs, removable_effects};
 use lumbre_scene::{Camera, Census, Mesh, SceneSettings, Transform};
 
-/// A wall that fills the view of a parallel camera, and shines by itself as much as the ambient light lets it.
+/// A wall that fills the view of the camera, half of whose light is emission and half ambient light.
 fn wall(change: impl FnOnce(&mut World, &mut Material)) -> World {
     let mut world = World::new();
     world.insert_resource(SceneSettings { ambient: Vec3::splat(0.25), ..SceneSettings::default() });
@@ -35,7 +36,7 @@ fn half_of_the_light_is_half_of_the_picture() {
     let scene = || {
         wall(|world, material| {
             material.alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
-            // Too far away for any fog.
+            // Starts too far away to have any effect.
             let fog = Fog { mode: FogMode::Linear { start: 1e6, end: 1e7 }, color: Vec3::ONE };
             world.resource_mut::<SceneSettings>().fog = Some(fog);
             world.spawn((Light::directional(Vec3::ONE), Transform::IDENTITY));
@@ -53,7 +54,7 @@ fn half_of_the_light_is_half_of_the_picture() {
     assert!(cost.rounds >= 5 && cost.milliseconds > 0.0, "{cost:?}");
     let accounting = cost.accounting.as_ref().unwrap();
     let forward = accounting.passes.iter().find(|pass| pass.pass == "forward").unwrap();
-    // One light on each of the wall's pixels. It is masked, and nothing hides it.
+    // One light on each of the wall's pixels. The wall is masked, and nothing hides it.
     assert_eq!(forward.lights.unwrap().tested, 32 * 32);
     assert!(accounting.remainder_ms().is_some());
     for effect in &cost.effects {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-/// An example that cargo built beside this test.
+/// Returns the path of an example that cargo built next to this test.
 fn example(name: &str) -> PathBuf {
     let mut path = std::env::current_exe().expect("this test is a file");
     path.pop();

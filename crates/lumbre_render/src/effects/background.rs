@@ -1,4 +1,4 @@
-//! What lies behind everything: the scene's background colour. Clears depth too.
+//! Clears the frame to the scene's background colour, and the depth buffer to 0.
 
 use bevy_ecs::world::World;
 use glam::Vec3;
@@ -17,9 +17,9 @@ pub(super) const LARGEST_HALF: Vec3 = Vec3::splat(65504.0);
 
 #[derive(Debug, Default)]
 pub(super) struct Background {
-    /// As radiance.
+    /// The background's radiance.
     background: Vec3,
-    /// As the pass's target holds it.
+    /// The colour as the pass's target stores it.
     color: Vec3,
 }
 

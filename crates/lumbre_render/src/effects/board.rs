@@ -1,4 +1,5 @@
-//! The board: the textures of a frame as handles, which the passes of one effect hand on to those of the next.
+//! The board holds the textures of a frame as graph handles, which the passes of one effect pass on to those
+//! of the next.
 
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
@@ -10,26 +11,29 @@ use crate::frame_plan::{Ending, FramePlan};
 use crate::frame_scene::FrameScene;
 use crate::target::{DEPTH_FORMAT, Viewport};
 
-/// The textures of a frame. A pass that writes one moves its handle on, so that later passes read what it wrote.
+/// The textures of a frame. A pass that writes a texture advances its handle, so that later passes read what
+/// it wrote.
 pub struct Board {
-    /// Linear radiance, one sample per pixel: complete at [`Stage::Radiance`](super::Stage::Radiance), if an effect there is called for.
+    /// Linear radiance, one sample per pixel. It is complete at [`Stage::Radiance`](super::Stage::Radiance),
+    /// if an effect of that stage is called for.
     pub linear: TextureHandle,
-    /// Depth, reversed-Z, with [`samples`](Self::samples) per pixel.
+    /// Reversed-Z depth, with [`samples`](Self::samples) per pixel.
     pub depth: TextureHandle,
-    /// The target: holds the picture from [`Stage::Picture`](super::Stage::Picture) on.
+    /// The target. It holds the picture from [`Stage::Picture`](super::Stage::Picture) on.
     pub target: TextureHandle,
-    /// Width and height of the frame in texels: of `linear` and `depth`, and of the part of `target` that the frame fills.
+    /// Width and height of the frame in texels: of `linear` and `depth`, and of the part of `target` that the
+    /// frame fills.
     pub size: [u32; 2],
-    /// That part, if it is not all of the target.
+    /// The part of the target that the frame fills, if that is not all of it.
     pub viewport: Option<Viewport>,
     /// Format of `linear`.
     pub linear_format: wgpu::TextureFormat,
-    /// Samples per pixel of `depth` and of what is lit.
+    /// Samples per pixel of `depth` and of the lit passes.
     pub samples: u32,
-    /// What several samples per pixel are drawn into.
+    /// The multisampled colour target, if there are several samples per pixel.
     multisampled: Option<TextureHandle>,
     ending: Ending,
-    /// What surfaces are lit with.
+    /// The textures that surfaces are lit with.
     lit_by: Vec<TextureHandle>,
     lit_by_buffers: Vec<(BufferHandle, BufferRead)>,
     others: HashMap<TypeId, Box<dyn Any>>,
@@ -47,7 +51,8 @@ impl Board {
         let samples = plan.samples;
         let mut linear = graph.texture("linear frame", described(plan.linear_format));
         if plan.ending != Ending::DisplayPass {
-            // So that whoever would read it is skipped for a reason of its own, and the plan has this one too.
+            // Gives the linear frame a reason for being skipped. Passes that would read it are then skipped
+            // for reasons of their own.
             graph
                 .raster_pass("linear frame")
                 .calls_for(false, "use for a linear frame")
@@ -71,7 +76,7 @@ impl Board {
         }
     }
 
-    /// A transient texture of the frame's size.
+    /// Creates a transient texture of the frame's size.
     pub fn texture(
         &self,
         graph: &mut FrameGraph<'_>,
@@ -81,7 +86,7 @@ impl Board {
         graph.texture(name, TextureDescriptor::new_2d(self.size[0], self.size[1], format))
     }
 
-    /// Begins a pass that draws lit colours as radiance, over those that are there. Where it is to test depth it adds
+    /// Begins a pass that draws lit colours as radiance over the existing ones. A pass that tests depth adds
     /// `.depth(&mut board.depth, LoadOp::Load)`.
     pub fn lit_pass<'g, 'a>(
         &mut self,
@@ -104,7 +109,7 @@ impl Board {
         }
     }
 
-    /// Has a pass that draws lit surfaces elsewhere than in the frame depend on what they are lit with.
+    /// Makes a pass that draws lit surfaces into another target depend on what they are lit with.
     pub(super) fn lit<'g, 'a>(
         &self,
         pass: PassBuilder<'g, 'a, Raster, FrameScene<'a>>,
@@ -117,27 +122,27 @@ impl Board {
         self.ending == Ending::DisplayPass
     }
 
-    /// Has every later [`lit_pass`](Self::lit_pass) sample a texture.
+    /// Makes every later [`lit_pass`](Self::lit_pass) sample a texture.
     pub(super) fn lit_by(&mut self, texture: TextureHandle) {
         self.lit_by.push(texture);
     }
 
-    /// Has every later [`lit_pass`](Self::lit_pass) that draws over what is there read a buffer.
+    /// Makes every later [`lit_pass`](Self::lit_pass) that does not clear its target read a buffer.
     pub(crate) fn lit_by_buffer(&mut self, buffer: BufferHandle, how: BufferRead) {
         self.lit_by_buffers.push((buffer, how));
     }
 
-    /// Leaves a value, as a rule a handle in a type of its own, for the effects that come later.
+    /// Stores a value for later effects, usually a handle in a type of its own.
     pub fn insert<T: Any>(&mut self, value: T) {
         self.others.insert(TypeId::of::<T>(), Box::new(value));
     }
 
-    /// What an earlier effect left under this type.
+    /// Returns what an earlier effect stored under this type.
     pub fn get<T: Any>(&self) -> Option<&T> {
         self.others.get(&TypeId::of::<T>())?.downcast_ref()
     }
 
-    /// As [`get`](Self::get), to be moved on by a write.
+    /// Like [`get`](Self::get), for handles that a write advances.
     pub fn get_mut<T: Any>(&mut self) -> Option<&mut T> {
         self.others.get_mut(&TypeId::of::<T>())?.downcast_mut()
     }

@@ -1,5 +1,6 @@
-//! From radiance to the numbers of the target: exposure, tone curve, encoding. A pass of its own where something needs the linear frame (several
-//! samples per pixel, blending, an effect at [`Stage::Radiance`], the probe); else the lit shaders do it where the colour is made.
+//! Converts radiance to the target's values: exposure, tone curve, encoding. This is a separate pass if
+//! something needs the linear frame (several samples per pixel, blending, an effect at [`Stage::Radiance`],
+//! the probe); otherwise the lit shaders convert their colours themselves.
 
 use std::collections::HashMap;
 
@@ -18,11 +19,11 @@ use crate::shader::{self, DisplayVariant};
 use crate::target::Viewport;
 use crate::{Display, FrameOptions, Gpu, RenderError};
 
-/// The pass and its pipelines.
+/// The display effect and its pipelines.
 #[derive(Debug, Default)]
 pub(super) struct DisplayPass {
     device: Option<OnDevice>,
-    /// Of this frame.
+    /// The key of this frame's pipeline.
     key: Option<Key>,
 }
 
@@ -30,7 +31,7 @@ pub(super) struct DisplayPass {
 struct Key {
     variant: DisplayVariant,
     format: wgpu::TextureFormat,
-    /// The frame fills a part of the target.
+    /// Whether the frame fills only a part of the target.
     viewport: bool,
 }
 
@@ -41,7 +42,7 @@ impl Key {
     }
 }
 
-/// The uniform of a frame of exposure 1 that fills its target.
+/// The uniform of a frame with exposure 1 that fills its target.
 const UNEXPOSED: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 
 #[derive(Debug)]
@@ -49,7 +50,7 @@ struct OnDevice {
     layout: wgpu::BindGroupLayout,
     pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
     uniform: wgpu::Buffer,
-    /// What the uniform holds: the exposure, and the viewport's corner.
+    /// The content of the uniform: the exposure, and the corner of the viewport.
     written: [f32; 4],
     /// Bytes written so far.
     uploaded: u64,
@@ -154,7 +155,7 @@ impl OnDevice {
         Self { layout, pipelines: HashMap::new(), uniform, written: UNEXPOSED, uploaded: 0 }
     }
 
-    /// Makes the pipeline for a target, or waits for it.
+    /// Creates the pipeline of a key, or waits for it.
     fn make(&mut self, gpu: &Gpu, key: Key) -> Result<(), EffectError> {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layout) = (gpu.device.clone(), self.layout.clone());
@@ -164,7 +165,7 @@ impl OnDevice {
         Ok(())
     }
 
-    /// Begins to make the pipeline of a frame on the device's thread; whether it is there.
+    /// Starts to create the pipeline of a frame on the device's worker thread. Returns true if it exists.
     fn begin(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
         let key = Key::of(frame);
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
@@ -181,7 +182,7 @@ impl OnDevice {
         Ok(pipeline.is_there(false)?)
     }
 
-    /// Writes the exposure and the viewport's corner if they changed.
+    /// Writes the exposure and the corner of the viewport if they changed.
     fn write(&mut self, gpu: &Gpu, numbers: [f32; 4]) {
         if numbers != self.written {
             self.written = numbers;
@@ -190,7 +191,7 @@ impl OnDevice {
         }
     }
 
-    /// Draws `frame` through the pipeline that `prepare` made.
+    /// Draws `frame` with a pipeline that `prepare` created.
     fn draw(
         &self,
         device: &wgpu::Device,
@@ -213,7 +214,7 @@ impl OnDevice {
     }
 }
 
-/// A first draw with a pipeline, of a frame of one texel.
+/// Draws once with a pipeline, from a frame of one texel, as a warm-up.
 fn rehearse(gpu: &Gpu, pass: &mut wgpu::RenderPass<'static>, key: Key) -> Result<(), EffectError> {
     let mut device = OnDevice::new(gpu);
     device.make(gpu, key)?;
@@ -267,7 +268,8 @@ fn make(
     }))
 }
 
-/// What the display makes of a colour for a target of this format: the numbers that the shaders write, in f64. Twin: shaders/display_color.wesl.
+/// Converts a colour to the values that the shaders write for a target of this format, in f64. Twin:
+/// shaders/display_color.wesl.
 pub fn display_color(display: Display, target: wgpu::TextureFormat, exposure: f32, radiance: Vec3) -> Vec3 {
     let exposed = radiance.as_dvec3() * f64::from(exposure);
     let shown = match display {
@@ -294,7 +296,8 @@ mod tests {
         let shown = |display, format, color| display_color(display, format, 2.0, color);
         assert_eq!(shown(Display::Linear, eight_bits, Vec3::splat(3.0)), Vec3::splat(6.0));
         assert_eq!(shown(Display::Clamp, eight_bits, Vec3::new(-1.0, 0.25, 9.0)), Vec3::new(0.0, 0.5, 1.0));
-        // Neutral below its compression: .3 loses the toe of .04, and .26 is .5469 encoded.
+        // Below its compression the Neutral tone mapper only subtracts a toe of 0.04: 0.3 becomes 0.26, which
+        // is 0.5469 when encoded.
         let grey = shown(Display::Srgb, eight_bits, Vec3::splat(0.15)).x;
         assert!((grey - 0.5469).abs() < 1e-4, "{grey}");
         assert!((shown(Display::Srgb, encoded, Vec3::splat(0.15)).x - 0.26).abs() < 1e-6);

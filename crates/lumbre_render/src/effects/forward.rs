@@ -1,4 +1,4 @@
-//! Opaque surfaces without a lightmap: flat, Gouraud and Phong shading in one pass over all lights.
+//! Draws opaque surfaces without a lightmap: flat, Gouraud and Phong shading in one pass over all lights.
 
 use bevy_ecs::world::World;
 

@@ -1,5 +1,5 @@
-//! The G-buffer: the nearest of the surfaces that are lit deferred, drawn before any of them is lit. The passes of opaque surfaces read it ([`GBuffer`]) and light what it holds
-//! of theirs.
+//! Draws the G-buffer: the nearest of the surfaces that are lit deferred, before any of them is lit. The
+//! passes of opaque surfaces then read it ([`GBuffer`]) and light their own surfaces in it.
 
 use bevy_ecs::world::World;
 use lumbre_graph::{LoadOp, RasterContext, TextureDescriptor, TextureHandle};
@@ -17,7 +17,7 @@ pub(super) struct GBufferPass {
     contents: Option<GBufferContents>,
 }
 
-/// The G-buffer of a frame on its [`Board`].
+/// The G-buffer of a frame, stored on the [`Board`].
 #[derive(Clone, Copy)]
 pub(super) struct GBuffer {
     surfaces: TextureHandle,
@@ -44,7 +44,8 @@ impl Effect for GBufferPass {
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         let [width, height] = board.size;
-        // Where it is called for there is one; depth has as many.
+        // A frame with a G-buffer has one sample per pixel; in any other frame the G-buffer matches the depth
+        // buffer.
         let described = TextureDescriptor::new_2d(width, height, g_buffer::FORMAT).samples(board.samples);
         let mut surfaces = graph.texture("surfaces", described);
         let detailed = self.contents.is_some_and(|contents| contents.details);
@@ -57,7 +58,7 @@ impl Effect for GBufferPass {
         if let Some(details) = &mut details {
             pass = pass.color(details, nothing);
         }
-        // What an effect at the stage of the background has drawn nearer stays.
+        // Depths that an effect at the background stage has drawn are kept.
         pass.depth(&mut board.depth, LoadOp::Load).run(|context| {
             context.user.draw_g_buffer(context.pass);
             Ok(())
@@ -68,7 +69,7 @@ impl Effect for GBufferPass {
     }
 }
 
-/// Declares a pass of opaque surfaces: it lights those that the G-buffer holds, and draws the others.
+/// Declares a pass of opaque surfaces, which lights its surfaces in the G-buffer and draws its others.
 pub(super) fn opaque_pass<'a>(
     graph: &mut FrameGraph<'a>,
     board: &mut Board,
@@ -90,7 +91,7 @@ pub(super) fn opaque_pass<'a>(
 }
 
 impl GBuffer {
-    /// Lights what it holds of a pass.
+    /// Lights the surfaces of a pass.
     fn light(
         &self,
         context: &mut RasterContext<'_, FrameScene<'_>>,

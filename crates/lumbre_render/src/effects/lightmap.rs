@@ -1,4 +1,4 @@
-//! Opaque surfaces whose light is baked: the lightmap's diffuse light, and what dynamic lights add to it.
+//! Draws opaque surfaces with baked light: the lightmap's diffuse light, and what dynamic lights add to it.
 
 use bevy_ecs::world::World;
 

@@ -1,9 +1,10 @@
-//! What flat mirrors show: each plane of mirrors in sight has a view of its own, drawn as the frame is, and its light is added to the surfaces that mirror, by the part that
-//! they reflect. Which views there are is decided in `mirror_views`. Nothing here is approximated but the light of other mirrors deeper than the frame goes: bent surfaces are
-//! drawn without what they mirror.
+//! Draws reflections in flat mirrors. Each plane of mirrors in sight has a view of its own, which is drawn
+//! like the frame; its radiance, times the reflected fraction, is added to the reflective surfaces. Which
+//! views there are is decided in `mirror_views`. Nothing is approximated here except reflections deeper than
+//! the frame's limit. Curved surfaces are drawn without reflections.
 //!
 //! ```text
-//!   view of a mirror ──► mirrors in it ──► what is blended in it ──► mirrors of the frame
+//!   view in a mirror ──► mirrors in it ──► blended surfaces in it ──► mirrors of the frame
 //! ```
 
 use std::collections::HashMap;
@@ -34,23 +35,24 @@ use crate::{FrameOptions, Gpu, RenderError};
 
 #[derive(Debug, Default)]
 pub(super) struct Mirrors {
-    /// Whether the scene has flat mirrors, and whether they are switched on.
+    /// Whether the scene has flat mirrors, and whether mirrors are switched on.
     called_for: [bool; 2],
     fog: Option<Feature>,
-    /// What lies behind everything, as radiance, with nothing of it a surface.
+    /// The background's radiance, with alpha 0 because it is not a surface.
     clear: wgpu::Color,
-    /// Of this frame, if it is decided.
+    /// The views of this frame, once it is decided.
     views: Option<Vec<MirrorShape>>,
     key: Option<Key>,
     size: [u32; 2],
     device: Option<OnDevice>,
 }
 
-/// On the board: what flat surfaces mirror that light passes through too, by the slots of their objects. Their light is added with what is seen through them.
+/// On the board: the reflections in flat transmissive surfaces, by the slots of their objects. They are added
+/// together with what is visible through these surfaces.
 #[derive(Debug, Default)]
 pub(super) struct MirrorPictures(pub HashMap<usize, TextureHandle>);
 
-/// What a pipeline follows from.
+/// What a pipeline depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Key {
     format: wgpu::TextureFormat,
@@ -60,7 +62,7 @@ struct Key {
 
 #[derive(Debug)]
 struct OnDevice {
-    /// Of a view and the objects, and of a surface and what it shows.
+    /// The layouts of a view with the objects, and of a surface with its reflection.
     layouts: [wgpu::BindGroupLayout; 2],
     pipelines: HashMap<Key, Deferred<wgpu::RenderPipeline>>,
     surfaces: SurfaceUniforms,
@@ -127,7 +129,7 @@ impl Effect for Mirrors {
         let [in_scene, switched_on] = self.called_for;
         let called_for = in_scene && switched_on;
         let views = self.views.as_deref().unwrap_or_default();
-        // Children before their parents: their pictures are in these.
+        // Children come before their parents, which show the children's pictures.
         let mut pictures: Vec<Option<TextureHandle>> = vec![None; views.len()];
         for index in (0..views.len()).rev().filter(|_| called_for) {
             pictures[index] = Some(self.declare_view(graph, board, (index, &views[index]), &pictures));
@@ -143,7 +145,7 @@ impl Effect for Mirrors {
             .lit_pass(graph, self.name(), LoadOp::Load)
             .calls_for(in_scene, "flat mesh that mirrors")
             .calls_for(switched_on, "mirrors switched on")
-            // Of an explanation without a device it is not known.
+            // In an explanation without a device this is not known.
             .calls_for(self.views.is_none() || !shown.is_empty(), "mirror in sight");
         let pass = shown.iter().fold(pass, |pass, (_, picture)| pass.samples(picture));
         pass.depth(&mut board.depth, LoadOp::Load).run(move |context| self.add_to(0, context, &shown));
@@ -155,7 +157,8 @@ impl Mirrors {
         Key { format: frame.lit_format, samples: frame.samples, fog: self.fog }
     }
 
-    /// The views in mirrors that a view sees, with their pictures: 0 is the camera's, 1 the first of those in mirrors.
+    /// Returns the views in the mirrors that a view sees, with their pictures: 0 is the camera's view, 1 the
+    /// first view in a mirror.
     fn seen_from(&self, parent: usize, pictures: &[Option<TextureHandle>]) -> Vec<(usize, TextureHandle)> {
         let views = self.views.iter().flatten().zip(pictures).enumerate();
         views
@@ -164,7 +167,8 @@ impl Mirrors {
             .collect()
     }
 
-    /// Declares the passes of a view in a mirror, with the pictures of those that it sees; its own picture.
+    /// Declares the passes of a view in a mirror, given the pictures of the views that it sees. Returns its
+    /// own picture.
     fn declare_view<'a>(
         &'a self,
         graph: &mut FrameGraph<'a>,
@@ -179,7 +183,7 @@ impl Mirrors {
             confine(context.pass, view.pixels);
             context.user.draw_view(context.pass, LitPass::Lightmap, number);
             context.user.draw_view(context.pass, LitPass::Forward, number);
-            // Seen in mirrors they are opaque.
+            // Refractive surfaces are opaque in mirrors.
             context.user.draw_view(context.pass, LitPass::Refraction, number);
             confine(context.pass, self.whole());
             Ok(())
@@ -202,7 +206,7 @@ impl Mirrors {
         targets.picture
     }
 
-    /// Adds what mirrors show, each view by its picture, to the surfaces of a view.
+    /// Adds reflections to the surfaces of a view, from the picture of each view in a mirror.
     fn add_to(
         &self,
         parent: usize,
@@ -239,12 +243,12 @@ impl Mirrors {
     }
 }
 
-/// Has a pass draw within a part of its targets only: the corner of the least numbers, width and height.
+/// Restricts a pass to a part of its targets: x and y of the upper left corner, width and height.
 fn confine(pass: &mut wgpu::RenderPass<'static>, [x, y, width, height]: [u32; 4]) {
     pass.set_scissor_rect(x, y, width, height);
 }
 
-/// What a view in a mirror is drawn into.
+/// The textures that a view in a mirror is drawn into.
 struct Targets {
     /// Radiance, one sample per pixel.
     picture: TextureHandle,
@@ -267,7 +271,7 @@ impl Targets {
         }
     }
 
-    /// Begins a pass over what is there, or over a background.
+    /// Begins a pass that draws over the existing content, or clears it.
     fn pass<'g, 'a>(
         &mut self,
         graph: &'g mut FrameGraph<'a>,
@@ -321,7 +325,7 @@ impl OnDevice {
         }
     }
 
-    /// Makes a pipeline, or begins to; whether it is there. With `wait` it is.
+    /// Creates a pipeline, or starts to. Returns true if it exists, which is always the case with `wait`.
     fn pipeline(&mut self, gpu: &Gpu, key: Key, wait: bool) -> Result<bool, EffectError> {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layouts) = (gpu.device.clone(), self.layouts.clone());
@@ -395,7 +399,8 @@ fn make(
                 attributes: &positions,
             })],
         },
-        // What a mirror is seen from was decided with its view; what is not there has no equal depth.
+        // The visible side was chosen together with the view, so nothing is culled. Hidden parts fail the
+        // test for equal depth.
         primitive: wgpu::PrimitiveState::default(),
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,

@@ -1,5 +1,6 @@
-//! Effects: the parts of a frame that a scene may or may not call for, those of this crate and those of a program that uses it. Each decides from the
-//! World whether it is called for, keeps its own things on the GPU, and declares its own passes; the renderer knows none of them by name.
+//! Effects are the parts of a frame that a scene may or may not call for: those of this crate and those of a
+//! program. Each effect decides from the World whether it is called for, keeps its own resources on the GPU
+//! and declares its own passes. The renderer treats all of them alike.
 //!
 //! ```text
 //!   extract ──► called for? ──► prepare ──► declare
@@ -7,7 +8,8 @@
 //!                               buffers      of the Board
 //! ```
 //!
-//! What a material or a light calls for within a shader is no effect of this kind: that is a feature of a shader's variant (`shader::variant`).
+//! What a material or a light needs within a lit shader is not an effect in this sense, but a feature of a
+//! shader variant (`shader::variant`).
 
 mod background;
 mod board;
@@ -33,138 +35,152 @@ use crate::frame_plan::FrameShape;
 use crate::frame_scene::FrameScene;
 use crate::{FrameOptions, Gpu, RenderingPath};
 
-/// The graph of a frame. Its passes are lent the frame's scene as `context.user`.
+/// The graph of a frame. Its passes access the frame's scene as `context.user`.
 pub type FrameGraph<'a> = Graph<'a, FrameScene<'a>>;
 
-/// Where among the stages of a frame an effect declares its passes. Effects of one stage stand in the order in which the renderer was given them,
-/// after its own.
+/// The stage of a frame at which an effect declares its passes. Effects of the same stage keep the order in
+/// which the renderer was given them, after the built-in ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
-    /// What surfaces are lit with: shadow maps. Nothing is drawn yet.
+    /// What surfaces are lit with: shadow maps. Nothing has been drawn yet.
     Light,
-    /// What lies behind everything.
+    /// What lies behind all surfaces.
     Background,
-    /// Opaque surfaces. Afterwards [`Board::depth`] holds the nearest of them.
+    /// Opaque surfaces. After this stage, [`Board::depth`] holds the depth of the nearest of them.
     Opaque,
     /// What is blended over them.
     Transparent,
-    /// Between light and display: [`Board::linear`] holds the lit frame, as radiance, one sample per pixel. A frame in which such an effect is
-    /// called for keeps its radiance until the display, as [others](Effect::needs_radiance) ask it to; any other is encoded where its colours are made.
+    /// Between lighting and display: [`Board::linear`] holds the lit frame as radiance, one sample per pixel.
+    /// A frame with an effect of this stage, or with [another one that asks for it](Effect::needs_radiance),
+    /// keeps its radiance until the display; otherwise the lit shaders may write the target's values
+    /// directly.
     Radiance,
-    /// From radiance to the numbers of the target.
+    /// Converts radiance to the target's values.
     Display,
-    /// Over the finished picture: [`Board::target`] holds it.
+    /// Draws over the finished picture, which [`Board::target`] holds.
     Picture,
 }
 
-/// What an effect has done since it was built, beside its passes: numbers that only grow.
+/// What an effect has done outside of its passes since it was created. These numbers only grow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EffectWork {
     /// Bytes that it uploaded itself.
     pub uploaded_bytes: u64,
-    /// Pipelines that it made.
+    /// Number of pipelines that it created.
     pub pipelines_made: usize,
-    /// Bytes of the renderer's own uploads that are there for it alone.
+    /// Bytes that the renderer uploaded for this effect alone.
     pub(crate) of_renderer: u64,
 }
 
 impl EffectWork {
-    /// Of an effect that has uploaded this many bytes and made this many pipelines.
+    /// Describes an effect that has uploaded this many bytes and created this many pipelines.
     pub fn new(uploaded_bytes: u64, pipelines_made: usize) -> Self {
         Self { uploaded_bytes, pipelines_made, of_renderer: 0 }
     }
 }
 
-/// A part of the frame that a scene may or may not call for. [`Renderer::builder`](crate::Renderer::builder) takes those of a program.
+/// A part of the frame that a scene may or may not call for. [`Renderer::builder`](crate::Renderer::builder)
+/// takes a program's effects.
 ///
-/// Once a frame, in this order: `extract`; `ready` and `prepare`, if it is called for; `declare`. An explanation without a device leaves out `prepare` and runs no
-/// pass. A frame that goes on as the one before, since pipelines are on their way, asks `extract` and `ready` once more, with what that one was drawn from; a frame in
-/// which nothing has changed (`is_still`) asks neither.
+/// The methods are called once per frame in this order: `extract`; `ready` (unless frames wait for pipelines)
+/// and `prepare`, if the effect is called for; `declare`. An explanation without a device does not call
+/// `prepare` and runs no pass. If pipelines are still being created, `extract` and `ready` are called once
+/// more with the facts and options that an earlier frame was decided by. If nothing has changed (`is_still`),
+/// neither is called.
 pub trait Effect: Send + Sync {
-    /// Its name, in plain words, for plans and errors.
+    /// Returns its name in plain words, for plans and errors.
     fn name(&self) -> &'static str;
 
-    /// Where its passes stand.
+    /// Returns the stage of its passes.
     fn stage(&self) -> Stage;
 
-    /// Takes from the World what it needs this frame; whether the scene calls for it. [`PassBuilder::calls_for`](lumbre_graph::PassBuilder::calls_for)
-    /// of its passes gives the reason.
+    /// Takes what it needs this frame from the World. Returns true if the scene calls for the effect.
+    /// [`PassBuilder::calls_for`](lumbre_graph::PassBuilder::calls_for) of its passes gives the reason.
     fn extract(&mut self, world: &mut World, facts: &SceneFacts, options: &FrameOptions) -> bool;
 
-    /// Whether `extract` would take from the World what it took last: that of a World in which no camera, light, mesh, material, texture, transform or setting has
-    /// changed, with the same options. An effect that looks at nothing else answers true; one with components of its own looks whether they changed.
+    /// Returns true if `extract` would return the same as last time, for the same options and a World in
+    /// which no camera, light, mesh, material, texture, transform or setting has changed. An effect that
+    /// depends on nothing else returns true; one with components of its own checks whether these have
+    /// changed.
     fn is_still(&mut self, world: &mut World) -> bool {
         let _ = world;
         false
     }
 
-    /// Whether its pipelines are there for such a frame, where frames do not wait for them ([`MissingPipelines::Background`](crate::MissingPipelines)): an effect
-    /// that keeps them as [`Deferred`](crate::Deferred) begins to make them here. Until it answers true frames go on without it, or as they were with it.
+    /// Returns true if its pipelines exist, in frames that do not wait for them
+    /// ([`MissingPipelines::Background`](crate::MissingPipelines)). An effect that keeps its pipelines as
+    /// [`Deferred`](crate::Deferred) starts to create them here. Until it returns true, frames are drawn
+    /// without it, or as they were drawn with it before.
     ///
     /// # Errors
-    /// Whatever keeps the effect from being drawn.
+    /// Any error that keeps the effect from being drawn.
     fn ready(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<bool, EffectError> {
         let _ = (gpu, frame);
         Ok(true)
     }
 
-    /// Makes what it needs on the GPU: pipelines, textures that outlive the frame, uniforms. Nothing that it is not called for.
+    /// Creates what it needs on the GPU: pipelines, textures that outlive the frame, uniforms. Called only
+    /// for effects that are called for.
     ///
     /// # Errors
-    /// Whatever keeps the effect from being drawn: the frame is not drawn then.
+    /// Any error that keeps the effect from being drawn. The frame is not drawn then.
     fn prepare(&mut self, gpu: &Gpu, frame: &FrameShape) -> Result<(), EffectError> {
         let _ = (gpu, frame);
         Ok(())
     }
 
-    /// Binds what it imports into the graph: textures and buffers that outlive the frame, under the names that `declare` imports.
+    /// Binds the textures and buffers that it imports into the graph and that outlive the frame, under the
+    /// names that `declare` imports.
     fn imports(&self, imports: Imports) -> Imports {
         imports
     }
 
-    /// Whether its passes draw the shapes of objects, through [`FrameScene::objects`].
+    /// Returns true if its passes draw the shapes of objects, through [`FrameScene::objects`].
     fn draws_objects(&self) -> bool {
         false
     }
 
-    /// Whether a frame in which it is called for keeps its radiance until the display.
+    /// Returns true if a frame in which it is called for must keep its radiance until the display.
     fn needs_radiance(&self) -> bool {
         self.stage() == Stage::Radiance
     }
 
-    /// What it has brought to the GPU and made there since it was built, for the accounts of frames ([`Accounting`](crate::Accounting)): whatever no pass shows.
+    /// Returns what it has uploaded and created since it was built, outside of its passes, for the accounts
+    /// of frames ([`Accounting`](crate::Accounting)).
     fn work(&self) -> EffectWork {
         EffectWork::default()
     }
 
-    /// Declares its passes, those that are not called for too, so that the plan can say why.
+    /// Declares its passes, also when they are not called for, so that the plan can say why.
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board);
 }
 
-/// An effect of the renderer's own that it can be built without ([`RendererBuilder::without`](crate::RendererBuilder::without)). The background is none of them: it clears the
-/// colours and depths that every other pass draws over.
+/// A built-in effect that a renderer can be built without
+/// ([`RendererBuilder::without`](crate::RendererBuilder::without)). The background is not among them, because
+/// it clears the colours and depths that every other pass draws over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BuiltIn {
-    /// Shadow maps: without them lights cast no shadows.
+    /// Shadow maps. Without them lights cast no shadows.
     ShadowMaps,
-    /// The G-buffer: without it all surfaces are lit where they are drawn.
+    /// The G-buffer. Without it all surfaces are lit forward.
     GBuffer,
-    /// Surfaces with a lightmap: without it they are lit as any others.
+    /// Surfaces with a lightmap. Without it they are lit like any others.
     Lightmap,
-    /// Opaque surfaces: without it they are not drawn.
+    /// Opaque surfaces. Without it they are not drawn.
     Forward,
-    /// What flat mirrors show: without it they are drawn without.
+    /// The views in flat mirrors. Without it mirrors reflect nothing.
     Mirrors,
-    /// What lies behind surfaces that light passes through: without it they are opaque.
+    /// Refraction. Without it transmissive surfaces are opaque.
     Refraction,
-    /// Blended surfaces: without it they are not drawn.
+    /// Blended surfaces. Without it they are not drawn.
     Transparent,
-    /// The display pass: without it, or another at [`Stage::Display`], a frame that needs one is refused ([`RenderError::NoDisplay`](crate::RenderError::NoDisplay)).
+    /// The display pass. Without it, or another effect at [`Stage::Display`], a frame that needs one is
+    /// refused ([`RenderError::NoDisplay`](crate::RenderError::NoDisplay)).
     Display,
 }
 
 impl BuiltIn {
-    /// Every one.
+    /// All built-in effects that can be left out.
     pub const ALL: [Self; 8] = [
         Self::ShadowMaps,
         Self::GBuffer,
@@ -176,7 +192,7 @@ impl BuiltIn {
         Self::Display,
     ];
 
-    /// Its name in plans and accounts.
+    /// Returns its name in plans and accounts.
     pub fn name(self) -> &'static str {
         match self {
             Self::ShadowMaps => "shadow maps",
@@ -190,7 +206,7 @@ impl BuiltIn {
         }
     }
 
-    /// Switches off what a frame cannot have without it.
+    /// Switches off the options that a frame cannot have without it.
     pub(crate) fn switch_off(self, options: &mut FrameOptions) {
         match self {
             Self::ShadowMaps => options.shadows = false,
@@ -198,14 +214,14 @@ impl BuiltIn {
             Self::Lightmap => options.lightmaps = false,
             Self::Mirrors => options.mirror_depth = 0,
             Self::Refraction => options.refraction = false,
-            // What the G-buffer holds of opaque surfaces would be lit by nothing.
+            // The surfaces in the G-buffer would not be lit by any pass.
             Self::Forward => options.rendering_path = RenderingPath::Forward,
             Self::Transparent | Self::Display => {}
         }
     }
 }
 
-/// The effects of this crate but for some, each in its stage.
+/// Returns the built-in effects except `without`, in the order of their stages.
 pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
     let all: [Box<dyn Effect>; 9] = [
         Box::new(shadows::Shadows::default()),
@@ -221,8 +237,8 @@ pub(crate) fn own(without: &[BuiltIn]) -> Vec<Box<dyn Effect>> {
     all.into_iter().filter(|effect| without.iter().all(|left_out| left_out.name() != effect.name())).collect()
 }
 
-/// In the order of their stages.
+/// Sorts effects by their stages.
 pub(crate) fn in_order(effects: &mut [Box<dyn Effect>]) {
-    // Stable.
+    // The sort is stable, so effects of one stage keep their order.
     effects.sort_by_key(|effect| effect.stage());
 }

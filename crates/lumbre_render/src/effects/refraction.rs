@@ -1,11 +1,13 @@
-//! What lies behind surfaces that light passes through, bent as they bend it, and what they mirror by Fresnel's equations: rays are followed over the picture of the frame so far
-//! (shaders/refraction.wesl). What that picture does not show (behind the camera, outside of the frame, hidden by something nearer, behind another such surface) is not there: rays
-//! take the picture's edge, or the background. Light that is reflected within a body is lost.
+//! Draws what is visible through transmissive surfaces, refracted, and what these reflect by Fresnel's
+//! equations. Rays are traced in screen space through the picture of the frame so far
+//! (shaders/refraction.wesl). What that picture does not show (behind the camera, outside of the frame,
+//! hidden by something nearer, behind another such surface) is missing: such rays take the edge of the
+//! picture, or the background. Light that is reflected inside a body is lost.
 //!
 //! ```text
-//!   frame so far ──► behind ───────────────┐
-//!   back faces of bodies ──► back faces ───┼──► refraction: added where refractive surfaces are
-//!   what flat ones mirror (`mirrors`) ─────┘
+//!   frame so far ──► behind ────────────────────┐
+//!   back faces of bodies ──► back faces ────────┼──► refraction: added to the refractive surfaces
+//!   reflections in flat surfaces (`mirrors`) ───┘
 //! ```
 
 use std::collections::HashMap;
@@ -29,35 +31,35 @@ use crate::shader::{self, Feature};
 use crate::target::DEPTH_FORMAT;
 use crate::{FrameOptions, Gpu, RenderError};
 
-/// Depths of what lies behind.
+/// Format of the depths behind the surfaces.
 const DEPTHS: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
-/// Normals and depths of back faces.
+/// Format of the normals and depths of back faces.
 const BACK_FACES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
 #[derive(Debug, Default)]
 pub(super) struct Refraction {
-    /// Whether light passes through any mesh, and whether what lies behind it is to be drawn.
+    /// Whether the scene has transmissive meshes, and whether refraction is switched on.
     called_for: [bool; 2],
     fog: Option<Feature>,
-    /// In view.
+    /// The surfaces in view.
     surfaces: Vec<RefractorSurface>,
-    /// Of this frame, if it is decided.
+    /// The pipelines of this frame, once it is decided.
     keys: Option<Keys>,
     device: Option<OnDevice>,
 }
 
-/// What a pipeline follows from.
+/// What a pipeline depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
-    /// The copy of the frame so far.
+    /// Copies the frame so far.
     Behind { format: wgpu::TextureFormat, multisampled: bool },
-    /// Back faces of what winds this way.
+    /// Draws back faces of objects with this winding.
     BackFaces { mirrored: bool },
-    /// The light that is added.
+    /// Adds the refracted and reflected light.
     Surfaces { format: wgpu::TextureFormat, samples: u32, fog: Option<Feature> },
 }
 
-/// The pipelines of a frame.
+/// The keys of a frame's pipelines.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
     behind: Key,
@@ -87,18 +89,18 @@ struct OnDevice {
     surfaces: SurfaceUniforms,
 }
 
-/// Of the groups that shaders read.
+/// Layouts of the bind groups.
 #[derive(Clone, Debug)]
 struct Layouts {
     /// The frame so far, with one sample per pixel and with several.
     frame: [wgpu::BindGroupLayout; 2],
     /// A view and the objects.
     view: wgpu::BindGroupLayout,
-    /// A surface, and the pictures in which its rays are followed.
+    /// A surface, and the pictures in which its rays are traced.
     surface: wgpu::BindGroupLayout,
 }
 
-/// The pictures in which rays are followed.
+/// The pictures in which rays are traced.
 #[derive(Clone, Copy, Debug)]
 struct Pictures {
     behind: TextureHandle,
@@ -147,7 +149,7 @@ impl Effect for Refraction {
             for key in keys.all() {
                 device.pipeline(gpu, key, true)?;
             }
-            // Each twice: as it is, and with a picture of what it mirrors.
+            // Each surface is stored twice: as it is, and with a reflection in a picture of its own.
             let data = self.surfaces.iter().flat_map(|surface| [surface.data, surface.data.pictured()]);
             device.surfaces.write(gpu, &data.collect::<Vec<_>>());
         }
@@ -165,7 +167,7 @@ impl Effect for Refraction {
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         let [in_scene, switched_on] = self.called_for;
-        // Of an explanation without a device it is not known what is in sight.
+        // In an explanation without a device it is not known what is in sight.
         let in_sight = self.keys.is_none() || !self.surfaces.is_empty();
         let [width, height] = board.size;
         let described = |format| TextureDescriptor::new_2d(width, height, format);
@@ -217,7 +219,7 @@ impl Effect for Refraction {
 }
 
 impl Refraction {
-    /// A pipeline of this frame, with what it was made with.
+    /// Returns a pipeline of this frame and its device objects.
     fn pipeline(&self, of: impl Fn(&Keys) -> Key) -> Option<(&OnDevice, &wgpu::RenderPipeline)> {
         let device = self.device.as_ref()?;
         let pipeline = device.pipelines.get(&of(self.keys.as_ref()?)).and_then(Deferred::get)?.ok()?;
@@ -286,7 +288,7 @@ impl Refraction {
         );
         context.pass.set_pipeline(pipeline);
         context.pass.set_bind_group(0, &view, &[]);
-        // Without a picture of their own they look for what they mirror behind.
+        // Surfaces without a reflection picture search for their reflection in the frame so far.
         let plain = device.surface_group(&context.resources, pictures, &pictures.behind)?;
         for (index, surface) in self.surfaces.iter().enumerate() {
             let picture = mirrored.get(&surface.slot);
@@ -323,7 +325,7 @@ impl OnDevice {
         }
     }
 
-    /// Makes a pipeline, or begins to; whether it is there. With `wait` it is.
+    /// Creates a pipeline, or starts to. Returns true if it exists, which is always the case with `wait`.
     fn pipeline(&mut self, gpu: &Gpu, key: Key, wait: bool) -> Result<bool, EffectError> {
         let pipeline = self.pipelines.entry(key).or_insert_with(|| {
             let (device, layouts) = (gpu.device.clone(), self.layouts.clone());
@@ -376,7 +378,7 @@ impl Layouts {
                 entries: &entries,
             })
         };
-        // The places of `FrameBuffer`.
+        // The layout uses the bindings of `FrameBuffer`.
         debug_assert_eq!([FrameBuffer::Frame.binding(), FrameBuffer::Objects.binding()], [0, 1]);
         let uniform = |dynamic| buffer(wgpu::BufferBindingType::Uniform, dynamic);
         let transforms = buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);

@@ -1,4 +1,5 @@
-//! The shadows of lights that ask for them: draws the maps that changed into the atlas, from which the lit surfaces read. Which maps there are is decided in `shadows`.
+//! Draws the shadow maps that changed into the atlas, which the lit surfaces read. Which maps there are is
+//! decided in `shadows`.
 
 use bevy_ecs::world::World;
 use lumbre_graph::{Imports, LoadOp, TextureDescriptor};
@@ -12,7 +13,7 @@ use crate::{FrameOptions, Gpu};
 
 #[derive(Debug, Default)]
 pub(super) struct Shadows {
-    /// Whether a light asks for one, and whether they are switched on.
+    /// Whether a light asks for a shadow, and whether shadows are switched on.
     called_for: [bool; 2],
     atlas: Option<ShadowAtlas>,
     work: EffectWork,
@@ -57,11 +58,11 @@ impl Effect for Shadows {
 
     fn declare<'a>(&'a self, graph: &mut FrameGraph<'a>, board: &mut Board) {
         let [asked, switched_on] = self.called_for;
-        // Of an explanation without a device the size is not known.
+        // In an explanation without a device the size is not known.
         let side = self.atlas.as_ref().map_or(1, |atlas| atlas.view.texture().width());
         let described = TextureDescriptor::new_2d(side, side, DEPTH_FORMAT);
         let (mut atlas, load) = match &self.atlas {
-            // What did not change is there from an earlier frame.
+            // Maps that did not change are kept from an earlier frame.
             Some(_) => (graph.import_texture("shadow atlas", described), LoadOp::Load),
             None => (graph.texture("shadow atlas", described), LoadOp::Clear(0.0)),
         };

@@ -1,24 +1,24 @@
-//! A uniform buffer of what shaders know of several surfaces, one after the other at dynamic offsets.
+//! A uniform buffer with the shader data of several surfaces, each at a dynamic offset.
 
 use bytemuck::Pod;
 
 use crate::Gpu;
 
-/// Bytes from one surface to the next: the largest alignment that a device may ask for.
+/// Bytes between two surfaces: the largest alignment that a device may require.
 const STRIDE: usize = 256;
 
-/// The surfaces of a frame on the GPU.
+/// The data of a frame's surfaces on the GPU.
 #[derive(Debug, Default)]
 pub(super) struct SurfaceUniforms {
     buffer: Option<wgpu::Buffer>,
-    /// What it holds.
+    /// The content of the buffer.
     written: Vec<u8>,
     /// Bytes written so far.
     pub uploaded: u64,
 }
 
 impl SurfaceUniforms {
-    /// Sends the surfaces of a frame, if they changed.
+    /// Uploads the data of a frame's surfaces, if it changed.
     pub fn write<T: Pod>(&mut self, gpu: &Gpu, surfaces: &[T]) {
         let mut bytes = vec![0; surfaces.len() * STRIDE];
         for (place, surface) in bytes.chunks_exact_mut(STRIDE).zip(surfaces) {
@@ -45,14 +45,14 @@ impl SurfaceUniforms {
         self.buffer = Some(buffer);
     }
 
-    /// The first surface; the others are at [`offset`](Self::offset)s from it.
+    /// Returns the binding of the first surface. The others are at their [`offset`](Self::offset).
     pub fn binding<T: Pod>(&self) -> Option<wgpu::BindingResource<'_>> {
         let size = wgpu::BufferSize::new(size_of::<T>() as u64);
         let bound = wgpu::BufferBinding { buffer: self.buffer.as_ref()?, offset: 0, size };
         Some(wgpu::BindingResource::Buffer(bound))
     }
 
-    /// The dynamic offset of a surface.
+    /// Returns the dynamic offset of a surface.
     pub fn offset(index: usize) -> u32 {
         // Fewer than 2^24 surfaces fit into a uniform buffer.
         (index * STRIDE) as u32

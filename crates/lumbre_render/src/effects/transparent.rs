@@ -1,4 +1,4 @@
-//! Surfaces that are blended over what lies behind them, the farthest first.
+//! Draws blended surfaces over what lies behind them, the farthest first.
 
 use bevy_ecs::world::World;
 use lumbre_graph::LoadOp;

@@ -1,4 +1,5 @@
-//! The camera of a frame: which one, its matrices, and its image in a mirror. Not its tone curve: that is the display pass.
+//! The camera of a frame: which one is used, its matrices, and its mirror image. The tone curve belongs to
+//! the display pass.
 
 use bevy_ecs::prelude::*;
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
@@ -7,12 +8,13 @@ use lumbre_scene::{ActiveCamera, Camera, GlobalTransform, Projection};
 use super::planar_mirror::mirror_image;
 use crate::RenderError;
 
-/// What a camera sees, as its projection tells.
+/// The volume that a camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ViewVolume {
-    /// Half the frame's width and height at depth 1, and the near plane's depth in metres.
+    /// Half the frame's width and height at depth 1, and the depth of the near plane in metres.
     Perspective { half_width: f64, half_height: f64, near: f64 },
-    /// Half the frame's width and height, negative where it is mirrored, and both planes' depths, all in metres.
+    /// Half the frame's width and height, negative if mirrored, and the depths of near and far plane, all in
+    /// metres.
     Orthographic { half_width: f64, half_height: f64, near: f64, far: f64 },
 }
 
@@ -29,7 +31,8 @@ pub(crate) struct CameraView {
     clip_from_view: DMat4,
 }
 
-/// Where the pixels of a frame look, across the line of sight: metres for each metre of depth, or metres where rays are parallel.
+/// The directions of the pixels of a frame, perpendicular to the line of sight: in metres per metre of depth,
+/// or in metres if the rays are parallel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PixelRays {
     /// From the eye to the frame's upper left corner.
@@ -41,7 +44,7 @@ pub(crate) struct PixelRays {
     pub parallel: bool,
 }
 
-/// A rectangle of the frame, in normalized device coordinates: from -1 to 1, to the right and up.
+/// A rectangle of the frame in normalized device coordinates, from -1 to 1, x to the right and y up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Window {
     pub low: DVec2,
@@ -52,18 +55,19 @@ impl Window {
     /// The whole frame.
     pub const WHOLE: Self = Self { low: DVec2::NEG_ONE, high: DVec2::ONE };
 
-    /// The least rectangle that holds both.
+    /// Returns the smallest rectangle that contains both.
     pub fn and(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// The part of the frame that it covers, at most 1.
+    /// Returns the fraction of the frame that it covers, at most 1.
     pub fn area(&self) -> f64 {
         let size = self.high - self.low;
         0.25 * size.x * size.y
     }
 
-    /// The pixels of a frame of this size that it touches: the corner of the least numbers, width and height.
+    /// Returns the pixels of a frame of this size that it touches: x and y of the upper left corner, width
+    /// and height.
     pub fn pixels(&self, [width, height]: [u32; 2]) -> [u32; 4] {
         let axis = |low: f64, high: f64, size: u32| {
             let at = |coordinate: f64| 0.5 * (coordinate + 1.0) * f64::from(size);
@@ -78,7 +82,7 @@ impl Window {
     }
 }
 
-/// The asked-for camera, else the active one, else the first.
+/// Returns the camera that was asked for, or else the active one, or else the first one.
 pub(crate) fn find_camera(world: &mut World, asked: Option<Entity>) -> Result<Entity, RenderError> {
     if let Some(entity) = asked {
         let there = world.get::<Camera>(entity).is_some() && world.get::<GlobalTransform>(entity).is_some();
@@ -90,7 +94,7 @@ pub(crate) fn find_camera(world: &mut World, asked: Option<Entity>) -> Result<En
 }
 
 impl CameraView {
-    /// The camera of an entity for a target of this aspect ratio.
+    /// Creates the view of a camera entity for a target with this aspect ratio.
     pub fn new(world: &World, entity: Entity, aspect: f64) -> Result<Self, RenderError> {
         let (Some(camera), Some(transform)) =
             (world.get::<Camera>(entity), world.get::<GlobalTransform>(entity))
@@ -139,7 +143,7 @@ impl CameraView {
         Ok(Self { eye, basis, exposure: camera.exposure, volume, window: Window::WHOLE, clip_from_view })
     }
 
-    /// From frame space, whose origin stands at `origin` in the world, to clip space.
+    /// Returns the transform to clip space from frame space, whose origin in the world is `origin`.
     pub fn clip_from_frame(&self, origin: DVec3) -> DMat4 {
         let rotation = self.basis.transpose();
         let view = DMat4::from_cols(
@@ -151,12 +155,14 @@ impl CameraView {
         self.clip_from_view * view
     }
 
-    /// The view that this one has in a mirror: its eye and axes are mirror images, so that a point's image is on the same pixel as the point is in the mirror; what lies
-    /// behind the mirror is cut off by the near plane, which is the mirror's. The plane is in the world and faces this view; of the frame only `window` is drawn. `None`
-    /// where no point of the window is before the mirror.
+    /// Returns the reflection of this view in a mirror. Eye and axes are mirror images, so that an object is
+    /// drawn at the pixel where this view sees its reflection. The near plane is the plane of the mirror,
+    /// which clips what lies behind it. The plane is given in world space and faces this view; only `window`
+    /// of the frame is drawn. `None` if no point of the window lies in front of the mirror.
     ///
-    /// The oblique near plane is that of Lengyel, "Oblique View Frustum Depth Projection and Clipping", Journal of Game Development 1(2), 2005, for depths that are reversed:
-    /// z/w = 1 - a d/w at a distance d from the mirror, with the largest a that keeps every point of the window above 0.
+    /// The oblique near plane follows Lengyel, "Oblique View Frustum Depth Projection and Clipping", Journal
+    /// of Game Development 1(2), 2005, adapted to reversed depth: z/w = 1 - a d/w at a distance d from the
+    /// mirror, with the largest a that keeps every point of the window above 0.
     pub fn reflected(&self, plane: DVec4, window: Window) -> Option<Self> {
         let eye = mirror_image(plane, self.eye, 1.0);
         let axis = |axis: DVec3| mirror_image(plane, axis, 0.0);
@@ -166,7 +172,7 @@ impl CameraView {
         let corners = [window.low, window.high].map(|x| [window.low, window.high].map(|y| [x.x, y.y]));
         let corners = corners.into_iter().flatten();
         let farthest = match self.volume {
-            // The distance grows with depth along each direction, by this much a metre.
+            // The distance from the mirror grows with depth along each direction, by this much per metre.
             ViewVolume::Perspective { half_width, half_height, .. } => corners
                 .map(|[x, y]| in_view.dot(DVec4::new(x * half_width, y * half_height, -1.0, 0.0)))
                 .fold(0.0, f64::max),
@@ -183,12 +189,14 @@ impl CameraView {
         Some(Self { eye, basis, window, clip_from_view: rows.transpose(), ..*self })
     }
 
-    /// Whether it is seen in an odd number of mirrors: the front of a triangle winds the other way then.
+    /// Returns true if the view is reflected an odd number of times. The front faces of triangles then have
+    /// the opposite winding.
     pub fn is_mirrored(&self) -> bool {
         self.basis.determinant() < 0.0
     }
 
-    /// The eye, or where it is infinitely far the direction towards it, with `w` 0; in the world.
+    /// Returns the eye in the world, or for an infinitely distant viewer the direction towards it, with `w`
+    /// 0.
     pub fn viewer(&self) -> DVec4 {
         match self.volume {
             ViewVolume::Perspective { .. } => self.eye.extend(1.0),
@@ -196,7 +204,7 @@ impl CameraView {
         }
     }
 
-    /// Where the pixels of a frame of this size look.
+    /// Returns the directions of the pixels of a frame of this size.
     pub fn pixel_rays(&self, [width, height]: [u32; 2]) -> PixelRays {
         let (half_width, half_height, parallel) = match self.volume {
             ViewVolume::Perspective { half_width, half_height, .. } => (half_width, half_height, false),
@@ -211,7 +219,8 @@ impl CameraView {
         }
     }
 
-    /// The part of the window in which a box may be seen that stands in the world along its axes; `None` where it is outside.
+    /// Returns the part of the window in which an axis-aligned box of the world may be visible; `None` if it
+    /// is outside.
     pub fn window_of_box(&self, center: DVec3, half_size: DVec3) -> Option<Window> {
         let clip = self.clip_from_frame(center);
         let corner = |index: usize| {
@@ -219,12 +228,12 @@ impl CameraView {
             clip * (DVec3::new(side(0), side(1), side(2)) * half_size).extend(1.0)
         };
         let corners: [DVec4; 8] = std::array::from_fn(corner);
-        // Above 0 in front of the near plane.
+        // Positive in front of the near plane.
         let before = |point: DVec4| point.w - point.z;
         let mut low = DVec2::INFINITY;
         let mut high = DVec2::NEG_INFINITY;
         let mut hold = |point: DVec4| {
-            // At the near plane of a perspective view w is positive; rounding may leave 0.
+            // At the near plane of a perspective view w is positive, but rounding may give 0.
             let projected = point.truncate().truncate() / point.w.max(f64::MIN_POSITIVE);
             (low, high) = (low.min(projected), high.max(projected));
         };
@@ -244,7 +253,7 @@ impl CameraView {
         (window.low.cmplt(window.high).all()).then_some(window)
     }
 
-    /// A part of the window outside of which no point of a sphere is seen, which stands in the world.
+    /// Returns a part of the window that contains every visible point of a sphere in the world.
     pub fn window_of_sphere(&self, center: DVec3, radius: f64) -> Window {
         let in_view = self.basis.transpose() * (center - self.eye);
         let depth = -in_view.z;
@@ -257,7 +266,8 @@ impl CameraView {
             }
             ViewVolume::Orthographic { half_width, half_height, .. } => DVec2::new(half_width, half_height),
         };
-        // Of the box around it: the nearer face on the side away from the line of sight, else the farther one.
+        // Bounds the box around the sphere: by its nearer face on the side away from the line of sight,
+        // otherwise by the farther one.
         let edge = |at: f64, outwards: bool| match self.volume {
             ViewVolume::Perspective { .. } => at / if outwards { depth - radius } else { depth + radius },
             ViewVolume::Orthographic { .. } => at,
@@ -269,7 +279,7 @@ impl CameraView {
         Window { low, high: high.clamp(low, self.window.high) }
     }
 
-    /// The corners of what is drawn between two depths along the line of sight, in frame space.
+    /// Returns the corners of the drawn volume between two depths along the line of sight, in frame space.
     pub fn corners(&self, origin: DVec3, depths: [f64; 2]) -> [DVec3; 8] {
         let (eye, window) = (self.eye - origin, self.window);
         std::array::from_fn(|index| {
@@ -288,7 +298,8 @@ impl CameraView {
         })
     }
 
-    /// Planes of what is drawn in frame space, normals inwards, of unit length; there is no far plane.
+    /// Returns the planes of the drawn volume in frame space, with inward normals of unit length. There is no
+    /// far plane.
     pub fn frustum(&self, origin: DVec3) -> [DVec4; 5] {
         let m = self.clip_from_frame(origin).transpose();
         let Window { low, high } = self.window;
@@ -303,7 +314,8 @@ impl CameraView {
     }
 }
 
-/// Depth 1 at the near plane, 0 at infinity: f32's precision is spread evenly over the logarithm of distance.
+/// Returns a projection with depth 1 at the near plane and 0 at infinity. This spreads the precision of f32
+/// evenly over the logarithm of the distance.
 fn perspective_reversed(vertical_fov: f64, aspect: f64, near: f64) -> DMat4 {
     let focal = 1.0 / (0.5 * vertical_fov).tan();
     DMat4::from_cols(
@@ -314,7 +326,7 @@ fn perspective_reversed(vertical_fov: f64, aspect: f64, near: f64) -> DMat4 {
     )
 }
 
-/// Depth 1 at the near plane, 0 at the far plane.
+/// Returns a projection with depth 1 at the near plane and 0 at the far plane.
 fn orthographic_reversed(half_width: f64, half_height: f64, near: f64, far: f64) -> DMat4 {
     let depth = far - near;
     DMat4::from_cols(
@@ -392,7 +404,7 @@ mod tests {
         }
     }
 
-    /// A camera of either kind before a tilted mirror, with the mirror's plane turned towards it.
+    /// Cameras of both kinds in front of a tilted mirror, with the mirror's plane facing the camera.
     fn before_a_mirror() -> Vec<(CameraView, DVec4)> {
         let mut world = World::new();
         let transform =
@@ -442,7 +454,7 @@ mod tests {
     fn a_view_in_two_mirrors_is_not_mirrored() {
         let (view, plane) = before_a_mirror()[0];
         let once = view.reflected(plane, Window::WHOLE).unwrap();
-        // The same mirror from behind: the second image is the first eye again.
+        // In the same mirror from behind, the second image is the original eye.
         let twice = once.reflected(-plane, Window::WHOLE).unwrap();
         assert!(!twice.is_mirrored() && (twice.eye - view.eye).length() < 1e-12);
     }

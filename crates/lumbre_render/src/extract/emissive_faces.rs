@@ -1,5 +1,5 @@
-//! The faces of an emissive mesh as few evenly shining polygons, in the mesh's own space: two triangles that make a parallelogram
-//! become one. Not where they stand in the world: that is `emitters`.
+//! The faces of an emissive mesh as a small number of evenly emitting polygons in mesh space. Two triangles
+//! that form a parallelogram become one polygon. Their placement in the world is computed in `emitters`.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use lumbre_mesh::{TriangleMesh, weld_positions};
 use lumbre_optics::decode_srgb_byte;
 use lumbre_scene::{MaterialTextures, TextureReference, Wrap};
 
-/// Most polygons of one object: every point that it reaches evaluates them all.
+/// Largest number of polygons of one object. Every point that it reaches evaluates all of them.
 pub(crate) const MAXIMUM_POLYGONS: usize = 256;
 
 /// A polygon of a mesh.
@@ -18,27 +18,27 @@ pub(crate) struct Face {
     pub edge_u: DVec3,
     pub edge_v: DVec3,
     pub triangle: bool,
-    /// Mean of the emissive texture, linear RGB; 1 without one.
+    /// Mean of the emissive texture as linear RGB; 1 without a texture.
     pub tint: Vec3,
 }
 
-/// How far, as a part of its diagonal, the fourth corner of a parallelogram may lie from where it should: the rounding of positions that
-/// a program has rotated in f32.
+/// Largest distance of the fourth corner of a parallelogram from its exact position, relative to the
+/// diagonal. This allows for positions that were rotated in f32.
 const TOLERANCE: f64 = 1e-6;
 
-/// Points along an edge at which an emissive texture is read, as many as the baker's pieces.
+/// Number of sample points along an edge for reading an emissive texture. The baker uses the same number.
 const TEXTURE_POINTS: u32 = 8;
 
-/// The faces of a mesh that have an area.
+/// Returns the faces of a mesh that have an area.
 ///
 /// # Errors
-/// Their number, or a lower bound of it, if there are more than [`MAXIMUM_POLYGONS`].
+/// The number of polygons, or a lower bound of it, if there are more than [`MAXIMUM_POLYGONS`].
 pub(crate) fn faces(mesh: &TriangleMesh, textures: Option<&MaterialTextures>) -> Result<Vec<Face>, usize> {
     let texture = textures.and_then(|textures| textures.emissive.as_ref());
     let valid = |t: &[u32; 3]| t.iter().all(|&vertex| (vertex as usize) < mesh.positions.len());
     let triangles: Vec<[u32; 3]> =
         mesh.triangles().filter(|t| valid(t) && area_vector(mesh, t).length() > 0.0).collect();
-    // Two triangles make a polygon at best, and only those of one colour.
+    // At best, two triangles form a polygon, and only if they have the same colour.
     let least = if texture.is_some() { triangles.len() } else { triangles.len().div_ceil(2) };
     if least > MAXIMUM_POLYGONS {
         return Err(least);
@@ -47,7 +47,7 @@ pub(crate) fn faces(mesh: &TriangleMesh, textures: Option<&MaterialTextures>) ->
     let mut faces = Vec::new();
     for (index, triangle) in triangles.iter().enumerate() {
         match partners[index] {
-            // The other triangle of the pair makes the polygon.
+            // The other triangle of the pair adds the polygon.
             Some(Partner { triangle: other, .. }) if other < index => {}
             Some(Partner { apex, .. }) => {
                 let tint = Vec3::ONE;
@@ -67,11 +67,11 @@ pub(crate) fn faces(mesh: &TriangleMesh, textures: Option<&MaterialTextures>) ->
     if faces.len() > MAXIMUM_POLYGONS { Err(faces.len()) } else { Ok(faces) }
 }
 
-/// What a triangle makes a parallelogram with.
+/// The other triangle of a parallelogram.
 #[derive(Clone, Copy, Debug)]
 struct Partner {
     triangle: usize,
-    /// The corner of this triangle that the other does not have.
+    /// The corner of this triangle that the other one does not share.
     apex: usize,
 }
 
@@ -79,7 +79,7 @@ fn position(mesh: &TriangleMesh, vertex: u32) -> DVec3 {
     mesh.positions[vertex as usize].as_dvec3()
 }
 
-/// 0 where it is not a number.
+/// Returns twice the area as a vector along the normal, or 0 if it is not finite.
 fn area_vector(mesh: &TriangleMesh, triangle: &[u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|vertex| position(mesh, vertex));
     let area = (b - a).cross(c - a);
@@ -91,10 +91,10 @@ fn face(mesh: &TriangleMesh, [a, b, c]: [u32; 3], triangle: bool, tint: Vec3) ->
     Face { corner, edge_u: position(mesh, b) - corner, edge_v: position(mesh, c) - corner, triangle, tint }
 }
 
-/// Pairs of triangles that make parallelograms, the most rectangular first.
+/// Finds pairs of triangles that form parallelograms, the most rectangular ones first.
 fn partners(mesh: &TriangleMesh, triangles: &[[u32; 3]]) -> Vec<Option<Partner>> {
     let welded = weld_positions(&mesh.positions);
-    // From a directed edge to the triangles on its left, each with the corner across.
+    // Maps a directed edge to the triangles on its left, each with its opposite corner.
     let mut left: HashMap<[u32; 2], Vec<(usize, usize)>> = HashMap::new();
     let edge =
         |index: usize, apex: usize| [1, 2].map(|next| welded[triangles[index][(apex + next) % 3] as usize]);
@@ -112,7 +112,7 @@ fn partners(mesh: &TriangleMesh, triangles: &[[u32; 3]]) -> Vec<Option<Partner>>
                     let corner = |index: usize, apex: usize| position(mesh, triangles[index][apex]);
                     let (a, d) = (corner(index, apex), corner(other, other_apex));
                     let (b, c) = (position(mesh, from), position(mesh, to));
-                    // Its diagonals halve each other.
+                    // The diagonals of a parallelogram bisect each other.
                     let apart = ((a + d) - (b + c)).length();
                     if apart <= TOLERANCE * (d - a).length().max((c - b).length()) {
                         let skew = (b - a).dot(c - a).abs() / ((b - a).length() * (c - a).length());
@@ -133,7 +133,7 @@ fn partners(mesh: &TriangleMesh, triangles: &[[u32; 3]]) -> Vec<Option<Partner>>
     partners
 }
 
-/// Mean of a texture over a triangle: the texels at the middles of 64 equal pieces.
+/// Returns the mean of a texture over a triangle: the mean of the texels at the centres of 64 equal parts.
 fn mean_texel(mesh: &TriangleMesh, triangle: &[u32; 3], texture: &TextureReference) -> Vec3 {
     let coordinates = if texture.tex_coord == 0 { &mesh.uv0 } else { &mesh.uv1 };
     let corners = triangle.map(|vertex| coordinates.get(vertex as usize).copied());
@@ -141,7 +141,8 @@ fn mean_texel(mesh: &TriangleMesh, triangle: &[u32; 3], texture: &TextureReferen
     let mut sum = Vec3::ZERO;
     for i in 0..TEXTURE_POINTS {
         for j in 0..TEXTURE_POINTS {
-            // The upright triangle of the cell, or beyond the diagonal the other one of the cell across it.
+            // The upright triangle of a cell, or beyond the diagonal the inverted triangle of the mirrored
+            // cell.
             let (i, j, third) = match i + j < TEXTURE_POINTS {
                 true => (i, j, 1.0),
                 false => (TEXTURE_POINTS - 1 - i, TEXTURE_POINTS - 1 - j, 2.0),
@@ -153,7 +154,7 @@ fn mean_texel(mesh: &TriangleMesh, triangle: &[u32; 3], texture: &TextureReferen
     sum / (TEXTURE_POINTS * TEXTURE_POINTS) as f32
 }
 
-/// The texel at texture coordinates, linear RGB; 1 where there is none.
+/// Returns the texel at texture coordinates as linear RGB; 1 if there is none.
 fn texel(texture: &TextureReference, uv: Vec2) -> Vec3 {
     let uv = texture.transformed(uv);
     if !uv.is_finite() {
@@ -218,7 +219,7 @@ mod tests {
         assert_eq!((found.len(), found.iter().any(|face| face.triangle)), (6, false));
         let outward = |f: &Face| f.edge_u.cross(f.edge_v).dot(f.corner + 0.5 * (f.edge_u + f.edge_v)) > 0.0;
         assert!(found.iter().all(outward));
-        // A sphere: its poles stay triangles, and whatever pairs keeps the area.
+        // The poles of a sphere stay triangles, and pairing keeps the total area.
         let sphere = shapes::uv_sphere(1.0, 12, 6);
         let found = faces(&sphere, None).unwrap();
         let total: f64 = sphere.triangles().map(|t| 0.5 * area_vector(&sphere, &t).length()).sum();
@@ -256,7 +257,7 @@ mod tests {
 
     #[test]
     fn a_texture_is_averaged_over_each_triangle() {
-        // Left half black, right half white: of a quad's two triangles one is darker.
+        // The left half is black and the right half white, so one of the quad's two triangles is darker.
         let image =
             Image { name: "half".into(), width: 2, height: 1, rgba: vec![0, 0, 0, 255, 255, 255, 255, 255] };
         let texture = TextureReference {
@@ -270,7 +271,8 @@ mod tests {
         let textures = MaterialTextures { emissive: Some(texture), ..MaterialTextures::default() };
         let found = faces(&quad(), Some(&textures)).unwrap();
         assert_eq!(found.len(), 2);
-        // The triangle with the right edge has three quarters of its area at u > 1/2. 64 pieces: exact to the ones that the line cuts.
+        // Three quarters of the area of the triangle with the right edge have u > 1/2. 64 samples are exact
+        // except for the parts that the line u = 1/2 crosses.
         let tints: Vec<f32> = found.iter().map(|face| face.tint.x).collect();
         assert!((tints[0] - 0.75).abs() < 0.07 && (tints[1] - 0.25).abs() < 0.07, "{tints:?}");
         assert!((tints[0] + tints[1] - 1.0).abs() < 1e-6);

@@ -1,5 +1,6 @@
-//! Emissive objects that light others: their faces as polygon lights in the world. The faces are found again only when a mesh or a
-//! texture changed; colours and places are read every frame. Not which objects the polygons reach: that is `light_lists`.
+//! Emissive objects that light others: their faces as polygon lights in the world. Faces are extracted again
+//! only if a mesh or a texture changed; colours and transforms are read every frame. Which objects the
+//! polygons reach is decided in `light_lists`.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ pub(crate) struct EmissivePolygon {
     pub light: PolygonLight,
     /// The object whose face it is.
     pub emitter: Entity,
-    /// Its diffuse light is in the lightmaps.
+    /// Whether its diffuse light is contained in the lightmaps.
     pub baked: bool,
 }
 
@@ -43,7 +44,8 @@ struct Emitter {
 }
 
 impl Emitters {
-    /// The polygons of all emitters, in the order of their entities. Global transforms must be up to date.
+    /// Returns the polygons of all emitters, in the order of their entities. Global transforms must be up to
+    /// date.
     ///
     /// # Errors
     /// [`RenderError::TooManyEmissiveFaces`].
@@ -51,7 +53,7 @@ impl Emitters {
         if self.world != Some(world.id()) {
             *self = Self { world: Some(world.id()), ..Self::default() };
         }
-        // Most Worlds have none.
+        // Most Worlds have no emitters.
         if world.query_filtered::<(), With<EmissiveLight>>().iter(world).next().is_none() {
             self.known.clear();
             return Ok(Vec::new());
@@ -111,7 +113,8 @@ impl Emitter {
     }
 }
 
-/// A face in the world, its front to the front: a mirroring transform turns the winding round.
+/// Places a face in the world. A mirroring transform reverses the winding, so the face is turned to keep its
+/// front.
 fn placed(face: &Face, place: &GlobalTransform, radiance: Vec3) -> PolygonLight {
     let light = PolygonLight {
         corner: place.0.transform_point3(face.corner),
@@ -123,13 +126,13 @@ fn placed(face: &Face, place: &GlobalTransform, radiance: Vec3) -> PolygonLight 
     if place.mirrors() { light.turned() } else { light }
 }
 
-/// Whether the entity or what it hangs from moves: the baker leaves it out then.
+/// Returns true if the entity or one of its ancestors is dynamic. The baker leaves it out in that case.
 fn moves(world: &World, entity: Entity) -> bool {
     let above = |entity: &Entity| world.get::<ChildOf>(*entity).map(ChildOf::parent);
     std::iter::successors(Some(entity), above).any(|entity| world.get::<DynamicObject>(entity).is_some())
 }
 
-/// What a person calls it: its own name, its node's, or its mesh's.
+/// Returns a name for messages: the entity's own, its node's, or its mesh's.
 fn name(world: &World, entity: Entity, primitive: Option<&Primitive>) -> String {
     let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
     let named = [Some(entity), parent].into_iter().flatten().find_map(|entity| world.get::<Name>(entity));
@@ -189,7 +192,7 @@ mod tests {
         let mirrored = Transform { scale: DVec3::new(-1.0, 1.0, 3.0), ..Transform::default() };
         let entity = lamp(&mut world, mirrored);
         assert_eq!(polygons(&mut world)[0].light.area_vector(), DVec3::Y * 6.0);
-        // Double-sided alone is no lamp on the back, as in the baker.
+        // As in the baker, a double-sided material alone does not emit from its back.
         let mut material = Material { double_sided: true, ..glowing() };
         world.entity_mut(entity).insert(material.clone());
         assert_eq!(polygons(&mut world).len(), 1);

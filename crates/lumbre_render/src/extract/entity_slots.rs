@@ -1,4 +1,5 @@
-//! A value for each entity of a World, in a slot that stays the entity's as long as it is found. Not what is kept there, nor how it is brought up to date.
+//! Stores a value for each entity of a World, in a slot that stays the same as long as the entity is found.
+//! What the values are and how they are updated is decided by the owner.
 
 use bevy_ecs::entity::{Entity, EntityHashMap};
 
@@ -6,7 +7,7 @@ use bevy_ecs::entity::{Entity, EntityHashMap};
 #[derive(Debug)]
 pub(crate) struct EntitySlots<T> {
     by_entity: EntityHashMap<usize>,
-    /// By slot; `None` is free, or new.
+    /// By slot; `None` if the slot is free or new.
     pub values: Vec<Option<T>>,
     free: Vec<usize>,
 }
@@ -18,12 +19,12 @@ impl<T> Default for EntitySlots<T> {
 }
 
 impl<T> EntitySlots<T> {
-    /// How many entities have one.
+    /// Returns the number of entities with a slot.
     pub fn len(&self) -> usize {
         self.by_entity.len()
     }
 
-    /// The slot of an entity: one that is free, if it has none yet.
+    /// Returns the slot of an entity, or assigns it a free one.
     pub fn of(&mut self, entity: Entity) -> usize {
         *self.by_entity.entry(entity).or_insert_with(|| {
             self.free.pop().unwrap_or_else(|| {
@@ -33,9 +34,10 @@ impl<T> EntitySlots<T> {
         })
     }
 
-    /// Frees the slots of entities whose values are not found any more, and hands these over; whether there were any.
+    /// Frees the slots of entities whose values are no longer found, and passes these values to `gone`.
+    /// Returns true if there were any.
     pub fn release(&mut self, is_found: impl Fn(&T) -> bool, mut gone: impl FnMut(T)) -> bool {
-        // As a rule all are there.
+        // Usually all are found.
         if self.values.iter().flatten().all(&is_found) {
             return false;
         }

@@ -1,4 +1,5 @@
-//! How far a light goes, and by what it can be found: its class, and the ball or the plane that holds all it lights. Not what it sends there.
+//! How far a light reaches and which lists it belongs to: its class, and the sphere or the plane that bounds
+//! what it lights. The amount of light is computed elsewhere.
 
 use bevy_ecs::entity::Entity;
 use glam::{DVec3, Vec3};
@@ -7,31 +8,33 @@ use lumbre_scene::GlobalTransform;
 
 use super::emitters::EmissivePolygon;
 
-/// By what a light can be found, and what has to be asked of it.
+/// Which lists a light belongs to, and what its shaders have to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LightClass {
-    /// It has no range, or is directional, or a polygon: it is in the lists of objects.
+    /// A light without a range, a directional light or a polygon. It is in the lists of objects.
     Unbounded,
-    /// A point light without a shadow, with a smooth cone or without one, of one colour, with the inverse square within a range, with or without a constant term
-    /// beside it: what most lights of a game are.
+    /// A point light without a shadow, with a smooth cone or none, of one colour, whose attenuation is the
+    /// inverse square within a range, with or without a constant term. Most lights of a game are of this
+    /// class.
     InverseSquare,
-    /// Any other point light with a range: with a shadow, OpenGL's cone, a linear attenuation, or colours that differ.
+    /// Any other point light with a range: with a shadow, OpenGL's cone, a linear attenuation term, or
+    /// different colours.
     Ranged,
 }
 
 impl LightClass {
-    /// Of a light; an ambient one has no range either.
+    /// Returns the class of a light. An ambient one has no range either.
     pub(super) fn of(light: &Light) -> Self {
         let Attenuation { range, constant, linear, quadratic, clamp } = light.attenuation;
         if light.kind != LightKind::Point || !range.is_finite() {
             return Self::Unbounded;
         }
-        // Numbers whose quotients are as good as they are.
+        // In these ranges the quotients are as accurate as the coefficients themselves.
         let inverse_square =
             linear == 0.0 && !clamp && (1e-3..=1e3).contains(&quadratic) && (0.0..=1e3).contains(&constant);
         let one_color = light.ambient == Vec3::ZERO && light.specular == light.diffuse;
         let narrowed = cone(light).is_some_and(|cone| !matches!(cone, SpotCone::Smooth { .. }));
-        // What `attenuate_quadratic` takes.
+        // The range that `attenuate_quadratic` supports.
         let usual_range = (1e-9..=1e15).contains(&range);
         match inverse_square && one_color && !narrowed && usual_range && !light.shadow {
             true => Self::InverseSquare,
@@ -40,29 +43,30 @@ impl LightClass {
     }
 }
 
-/// The cone of a light, if it narrows it.
+/// Returns the cone of a light, if it restricts the light.
 pub(super) fn cone(light: &Light) -> Option<SpotCone> {
     light.spot.filter(|cone| !cone.is_everywhere())
 }
 
-/// How far a light of the buffer goes.
+/// How far a light reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightReach {
     pub class: LightClass,
-    /// Of the ball that holds all it reaches, in the world; of a polygon light, its corner.
+    /// Centre of the sphere that contains everything it reaches, in the world; for a polygon light one of its
+    /// corners.
     pub center: DVec3,
-    /// Of that ball, in metres; infinite for a light without a range.
+    /// Radius of that sphere in metres; infinite for a light without a range.
     pub radius: f64,
-    /// Baked into the lightmaps in use.
+    /// Whether it is baked into the lightmaps in use.
     pub baked: bool,
-    /// Of a polygon light: the plane that it shines from.
+    /// The plane that a polygon light shines from.
     pub polygon: Option<PolygonReach>,
 }
 
-/// Where a polygon light shines: before its plane, on everything but the object whose face it is.
+/// Where a polygon light shines: in front of its plane, on everything except the object whose face it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PolygonReach {
-    /// Of any length, to the front.
+    /// Normal towards the front, of any length.
     pub front: DVec3,
     pub emitter: Entity,
 }
@@ -82,7 +86,7 @@ impl LightReach {
         Self { class, center, radius: f64::INFINITY, baked: *baked, polygon: Some(reach) }
     }
 
-    /// Whether it may light anything of an object with this bounding box in the world.
+    /// Returns true if it may light any part of an object with this bounding box in the world.
     pub fn touches(&self, entity: Entity, center: DVec3, half_size: DVec3) -> bool {
         if let Some(polygon) = self.polygon {
             return polygon.shines_on(self.center, entity, center, half_size);
@@ -93,25 +97,28 @@ impl LightReach {
 }
 
 impl PolygonReach {
-    /// Whether anything of an object with this bounding box lies before the polygon with this corner, and the object is not its own.
+    /// Returns true if any part of an object with this bounding box lies in front of the polygon with this
+    /// corner, and the object is not the emitter itself.
     pub fn shines_on(&self, corner: DVec3, entity: Entity, center: DVec3, half_size: DVec3) -> bool {
         let farthest = (center - corner).dot(self.front) + half_size.dot(self.front.abs());
         self.emitter != entity && farthest > 0.0
     }
 }
 
-/// Middle and radius of the smallest ball around all that a point light reaches: the ball of its range, or around a spotlight's part of it.
+/// Returns centre and radius of the smallest sphere around everything that a point light reaches: the sphere
+/// of its range, or one around the spotlight's part of that.
 fn bounding_sphere(light: &Light, transform: &GlobalTransform) -> (DVec3, f64) {
     let (place, range) = (transform.translation(), f64::from(light.attenuation.range));
     let Some(cone) = cone(light).filter(|_| range.is_finite()) else { return (place, range) };
-    // Rounded to f32 on the device, and strictly inside is lit: a little wider is enough.
+    // The device rounds the cosine to f32 and lights only points strictly inside, so a small margin is
+    // sufficient.
     let cosine = (cone.cosines().outer - 1e-6).max(0.0);
     let sine = (1.0 - cosine * cosine).sqrt();
     let axis = transform.forward();
     match cosine > sine {
-        // Through the apex and the rim of the cap.
+        // Through the apex and the rim of the spherical cap.
         true => (place + axis * (0.5 * range / cosine), 0.5 * range / cosine),
-        // Around the rim.
+        // Around the rim of the spherical cap.
         false => (place + axis * (range * cosine), range * sine),
     }
 }
@@ -133,7 +140,7 @@ mod tests {
             let cone = SpotCone::Smooth { inner: 0.0, outer };
             let (center, radius) =
                 bounding_sphere(&Light { attenuation, ..Light::spot(Vec3::ONE, cone) }, &place);
-            // Its farthest points: the apex, the middle and the rim of the cap.
+            // The farthest points are the apex, the middle of the cap and its rim.
             let rim = |angle: f64| axis * angle.cos() + side * angle.sin();
             let outer = f64::from(outer);
             let mut farthest: f64 = if outer < 0.786 { center.distance(place.translation()) } else { 0.0 };

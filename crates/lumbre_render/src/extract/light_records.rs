@@ -1,5 +1,6 @@
-//! What is kept of each light from frame to frame: what the device reads of it and how far it goes, worked out again only when its entity, the origin of frame space or the
-//! scene's settings changed. Which lights a frame has, and how they count, is decided in `lights`.
+//! The records of lights that are kept between frames: the device's data of a light and how far it reaches. A
+//! record is computed again only if its entity, the origin of frame space or the scene's settings changed.
+//! Which lights a frame has, and how they are counted, is decided in `lights`.
 
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemState;
@@ -17,14 +18,14 @@ use crate::layout::{InverseSquareLightData, LightData};
 #[derive(Clone, Debug)]
 pub(super) struct LightRecord {
     pub entity: Entity,
-    /// As frames show it.
+    /// The light as frames show it.
     pub light: Light,
     pub place: GlobalTransform,
-    /// With the class that it has as long as numbers do not run out.
+    /// Its class is the one without the limit on 16-bit indices.
     pub reach: LightReach,
-    /// Without what its shadow adds.
+    /// Without the flags of its shadow.
     pub data: LightData,
-    /// Of a light of that class.
+    /// Set for an inverse-square light.
     pub inverse_square: Option<InverseSquareLightData>,
 }
 
@@ -45,12 +46,12 @@ impl LightRecord {
 /// A light, whether it shines or not.
 #[derive(Debug, Default)]
 struct Kept {
-    /// If it shines.
+    /// Set if it shines.
     record: Option<LightRecord>,
     /// What is wrong with it.
     fault: Option<String>,
     has_place: bool,
-    /// The last update that found it.
+    /// Number of the last update that found it.
     seen: u64,
 }
 
@@ -58,20 +59,22 @@ type Lights<'w, 's> = Query<'w, 's, (Entity, Ref<'static, Light>, Option<Ref<'st
 type Names<'w, 's> = Query<'w, 's, &'static Name>;
 type Extraction = SystemState<(Lights<'static, 'static>, Names<'static, 'static>)>;
 
-/// The lights of one World at a time.
+/// Keeps the lights of one World at a time.
 #[derive(Default)]
 pub(crate) struct LightRecords {
     state: Option<(WorldId, Extraction)>,
     kept: EntitySlots<Kept>,
-    /// Origin of frame space, and what settings say of lights, that the records were made for.
+    /// Origin of frame space and light settings that the records were computed for.
     made_for: Option<(DVec3, f32, ShadowFilter)>,
     updates: u64,
-    /// Slots of those that shine: dynamic ones first, entities in order, so that sums are the same every time.
+    /// Slots of the lights that shine: dynamic ones first, then in the order of their entities, so that sums
+    /// are the same every time.
     order: Vec<(bool, u32, usize)>,
 }
 
 impl LightRecords {
-    /// Brings the records up to date. Lights whose numbers are out of range are `left_out`, each with a sentence.
+    /// Brings the records up to date. Lights with invalid data are left out, each with a message in
+    /// `left_out`.
     pub fn update(
         &mut self,
         world: &mut World,
@@ -92,7 +95,8 @@ impl LightRecords {
                 let slot = self.kept.of(entity);
                 let kept = self.kept.values[slot].get_or_insert_default();
                 let moved = place.as_ref().is_some_and(Ref::is_changed) || place.is_some() != kept.has_place;
-                // What is wrong is said by name, which may change.
+                // A faulty light is always checked again, because its message contains its name, which may
+                // change.
                 if remade || kept.seen == 0 || moved || light.is_changed() || kept.fault.is_some() {
                     let transform = place.as_deref();
                     kept.has_place = transform.is_some();
@@ -114,20 +118,20 @@ impl LightRecords {
         self.kept.release(|kept| kept.seen == updates, drop);
     }
 
-    /// Lights that shine, dynamic ones or those that are baked, entities in order.
+    /// Returns the lights that shine, either the dynamic or the baked ones, in the order of their entities.
     pub(super) fn shining(&self, baked: bool) -> impl Iterator<Item = &LightRecord> {
         let begin = if baked { self.order.partition_point(|(baked, ..)| !baked) } else { 0 };
         let of_kind = self.order[begin..].iter().take_while(move |(of, ..)| *of == baked);
         of_kind.filter_map(|(_, _, slot)| self.kept.values[*slot].as_ref()?.record.as_ref())
     }
 
-    /// How many shine, and how many do not.
+    /// Returns how many lights shine, and how many do not.
     pub fn counts(&self) -> (usize, usize) {
         (self.order.len(), self.kept.len() - self.order.len())
     }
 }
 
-/// What is wrong with a light that is on, by name; nothing as a rule.
+/// Returns a message with the light's name if something is wrong with a light that is switched on.
 fn fault(
     names: &Names<'_, '_>,
     entity: Entity,

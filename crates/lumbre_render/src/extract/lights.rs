@@ -1,4 +1,5 @@
-//! Lights of a frame: those that are on and the faces of emissive objects, dynamic ones first. Which of them reach what is not decided here.
+//! The lights of a frame: those that are switched on and the faces of emissive objects, dynamic ones first.
+//! Which of them reach which object is decided in `light_lists` and `light_clusters`.
 
 use std::borrow::Cow;
 
@@ -16,49 +17,52 @@ use crate::layout::{InverseSquareLightData, LightData};
 use crate::shadow_light::{MOST_VIEWS, ShadowKind, ShadowLight, light_size};
 use crate::{LightLists, RenderError};
 
-/// Most inverse-square lights that a uniform buffer of 64 KiB holds, which every device has, beside a black one.
+/// Largest number of inverse-square lights, besides a black one, in a uniform buffer of 64 KiB, which every
+/// device supports.
 pub(crate) const UNIFORM_LIGHTS: u32 = 1364;
-/// Most inverse-square lights that 16 bits number, beside a black one; more of them are listed as other lights with a range are.
+/// Largest number of inverse-square lights that 16-bit indices allow, besides a black one. Further ones are
+/// listed like other lights with a range.
 pub(crate) const NUMBERED_LIGHTS: usize = 65_535;
-/// From so many lights with a range on they are listed by clusters: with two, finding the cluster costs about what it saves.
+/// With at least this many lights with a range, clusters are used. With two, finding the cluster costs about
+/// what it saves.
 const CLUSTERED_LIGHTS: u32 = 3;
 
-/// Lights of one class, counted.
+/// Counts of the lights of one class.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LightCounts {
-    /// Lights that are shaded in full.
+    /// Number of lights that are shaded in full.
     pub dynamic: u32,
-    /// These and the lights that are baked into the lightmaps.
+    /// Number of these lights and of those that are baked into the lightmaps.
     pub all: u32,
     /// Whether a baked light has an ambient colour.
     pub static_ambient: bool,
     pub directional: bool,
     pub point: bool,
     pub spot: bool,
-    /// Whether faces of emissive objects shine.
+    /// Whether there are faces of emissive objects.
     pub polygon: bool,
-    /// What has to be known of shadows.
+    /// What the shaders have to know about shadows.
     pub shadows: ShadowCounts,
 }
 
 /// Whether lights of a class cast shadows, and of which kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ShadowCounts {
-    /// Lights that do.
+    /// Number of lights with a shadow.
     pub lights: u32,
     pub cubes: bool,
     pub cascades: bool,
     pub soft: bool,
 }
 
-/// What the shaders need to know of a frame's lights.
+/// What the shaders have to know about a frame's lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LightSet {
-    /// What they count as in the census.
+    /// The lights as the census counts them.
     pub census: LightCensus,
-    /// Sum of the ambient lights, which are in no class.
+    /// Sum of the ambient lights, which belong to no class.
     pub ambient: Vec3,
-    /// Lights of all classes.
+    /// The lights of all classes.
     pub every: LightCounts,
     pub unbounded: LightCounts,
     pub inverse_square: LightCounts,
@@ -83,7 +87,7 @@ impl LightCounts {
         }
     }
 
-    /// Whether shaders for lights that count so know all of one that counts so by itself.
+    /// Returns true if shaders for lights with these counts support a single light with the counts `own`.
     fn knows(&self, own: &Self, baked: bool) -> bool {
         let there = match baked {
             true => self.all > self.dynamic && (self.static_ambient || !own.static_ambient),
@@ -110,7 +114,7 @@ impl LightCounts {
 }
 
 impl LightSet {
-    /// The lights of a World, counted.
+    /// Counts the lights of a World.
     ///
     /// # Errors
     /// [`RenderError::TooManyEmissiveFaces`].
@@ -135,7 +139,7 @@ impl LightSet {
         Ok(set)
     }
 
-    /// With lightmaps switched off nothing counts as baked.
+    /// Returns the counts with lightmaps switched off, so that no light counts as baked.
     pub fn without_lightmaps(mut self) -> Self {
         for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
             counts.dynamic = counts.all;
@@ -143,7 +147,7 @@ impl LightSet {
         self
     }
 
-    /// With shadows switched off no light casts any.
+    /// Returns the counts with shadows switched off.
     pub fn without_shadows(mut self) -> Self {
         for counts in [&mut self.every, &mut self.unbounded, &mut self.inverse_square, &mut self.ranged] {
             counts.shadows = ShadowCounts::default();
@@ -151,7 +155,8 @@ impl LightSet {
         self
     }
 
-    /// Whether fragments find lights with a range by clusters: with fewer, the lists of objects are as short.
+    /// Returns true if fragments find lights with a range by clusters. With few lights, the lists of objects
+    /// are just as short.
     pub fn are_clustered(&self, lists: LightLists) -> bool {
         match lists {
             LightLists::Auto => self.inverse_square.all + self.ranged.all >= CLUSTERED_LIGHTS,
@@ -160,8 +165,8 @@ impl LightSet {
         }
     }
 
-    /// By which lists the lights of a frame are found, and why, a line for each kind of list. `clustered` of `objects` shown ones have
-    /// fragments that read clusters' lists.
+    /// Describes which lists the lights of a frame are found by, and why, with one line for each kind of
+    /// list. `clustered` of `objects` objects have fragments that use clusters.
     pub fn listing(&self, lists: LightLists, clustered: usize, objects: usize) -> Vec<String> {
         let (every, inverse_square, ranged) = (self.every.all, self.inverse_square.all, self.ranged.all);
         if every == 0 {
@@ -201,8 +206,8 @@ impl LightSet {
         self.unbounded.add_polygon(polygon);
     }
 
-    /// Counts a light of a class, and says of which class it is in a frame; an ambient one is of none. Baked lights are to come last: where numbers run out, the same
-    /// lights have to go without one wherever they are counted.
+    /// Counts a light and returns the class that it has in this frame; `None` for an ambient light. Baked
+    /// lights must come last, so that the same lights go without a 16-bit index wherever lights are counted.
     fn add(&mut self, light: &Light, class: LightClass) -> Option<LightClass> {
         self.census.add(light);
         if light.kind == LightKind::Ambient {
@@ -226,18 +231,19 @@ impl LightSet {
     }
 }
 
-/// What the shaders of a frame know of lights: those of an earlier one, while others are being made.
+/// What the shaders of an earlier frame support, while new ones are being created.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KnownLights<'a> {
     pub set: &'a LightSet,
-    /// Fragments find lights with a range by clusters.
+    /// Whether fragments find lights with a range by clusters.
     pub clustered: bool,
     pub lightmaps: bool,
     pub shadows: bool,
 }
 
 impl KnownLights<'_> {
-    /// A light as these shaders can show it, without its shadow if need be; nothing if they cannot. `so_far` counts those before it.
+    /// Returns a light in the way these shaders can show it, without its shadow if necessary; `None` if they
+    /// cannot. `so_far` counts the lights before it.
     fn shown<'l>(
         &self,
         record: &'l LightRecord,
@@ -266,7 +272,7 @@ impl KnownLights<'_> {
                 LightClass::InverseSquare => &self.set.inverse_square,
                 LightClass::Ranged => &self.set.ranged,
             };
-            // The uniform buffer is as long as it is.
+            // The size of the uniform buffer is fixed.
             let full = class == LightClass::InverseSquare
                 && self.set.inverse_square.all <= UNIFORM_LIGHTS
                 && so_far.inverse_square.all >= UNIFORM_LIGHTS;
@@ -282,14 +288,14 @@ impl KnownLights<'_> {
     }
 }
 
-/// A light with all that the CPU may ask of it.
+/// A light with everything that CPU code needs of it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lamp {
     pub reach: LightReach,
-    /// Nothing of a polygon light but that it shines.
+    /// For a polygon light, this only says that it shines.
     pub light: Light,
     pub position: DVec3,
-    /// Unit: where it shines.
+    /// Direction that it shines in, of unit length.
     pub axis: DVec3,
 }
 
@@ -303,7 +309,7 @@ impl Lamp {
         Self { reach, light: Light::point(Vec3::ONE), position, axis: DVec3::NEG_Z }
     }
 
-    /// The lights of a World that a frame would evaluate, with lightmaps and shadows or without.
+    /// Returns the lights of a World that a frame would evaluate, with or without lightmaps and shadows.
     ///
     /// # Errors
     /// [`RenderError::TooManyEmissiveFaces`].
@@ -329,34 +335,35 @@ impl Lamp {
     }
 }
 
-/// The lights of a frame: what is counted of them, and one entry of each list for each light, dynamic ones first.
+/// The lights of a frame: their counts, and one entry in each list for each light, dynamic ones first.
 #[derive(Debug, Default)]
 pub(crate) struct SceneLights {
     pub set: LightSet,
     pub reaches: Vec<LightReach>,
-    /// Those of the class, in the order of `reaches`.
+    /// The records of inverse-square lights, in the order of `reaches`.
     pub inverse_square: Vec<InverseSquareLightData>,
-    /// Those that cast shadows.
+    /// The lights that cast shadows.
     pub shadows: Vec<ShadowLight>,
-    /// One for each of `reaches`, where they are asked for.
+    /// One for each of `reaches`, if they were asked for.
     pub lamps: Vec<Lamp>,
 }
 
-/// Where the lights of a frame go, and what is wanted of them.
+/// How the lights of a frame are extracted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightPlace<'a> {
-    /// Of frame space, in the world.
+    /// Origin of frame space in the world.
     pub origin: DVec3,
-    /// Only what these can show is lit.
+    /// If set, only lights that these shaders can show are extracted.
     pub known: Option<KnownLights<'a>>,
-    /// [`SceneLights::lamps`] are wanted.
+    /// Whether [`SceneLights::lamps`] are needed.
     pub lamps: bool,
-    /// Where lights end, and whether their size shows.
+    /// Settings for where lights end and whether their size matters.
     pub settings: FrameSettings,
 }
 
-/// Writes the lights that are on and not black; entities in order, so that sums are the same every time. Those whose numbers are out of
-/// range are `left_out`, each with a sentence; with `known`, those that its shaders cannot show stay dark.
+/// Extracts the lights that are on and not black, in the order of their entities, so that sums are the same
+/// every time. Lights with invalid data are left out, each with a message in `left_out`. With `known`, lights
+/// that its shaders cannot show stay dark.
 ///
 /// # Errors
 /// [`RenderError::TooManyEmissiveFaces`].
@@ -414,14 +421,15 @@ pub(crate) fn extract_lights(
         }
     }
     if known.is_some() {
-        // Where all of a class are gone its lists are read still, and find a black one: `ClusterBuffers::build`.
+        // If all lights of a class are gone, the shaders still read its lists and find a black light; see
+        // `ClusterBuffers::build`.
         data.push(LightData::default());
     }
     buffer.replace(data);
     Ok(scene)
 }
 
-/// What a World asks of its frames.
+/// Returns the settings of a World's frames.
 fn frame_settings(world: &World) -> FrameSettings {
     world.get_resource::<SceneSettings>().map_or_else(FrameSettings::default, |settings| settings.frame)
 }

@@ -1,9 +1,10 @@
-//! The passes that draw lit surfaces, and which of them draws an object. Not which exist in a frame: that follows from how many objects each has (`facts`).
+//! The passes that draw lit surfaces, and which of them draws an object. Which passes a frame has follows
+//! from the number of their objects (`facts`).
 
 use lumbre_optics::AlphaMode;
 use lumbre_scene::ObjectTraits;
 
-/// The pass that draws an object; in this order.
+/// The pass that draws an object. The passes run in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum LitPass {
     Lightmap,
@@ -13,10 +14,10 @@ pub(crate) enum LitPass {
 }
 
 impl LitPass {
-    /// Every one, in this order.
+    /// All passes in this order.
     pub const ALL: [Self; 4] = [Self::Lightmap, Self::Forward, Self::Refraction, Self::Transparent];
 
-    /// The name of the pass in plans.
+    /// Returns the name of the pass in plans.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lightmap => "lightmap",
@@ -26,7 +27,7 @@ impl LitPass {
         }
     }
 
-    /// The pass of an object, where lightmaps are used or not, and refraction is.
+    /// Returns the pass of an object. `lightmaps` and `refraction` say whether these are used.
     pub fn of(traits: &ObjectTraits, lightmaps: bool, refraction: bool) -> Self {
         match (traits.alpha_mode, refraction && traits.refracts, lightmaps && traits.is_lit_by_lightmap()) {
             (AlphaMode::Blend, ..) => Self::Transparent,

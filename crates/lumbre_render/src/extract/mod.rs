@@ -1,4 +1,5 @@
-//! From the World to the GPU: what changed since the last frame, and nothing else. What is drawn of it is decided in `draws`.
+//! Extracts the World for the GPU: only what changed since the last frame. What is drawn of it is decided in
+//! `draws`.
 
 mod camera;
 mod emissive_faces;

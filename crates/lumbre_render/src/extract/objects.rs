@@ -1,5 +1,5 @@
-//! Objects of a frame: entities with a mesh, one slot each in the GPU's buffers. A slot is written again only when a component
-//! of its entity changed.
+//! The objects of a frame: entities with a mesh, each with a slot in the GPU's buffers. A slot is written
+//! again only when a component of its entity changed.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::texture_sets::{TextureSet, TextureSets};
 use crate::textures::Textures;
 use crate::{Gpu, RenderError};
 
-/// What the draws need to know of one object.
+/// What drawing needs to know about one object.
 #[derive(Debug)]
 pub(crate) struct Object {
     pub entity: Entity,
@@ -33,36 +33,36 @@ pub(crate) struct Object {
     pub lightmap: Option<Arc<wgpu::BindGroup>>,
     pub traits: ObjectTraits,
     optional: Optional,
-    /// Of its mesh.
+    /// Number of triangles of its mesh.
     triangles: usize,
-    /// It is in the census.
+    /// Whether it is counted in the census.
     counted: bool,
-    /// Why it cannot be drawn, by name.
+    /// A message with its name if it cannot be drawn.
     fault: Option<String>,
     pub mirrored: bool,
     pub world_from_mesh: DAffine3,
-    /// Middle of the bounding box in the world.
+    /// Centre of the bounding box in the world.
     pub center: DVec3,
-    /// Half the sides of that box, along the world's axes.
+    /// Half the sides of that box along the world's axes.
     pub half_size: DVec3,
-    /// Of the sphere around the same middle.
+    /// Radius of the bounding sphere around the same centre.
     pub radius: f64,
-    /// Where what it mirrors can be drawn.
+    /// Set if its reflection can be drawn.
     pub planar_mirror: Option<PlanarMirror>,
-    /// What light does that passes through it, where it does.
+    /// How it transmits light, from its material and medium.
     pub refractor: Option<Refractor>,
-    /// What it reflects.
+    /// The reflection coefficients of its material.
     pub reflectance: Reflectance,
-    /// A number that is another one after each change of it.
+    /// A number that changes whenever the object changes.
     pub changed: u64,
     seen: u64,
 }
 
-/// The coefficients of both sides of a material.
+/// The reflection coefficients of both sides of a material.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reflectance {
     pub front: Surface,
-    /// Of the back, if it differs.
+    /// The back side, if it differs from the front.
     pub back: Option<Surface>,
     pub lobe: Lobe,
 }
@@ -73,13 +73,14 @@ impl Reflectance {
     }
 }
 
-/// What an object's components say that may be absent: their removal leaves no other mark.
+/// The optional components of an object. They are compared because removing a component leaves no change
+/// mark.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Optional {
     maps: bool,
     lightmap: bool,
     choices: (Option<Shading>, Option<ReflectionModel>, Option<Medium>),
-    /// It is static, it moves, it lights others.
+    /// Static, dynamic, emissive.
     marks: (bool, bool, bool),
 }
 
@@ -98,7 +99,7 @@ type ObjectQuery<'w, 's> = Query<
     ),
 >;
 
-/// Meshes that nothing says the look of.
+/// Meshes without a material.
 type Unfinished<'w, 's> = Query<'w, 's, Entity, (With<Mesh>, Without<Material>)>;
 type HiddenBranches<'w, 's> = (Query<'w, 's, Entity, With<Hidden>>, Query<'w, 's, &'static Children>);
 type Names<'w, 's> = Query<'w, 's, &'static Name>;
@@ -109,22 +110,23 @@ type Extraction = SystemState<(
     Names<'static, 'static>,
 )>;
 
-/// All objects, and their GPU buffers.
+/// All objects and their GPU buffers.
 pub(crate) struct Objects {
     state: Option<(WorldId, Extraction)>,
     slots: EntitySlots<Object>,
-    /// Of the objects that can be drawn.
+    /// Counts of the objects that can be drawn.
     pub census: ObjectCensus,
     pub transforms: GrowableBuffer<ObjectData>,
     pub materials: GrowableBuffer<MaterialData>,
     frame: u64,
-    /// Something that the GPU holds may be in use no longer.
+    /// Whether something on the GPU may no longer be in use.
     stale: bool,
-    /// Where frame space has its origin in the world.
+    /// The origin of frame space in the world.
     pub origin: DVec3,
 }
 
-/// Farther from the origin of frame space than this, in metres, the origin moves to the camera: at 512 m f32 still tells 0.03 mm apart.
+/// If the camera is farther from the origin of frame space than this, in metres, the origin moves to the
+/// camera. Up to 512 m, f32 still resolves 0.03 mm.
 const ORIGIN_REACH: f64 = 512.0;
 
 impl Objects {
@@ -141,7 +143,8 @@ impl Objects {
         }
     }
 
-    /// Brings the slots up to date for a frame seen from `eye`. What cannot be drawn is `left_out`, each with a sentence.
+    /// Brings the slots up to date for a frame seen from `eye`. Objects that cannot be drawn are left out,
+    /// each with a message in `left_out`.
     pub fn extract(
         &mut self,
         world: &mut World,
@@ -152,7 +155,7 @@ impl Objects {
     ) -> Result<(), RenderError> {
         let updated = self.update(world, gpu, resources, eye, left_out);
         if updated.is_err() {
-            // Half of it is of this frame: the next one begins anew.
+            // The update is incomplete, so the next frame starts from scratch.
             *self = Self { frame: self.frame, stale: true, ..Self::new() };
         }
         updated
@@ -168,7 +171,7 @@ impl Objects {
     ) -> Result<(), RenderError> {
         self.frame += 1;
         if self.state.as_ref().is_none_or(|(id, _)| *id != world.id()) {
-            // Another World: nothing of the old one is left.
+            // This is another World, so drop everything of the previous one.
             *self = Self { frame: self.frame, stale: true, ..Self::new() };
             self.state = Some((world.id(), SystemState::new(world)));
         }
@@ -219,7 +222,7 @@ impl Objects {
                         ObjectTraits::new(((&*mesh, &*material, maps, lightmap), choices, marks)),
                     )
                 });
-                // A component that was removed leaves no change behind.
+                // The removal of a component leaves no change mark.
                 let rematerialized =
                     new || material.is_changed() || maps_changed || object.optional.maps != optional.maps;
                 let restated = remeshed || rematerialized || map_changed || object.optional != optional;
@@ -272,7 +275,7 @@ impl Objects {
         Ok(())
     }
 
-    /// Frees the slots of entities that are gone, and what only they used.
+    /// Frees the slots of despawned entities, and what only they used.
     fn release(&mut self, meshes: &mut MeshBuffers, textures: &mut Textures, sets: &mut TextureSets) {
         let (frame, census) = (self.frame, &mut self.census);
         let released = self.slots.release(|object| object.seen == frame, |mut object| object.leave(census));
@@ -283,12 +286,12 @@ impl Objects {
         }
     }
 
-    /// What stands in a slot.
+    /// Returns the object in a slot.
     pub fn get(&self, slot: usize) -> Option<&Object> {
         self.slots.values.get(slot)?.as_ref()
     }
 
-    /// Objects that can be drawn, with their slots.
+    /// Returns the objects that can be drawn, with their slots.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Object)> {
         let drawn = |object: &&Object| object.fault.is_none();
         self.slots
@@ -299,7 +302,8 @@ impl Objects {
     }
 }
 
-/// Middle of the bounding box in the world of what has this one in mesh space, half its sides along the world's axes, and the radius of the sphere around it.
+/// Transforms a bounding box from mesh space. Returns its centre in the world, half the sides of its bounding
+/// box along the world's axes, and the radius of the sphere around that box.
 pub(crate) fn world_box(center: DVec3, half: DVec3, transform: &GlobalTransform) -> (DVec3, DVec3, f64) {
     let matrix = transform.0.matrix3;
     let half_size =
@@ -332,7 +336,7 @@ impl Object {
         }
     }
 
-    /// Takes new traits, in the census too.
+    /// Sets new traits, and updates the census.
     fn count(&mut self, census: &mut ObjectCensus, traits: ObjectTraits, triangles: usize) {
         let drawn = self.fault.is_none();
         if (self.traits, self.triangles, self.counted) != (traits, triangles, drawn) {
@@ -344,7 +348,7 @@ impl Object {
         }
     }
 
-    /// Leaves the census.
+    /// Removes the object from the census.
     fn leave(&mut self, census: &mut ObjectCensus) {
         if std::mem::take(&mut self.counted) {
             census.remove(&self.traits, self.triangles);

@@ -1,4 +1,5 @@
-//! A planar mirror in the world: its plane, and which part of the light it reflects. Not what is seen in it: that is a view of its own (`mirror_views`).
+//! A planar mirror in the world: its plane, and how much light it reflects. What is visible in it is a view
+//! of its own (`mirror_views`).
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, DVec4, Vec3};
@@ -8,30 +9,33 @@ use lumbre_scene::Medium;
 
 use crate::layout::coefficient;
 
-/// A flat surface that mirrors.
+/// A flat reflective surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PlanarMirror {
-    /// A point p is on its front where the dot product with (p, 1) is positive; in the world, in metres, with a normal of unit length.
+    /// A point p in front of the mirror has a positive dot product of the plane with (p, 1). In the world, in
+    /// metres, with a normal of unit length.
     pub plane: DVec4,
     /// k_r.
     pub mirror: Vec3,
-    /// k_t, where Fresnel's equations divide it; else 0, for all of it passes.
+    /// k_t if Fresnel's equations split it into reflected and transmitted light; otherwise 0, because all of
+    /// it is transmitted.
     pub transmission: Vec3,
     /// Index of refraction.
     pub ior: f32,
-    /// A sheet without an inside.
+    /// A sheet without an interior.
     pub thin: bool,
 }
 
 impl PlanarMirror {
-    /// Of a flat mesh in the world; `None` where its transform has no inverse.
+    /// Creates the mirror of a flat mesh in the world; `None` if its transform has no inverse.
     pub fn new(
         mesh: MeshPlane,
         world_from_mesh: &DAffine3,
         material: &Material,
         medium: Option<&Medium>,
     ) -> Option<Self> {
-        // A plane's normal goes the inverse transposed way, and the front stays the front, whether the transform mirrors or not.
+        // Normals transform by the inverse transpose, and the front stays the front even if the transform
+        // mirrors.
         let normal = world_from_mesh.matrix3.inverse().transpose() * mesh.normal;
         let normal = normal.try_normalize().filter(|normal| normal.is_finite())?;
         let point = world_from_mesh.transform_point3(mesh.point);
@@ -45,12 +49,13 @@ impl PlanarMirror {
         })
     }
 
-    /// The largest part of the light that it can reflect, in any channel.
+    /// Returns the largest fraction of light that it can reflect in any channel.
     pub fn weight(&self) -> f64 {
         f64::from((self.mirror + self.transmission).abs().max_element())
     }
 
-    /// Its plane, turned towards a viewer in this direction from it or at this point, with whether that is its front. `None` from within the plane.
+    /// Returns its plane, turned towards a viewer at a point or in a direction (`w` 0), and whether that is
+    /// its front. `None` if the viewer lies in the plane.
     pub fn facing(&self, viewer: DVec4) -> Option<(DVec4, bool)> {
         let side = self.plane.dot(viewer);
         let turned = if side > 0.0 { self.plane } else { -self.plane };
@@ -61,39 +66,40 @@ impl PlanarMirror {
 /// A mirror in the plane of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MirrorSurface {
-    /// Of its object.
+    /// Slot of its object.
     pub slot: usize,
-    /// What lies behind it is drawn through it where the camera sees it.
+    /// Whether what lies behind it is visible through it in the camera's view.
     pub refracts: bool,
     pub data: MirrorData,
 }
 
-/// `Mirror`: what a surface makes of what it mirrors.
+/// `Mirror` of shaders/mirror.wesl: how a surface reflects what is visible in it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MirrorData {
     /// k_r.
     mirror: Vec3,
-    /// Of the medium behind the surface to that before it.
+    /// Index of refraction of the medium behind the surface relative to that in front of it.
     eta: f32,
     /// k_t.
     transmission: Vec3,
-    /// 1 for a sheet, which both of its faces make brighter.
+    /// 1 for a sheet, whose two faces both reflect.
     thin: f32,
-    /// Unit, towards the viewer.
+    /// Unit vector towards the viewer.
     normal: Vec3,
-    /// 1 where rays of sight are parallel.
+    /// 1 if the rays of the view are parallel.
     parallel: f32,
-    /// What lies behind everything, as radiance.
+    /// Radiance of the background.
     background: Vec3,
     padding: f32,
 }
 
 impl MirrorData {
-    /// Of a mirror whose plane is turned towards the viewer, who may be in front of it or behind, and infinitely far.
+    /// Creates the data of a mirror whose plane faces the viewer. `front` is true if the viewer is in front
+    /// of the mirror, `parallel` if the viewer is at infinity.
     pub fn new(mirror: &PlanarMirror, plane: DVec4, front: bool, parallel: bool, background: Vec3) -> Self {
         let flag = |on: bool| if on { 1.0 } else { 0.0 };
-        // Seen from behind a solid's surface, the viewer is inside.
+        // Behind the surface of a solid body, the viewer is inside the body.
         let inside = !front && !mirror.thin && mirror.ior > 0.0;
         Self {
             mirror: mirror.mirror,
@@ -108,7 +114,7 @@ impl MirrorData {
     }
 }
 
-/// The mirror image of a point or, with `w` 0, of a direction in a plane.
+/// Returns the mirror image in a plane of a point or, with `w` 0, of a direction.
 pub(crate) fn mirror_image(plane: DVec4, point: DVec3, w: f64) -> DVec3 {
     point - 2.0 * plane.dot(point.extend(w)) * plane.truncate()
 }

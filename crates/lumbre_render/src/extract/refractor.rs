@@ -1,4 +1,5 @@
-//! A surface that light passes through: which part of it, how bent and how absorbed. Not what is seen through it: that is the effect `refraction`.
+//! A transmissive surface: how much light passes through it, and how it is refracted and absorbed. What is
+//! visible through it is drawn by the effect `refraction`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -7,7 +8,7 @@ use lumbre_scene::Medium;
 
 use crate::layout::{coefficient, finite};
 
-/// What its material and its medium say of it.
+/// The optical properties from an object's material and medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Refractor {
     /// k_r.
@@ -18,19 +19,19 @@ pub(crate) struct Refractor {
     ior: f32,
     /// σ, per metre.
     absorption: Vec3,
-    /// A sheet without an inside.
+    /// A sheet without an interior.
     pub thin: bool,
-    /// Fresnel's equations divide k_t.
+    /// Whether Fresnel's equations split k_t into reflected and transmitted light.
     fresnel: bool,
 }
 
 impl Refractor {
-    /// Whether more than half of the light passes, in the mean of the channels.
+    /// Returns true if more than half of the light passes, averaged over the channels.
     pub fn lets_most_pass(&self) -> bool {
         self.transmission.element_sum() > 1.5
     }
 
-    /// Of what these components say.
+    /// Creates it from the components of an object.
     pub fn new(material: &Material, medium: Option<&Medium>) -> Self {
         let medium = medium.copied().unwrap_or_default();
         let ior = if material.ior.is_finite() && material.ior > 0.0 { material.ior } else { 1.0 };
@@ -45,14 +46,14 @@ impl Refractor {
     }
 }
 
-/// A surface of a frame that light passes through.
+/// A transmissive surface of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RefractorSurface {
-    /// Of its object.
+    /// Slot of its object.
     pub slot: usize,
-    /// A sheet without an inside.
+    /// A sheet without an interior.
     pub thin: bool,
-    /// Its transform mirrors: its triangles wind the other way.
+    /// Its transform mirrors, so its triangles have the opposite winding.
     pub mirrored: bool,
     pub data: RefractorData,
 }
@@ -78,7 +79,8 @@ impl RefractorData {
     const PARALLEL: u32 = 8;
     const OPEN: u32 = 16;
 
-    /// Of a body in a bounding sphere of this radius, in metres, or a flat surface; before this background, for a viewer who may be infinitely far.
+    /// Creates the data of a body with a bounding sphere of this radius in metres, or of a flat surface.
+    /// `parallel` is true for a viewer at infinity; `background` is the background's radiance.
     pub fn new(refractor: &Refractor, (radius, flat): (f64, bool), parallel: bool, background: Vec3) -> Self {
         let flags = [
             (refractor.thin, Self::THIN),
@@ -98,7 +100,7 @@ impl RefractorData {
         }
     }
 
-    /// The same of a flat surface whose mirror image has a picture of its own.
+    /// Returns the same data for a flat surface whose reflection has a picture of its own.
     pub fn pictured(self) -> Self {
         Self { flags: self.flags | Self::PICTURED, ..self }
     }

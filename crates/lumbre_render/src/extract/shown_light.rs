@@ -1,11 +1,13 @@
-//! A light as the frames of a scene show it: ended where it brings too little, without a size where shadows have no penumbra. Not its records, and not its light in bakes.
+//! A light as the frames of a scene show it: its range is limited where it becomes too dim, and it has a size
+//! only if shadows have a penumbra. Light records and bakes are not handled here.
 
 use std::borrow::Cow;
 
 use lumbre_optics::{Light, LightKind};
 use lumbre_scene::{FrameSettings, ShadowFilter};
 
-/// The light with a range by the threshold, if that is nearer than its own, and with a size only for soft shadows. A clone where something differs.
+/// Returns the light with the range that follows from the threshold, if that is less than its own, and with a
+/// size only for soft shadows. The light is cloned only if something differs.
 pub(super) fn shown_light<'a>(light: &'a Light, settings: &FrameSettings) -> Cow<'a, Light> {
     let mut shown = Cow::Borrowed(light);
     let range = range(light, settings.light_threshold);
@@ -20,15 +22,16 @@ pub(super) fn shown_light<'a>(light: &'a Light, settings: &FrameSettings) -> Cow
     shown
 }
 
-/// Metres to where the strongest channel falls to the threshold on a white surface that faces the light; infinite where it never does or nothing is asked for.
+/// Returns the distance in metres at which the strongest channel falls to the threshold on a white surface
+/// that faces the light; infinity if it never does or if there is no threshold.
 fn range(light: &Light, threshold: f32) -> f32 {
     let strongest = light.ambient.max(light.diffuse).max(light.specular).max_element();
-    // Neither a threshold of NaN nor a black light ends anything.
+    // Neither a threshold of NaN nor a black light limits the range.
     if light.kind != LightKind::Point || !(threshold > 0.0 && strongest > 0.0) {
         return f32::INFINITY;
     }
     let reach = light.attenuation.reach(f64::from(threshold) / f64::from(strongest));
-    // A range is more than 0: what ends at once lights a hair's breadth.
+    // A range must be positive, so a light that ends at once gets a tiny range.
     (reach as f32).max(1e-6)
 }
 
@@ -53,7 +56,7 @@ mod tests {
         assert_eq!(ended(&lamp, f32::NAN), f32::INFINITY);
         assert_eq!(ended(&lamp.clone().with_range(3.0), 0.01), 3.0);
         assert_eq!(ended(&Light { attenuation: Attenuation::NONE, ..lamp.clone() }, 0.01), f32::INFINITY);
-        // Nowhere as bright as the threshold.
+        // The light is nowhere as bright as the threshold.
         let faint = Attenuation { constant: 1.0, ..Attenuation::INVERSE_SQUARE };
         assert!(ended(&Light { attenuation: faint, ..lamp }, 5.0) < 1e-3);
         assert_eq!(ended(&Light::directional(Vec3::ONE), 5.0), f32::INFINITY);

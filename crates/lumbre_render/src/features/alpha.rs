@@ -1,4 +1,4 @@
-//! Coverage: what a mask cuts out, and what is blended.
+//! Coverage: alpha masks and alpha blending.
 
 use lumbre_optics::AlphaMode;
 

@@ -1,4 +1,4 @@
-//! Fog and depth cueing: the mode that the scene asks for.
+//! Fog and depth cueing, in the mode that the scene asks for.
 
 use lumbre_optics::FogMode;
 
@@ -11,7 +11,7 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     variant.set(fog_feature(&fog.mode), true);
 }
 
-/// The feature of a mode, beside that of any fog.
+/// Returns the feature of a mode, which is set in addition to that of any fog.
 pub(crate) fn fog_feature(mode: &FogMode) -> Feature {
     match mode {
         FogMode::Linear { .. } => Feature::FogLinear,
@@ -21,7 +21,7 @@ pub(crate) fn fog_feature(mode: &FogMode) -> Feature {
     }
 }
 
-/// Fog in shaders that know no other feature, and read tables from buffers.
+/// Returns the fog flags of shaders that have no other features and read tables from buffers.
 pub(crate) fn fog_flags(fog: Option<Feature>) -> Vec<(&'static str, bool)> {
     let features = [
         Feature::Fog,

@@ -1,4 +1,4 @@
-//! The baked light of what has no lightmap: where there is an irradiance volume and the frame uses it.
+//! Baked light of objects without a lightmap, if there is an irradiance volume and the frame uses it.
 
 use super::Subject;
 use crate::shader::{Feature, Variant};

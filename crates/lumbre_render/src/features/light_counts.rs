@@ -1,4 +1,5 @@
-//! Counts of lights, where a frame is measured so and the device can: in the stage that evaluates the lights.
+//! Counts of lights, in frames that are measured this way and on devices that can count, in the stage that
+//! evaluates the lights.
 
 use super::Subject;
 use crate::shader::{Feature, Variant};

@@ -1,4 +1,4 @@
-//! The baked light of a surface, where it has a lightmap and the frame uses them.
+//! Baked light of surfaces with a lightmap, if the frame uses lightmaps.
 
 use super::Subject;
 use crate::shader::{Feature, Variant};

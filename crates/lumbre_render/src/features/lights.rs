@@ -1,4 +1,4 @@
-//! Lights: the kinds that a loop has to know, and by which lists it finds them.
+//! Lights: the kinds that the light loop has to support, and the lists that it finds them by.
 
 use lumbre_optics::Shading;
 
@@ -11,7 +11,8 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     let clustered = frame.clustered && subject.lit && subject.shading == Shading::Phong;
     let LightSet { every, unbounded, inverse_square, ranged, .. } = &frame.lights;
     let listed = if clustered { unbounded } else { every };
-    // Of a baked light the highlight is left, if the material has one, and what the light adds to the ambient term.
+    // On a lightmapped surface, a baked light still adds its highlight, if the material has one, and its
+    // ambient term.
     let lightmapped = frame.lightmaps && object.is_lit_by_lightmap();
     let left =
         |of: &LightCounts| of.all > of.dynamic && (!lightmapped || object.specular || of.static_ambient);

@@ -1,5 +1,6 @@
-//! Features: what an object, its material, the lights and the frame call for within the shaders, one file for each subject with the reason for each of its features. A
-//! shader variant holds these and nothing else; what excludes what is `Variant::reduced`. Passes are not chosen here: those are `effects`.
+//! Features: what an object, its material, the lights and the frame need within the shaders, with one file
+//! for each subject. A shader variant has these features and no others; features that make others unnecessary
+//! are handled in `Variant::reduced`. Passes are chosen in `effects`.
 
 mod alpha;
 mod display;
@@ -31,30 +32,30 @@ pub(crate) struct FrameFeatures {
     pub shading: Option<Shading>,
     pub reflection: Option<ReflectionModel>,
     pub lightmaps: bool,
-    /// Surfaces that light passes through have a pass of their own.
+    /// Whether transmissive surfaces have a pass of their own.
     pub refraction: bool,
-    /// What has no lightmap is lit by an irradiance volume.
+    /// Whether objects without a lightmap are lit by an irradiance volume.
     pub irradiance_volumes: bool,
     pub specular_antialiasing: bool,
     pub clamp: bool,
-    /// The frame is kept in half floats.
+    /// Whether the frame is kept in half floats.
     pub half: bool,
     pub lights: LightSet,
-    /// A surface reads one texel of a shadow map.
+    /// Whether a surface reads a single texel of a shadow map.
     pub hard_shadows: bool,
-    /// Fragments find lights with a range by clusters.
+    /// Whether fragments find lights with a range by clusters.
     pub clustered: bool,
-    /// Colours are made as the target holds them.
+    /// Set if the lit shaders write the target's final values.
     pub display: Option<DisplayVariant>,
-    /// What opaque surfaces are lit from that are shaded deferred, as far as they can be.
+    /// The contents of the G-buffer, if the frame is shaded deferred.
     pub g_buffer: Option<GBufferContents>,
-    /// Where lights are counted: nowhere, unless the frame is measured so.
+    /// The stages in which lights are counted: none, unless the frame is measured this way.
     pub counted: CountedStages,
 }
 
 impl FrameFeatures {
-    /// What options and settings come to for a frame of such a scene and these lights that ends so in a target of this format; `half` if its radiance is kept in half
-    /// floats.
+    /// Derives the features from options and settings, for a frame with these facts and lights and this
+    /// ending, in a target of this format. `half` is true if its radiance is kept in half floats.
     pub fn new(
         options: &FrameOptions,
         settings: &SceneSettings,
@@ -81,24 +82,24 @@ impl FrameFeatures {
     }
 }
 
-/// An object in a frame, as the subjects are asked about it.
+/// An object in a frame, for which the features of each subject are chosen.
 struct Subject<'a> {
     object: &'a ObjectTraits,
     settings: &'a SceneSettings,
     frame: &'a FrameFeatures,
     shading: Shading,
-    /// Takes light at all.
+    /// Whether the object is lit at all.
     lit: bool,
 }
 
 impl Subject<'_> {
-    /// Whether light is evaluated at vertices.
+    /// Returns true if light is evaluated at vertices.
     fn is_lit_per_vertex(&self) -> bool {
         self.lit && self.shading != Shading::Phong
     }
 }
 
-/// How often an object asks to be lit in such a frame; by need perhaps.
+/// Returns the shading that an object asks for in such a frame, which may be `Shading::Auto`.
 pub(crate) fn asked_shading(
     object: &ObjectTraits,
     settings: &SceneSettings,
@@ -107,7 +108,7 @@ pub(crate) fn asked_shading(
     frame.shading.or(object.shading).unwrap_or(settings.shading)
 }
 
-/// The specular model of an object in such a frame.
+/// Returns the specular model of an object in such a frame.
 pub(crate) fn asked_reflection(
     object: &ObjectTraits,
     settings: &SceneSettings,
@@ -116,7 +117,8 @@ pub(crate) fn asked_reflection(
     frame.reflection.or(object.reflection).unwrap_or(settings.reflection)
 }
 
-/// The variant that draws an object in such a frame, lit so often, which is no longer by need.
+/// Returns the variant that draws an object in such a frame with this shading, which must not be
+/// `Shading::Auto`.
 pub(crate) fn variant(
     object: &ObjectTraits,
     shading: Shading,

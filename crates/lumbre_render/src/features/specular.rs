@@ -1,4 +1,5 @@
-//! Highlights: whether there is one, how sharp, of which distribution and Fresnel reflectance, and whether it keeps its energy.
+//! Highlights: whether there is one, how sharp it is, with which distribution and Fresnel reflectance, and
+//! whether it is normalized.
 
 use lumbre_optics::{Distribution, Fresnel};
 

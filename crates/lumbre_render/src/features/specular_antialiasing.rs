@@ -1,4 +1,5 @@
-//! Highlights as a pixel shows them, where the frame asks for it: only one that is evaluated per fragment can fall between pixels.
+//! Filtering of highlights within a pixel, if the frame asks for it. Only highlights that are evaluated per
+//! fragment can alias.
 
 use super::Subject;
 use crate::shader::{Feature, Variant};

@@ -1,4 +1,4 @@
-//! The textures of a material, and the sets of coordinates that they and the lightmap read.
+//! The textures of a material, and the sets of texture coordinates that they and the lightmap read.
 
 use lumbre_scene::ObjectTraits;
 
@@ -10,12 +10,12 @@ pub(super) fn call(subject: &Subject<'_>, variant: &mut Variant) {
     for (feature, bound) in texture_sets::features(subject.object.texture_mask) {
         variant.set(feature, bound);
     }
-    // Light that vertices took is modulated per fragment.
+    // Light from the vertex stage is modulated by the texture per fragment.
     let modulated = subject.is_lit_per_vertex() && variant.has(Feature::BaseColorTexture);
     variant.set(Feature::Modulated, modulated);
 }
 
-/// The variant with the coordinates of the textures that are left in it.
+/// Returns the variant with the coordinates of its remaining textures.
 pub(super) fn coordinates(object: &ObjectTraits, mut variant: Variant) -> Variant {
     let read = |second: bool| {
         let slots = (0..).zip(texture_sets::features(object.texture_mask));

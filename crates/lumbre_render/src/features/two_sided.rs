@@ -1,4 +1,4 @@
-//! Backs that are lit by themselves: where the material has two sides and the scene lights both.
+//! Separate lighting of back faces, if the material is double-sided and the scene lights both sides.
 
 use super::Subject;
 use crate::shader::{Feature, Variant};

@@ -1,5 +1,6 @@
-//! The irradiance volumes of a World: which can be used, which of them lights an object, and their copies on the GPU, made where a frame first calls for them. How a
-//! surface reads one is shaders/irradiance_volume.wesl; that it does is decided in `features`.
+//! The irradiance volumes of a World: which ones are usable, which of them lights an object, and their copies
+//! on the GPU, created when a frame first needs them. How a surface reads a volume is in
+//! shaders/irradiance_volume.wesl; whether it does is decided in `features`.
 
 mod probe_texture;
 
@@ -22,20 +23,20 @@ use crate::Gpu;
 type Found<'a> = (Entity, Ref<'a, IrradianceVolume>, Option<&'a GlobalTransform>, Option<&'a Name>);
 type FoundQuery<'w, 's> = Query<'w, 's, Found<'static>>;
 
-/// Those of the World that was drawn last.
+/// The volumes of the World that was drawn last.
 #[derive(Default)]
 pub(crate) struct IrradianceVolumes {
     state: Option<(WorldId, SystemState<FoundQuery<'static, 'static>>)>,
     known: HashMap<Entity, Volume>,
-    /// Those that can be used, in the order of their entities.
+    /// The usable volumes in the order of their entities.
     usable: Vec<Usable>,
     uploaded: u64,
 }
 
 struct Volume {
-    /// Of its numbers, wherever it stands.
+    /// What is wrong with its data, regardless of its transform.
     fault: Option<IrradianceVolumeError>,
-    /// Once a frame has called for it.
+    /// Created when a frame first needs it.
     texture: Option<ProbeTexture>,
     seen: bool,
 }
@@ -47,7 +48,7 @@ struct Usable {
 }
 
 impl IrradianceVolumes {
-    /// Finds the volumes of a World; names those that cannot be used.
+    /// Finds the volumes of a World, and adds messages about unusable ones to `left_out`.
     pub fn extract(&mut self, world: &mut World, left_out: &mut Vec<String>) {
         let id = world.id();
         let mut state = match self.state.take() {
@@ -59,7 +60,7 @@ impl IrradianceVolumes {
         };
         self.usable.clear();
         self.known.values_mut().for_each(|volume| volume.seen = false);
-        // A query is there in every World.
+        // A query cannot fail in any World.
         if let Ok(query) = state.get(world) {
             for (entity, volume, transform, name) in &query {
                 if let Err(fault) = self.take(entity, &volume, transform) {
@@ -73,7 +74,7 @@ impl IrradianceVolumes {
         self.state = Some((id, state));
     }
 
-    /// Notes a volume among those that are known, and those that can be used if it can.
+    /// Registers a volume, and adds it to the usable ones if it is valid.
     fn take(
         &mut self,
         entity: Entity,
@@ -94,12 +95,12 @@ impl IrradianceVolumes {
         Ok(())
     }
 
-    /// How many can be used.
+    /// Returns the number of usable volumes.
     pub fn len(&self) -> usize {
         self.usable.len()
     }
 
-    /// Brings those that can be used to the GPU, in frame space from this origin.
+    /// Uploads the usable volumes, placed in the frame space with this origin.
     pub fn upload(&mut self, world: &World, gpu: &Gpu, layout: &wgpu::BindGroupLayout, origin: DVec3) {
         for usable in &mut self.usable {
             let volume = world.get::<IrradianceVolume>(usable.entity);
@@ -112,12 +113,12 @@ impl IrradianceVolumes {
         }
     }
 
-    /// Bytes uploaded since the last call.
+    /// Returns the bytes uploaded since the last call.
     pub fn take_uploaded(&mut self) -> u64 {
         std::mem::take(&mut self.uploaded)
     }
 
-    /// The group of the volume that lights an object with this middle.
+    /// Returns the group of the volume that lights an object with this centre.
     pub fn around(&self, center: DVec3) -> Option<&Arc<wgpu::BindGroup>> {
         nearest_volume(&self.usable, |usable| &usable.place, center)?.group.as_ref()
     }

@@ -1,4 +1,5 @@
-//! An irradiance volume on the GPU: its sides in one texture, its place in a uniform, and their group. Layout twin: shaders/irradiance_volume.wesl.
+//! An irradiance volume on the GPU: the sides of its ambient cubes in one texture, its placement in a
+//! uniform, and their bind group. Layout twin: shaders/irradiance_volume.wesl.
 
 use std::sync::Arc;
 
@@ -9,7 +10,8 @@ use lumbre_scene::{IrradianceVolume, VolumePlace};
 
 use crate::Gpu;
 
-/// The largest offset that shaders get, in cells: with cells of a nanometre and points anywhere, sums stay finite.
+/// The largest offset for shaders, in cells. It keeps sums finite even with cells of a nanometre and distant
+/// points.
 const FARTHEST: f64 = 1e30;
 
 /// `ProbeGrid`.
@@ -24,7 +26,7 @@ struct ProbeGridData {
     padding_3: f32,
 }
 
-/// A volume as shaders read it.
+/// A volume in the form that shaders read.
 pub(super) struct ProbeTexture {
     pub group: Arc<wgpu::BindGroup>,
     grid: wgpu::Buffer,
@@ -32,7 +34,7 @@ pub(super) struct ProbeTexture {
 }
 
 impl ProbeTexture {
-    /// Uploads a valid volume; its place follows.
+    /// Uploads a valid volume. Its placement is set by `stand`.
     pub fn new(
         gpu: &Gpu,
         layout: &wgpu::BindGroupLayout,
@@ -57,7 +59,7 @@ impl ProbeTexture {
         Self { group: Arc::new(group), grid, written: None }
     }
 
-    /// Puts it in its place, seen from the origin of frame space.
+    /// Writes its placement relative to the origin of frame space.
     pub fn stand(&mut self, gpu: &Gpu, place: &VolumePlace, origin: DVec3, uploaded: &mut u64) {
         let offset = place.seen_from(origin).offset.clamp(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
         let data = ProbeGridData {
@@ -74,7 +76,8 @@ impl ProbeTexture {
     }
 }
 
-/// Light times openness, and openness: of (Rx, 2 Ry, 3 Rz) texels, as `probe_grid_texel` finds them.
+/// Returns texels of (light times openness, openness) for (Rx, 2 Ry, 3 Rz) texels, in the order that
+/// `probe_grid_texel` expects.
 fn texels(volume: &IrradianceVolume) -> Vec<[f16; 4]> {
     let [width, height, depth] = volume.resolution.to_array().map(|side| side as usize);
     let mut texels = Vec::with_capacity(6 * volume.cubes.len());
@@ -94,7 +97,7 @@ fn texels(volume: &IrradianceVolume) -> Vec<[f16; 4]> {
     texels
 }
 
-/// The layout of the group that surfaces read a volume from.
+/// Creates the layout of the group that surfaces read a volume from.
 pub(crate) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
@@ -119,12 +122,12 @@ pub(crate) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     })
 }
 
-/// A group of a volume of one cell that nothing has been written to.
+/// Creates the group of a volume with one cell and no data.
 pub(crate) fn empty(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
     bind(gpu, layout, UVec3::ONE).0
 }
 
-/// A group, the texture in it, and the uniform.
+/// Creates a bind group together with its texture and its uniform.
 fn bind(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,

@@ -1,4 +1,4 @@
-//! From WESL modules and feature flags to a wgpu shader module, errors included.
+//! Compiles WESL modules with feature flags to a wgpu shader module, and reports errors.
 
 use lumbre_shaders::to_wgsl;
 
@@ -29,8 +29,9 @@ pub(crate) fn compile(
     }
 }
 
-/// WGSL whose fragments are tested for depth before they run, as those are that write no buffer: they would run where something nearer hides them, and be counted. What discards fragments
-/// is tested afterwards, since a depth that is written before stays.
+/// Returns WGSL with a forced depth test before each fragment. Without it, fragment shaders that write a
+/// buffer are tested after they have run, so hidden fragments would be counted. It must not be used in
+/// shaders that discard fragments, because an early test has already written the depth.
 fn tested_early(source: &str) -> String {
     source.replace("@fragment", "@early_depth_test(force) @fragment")
 }
@@ -44,7 +45,7 @@ mod tests {
     use super::{tested_early, to_wgsl};
     use crate::shader::{Feature, Variant};
 
-    /// The WGSL of a variant, which naga accepts.
+    /// Returns the WGSL of a variant, after naga has validated it.
     fn valid(variant: &Variant) -> Arc<str> {
         let mut source = to_wgsl("forward", &variant.flags(false)).unwrap();
         if variant.has(Feature::CountLights) {
@@ -74,7 +75,7 @@ mod tests {
 
     #[test]
     fn every_feature_makes_a_valid_shader_in_every_shading() {
-        // What a feature needs beside itself.
+        // Other features that a feature requires.
         let with = |feature: Feature| match feature {
             Feature::BaseColorTexture => vec![Feature::Uv0, Feature::Modulated],
             Feature::EmissiveTexture
@@ -145,14 +146,15 @@ mod tests {
         for word in ["frame_lights", "light_list", "safe_normalize", "for ("] {
             assert!(!unlit.contains(word), "{word} is left in:\n{unlit}");
         }
-        // Polygons alone: nothing of the other kinds is left; all together: both are there.
+        // With polygon lights alone, nothing of the other kinds is left; with another kind, both are there.
         let polygons = [Feature::Lit, Feature::DynamicLights, Feature::StaticLights, Feature::PolygonLights];
         let alone = valid(&variant(Shading::Phong, &polygons));
         assert!(alone.contains("polygon_form_factor") && !alone.contains("evaluate_light("), "{alone}");
         let together =
             valid(&variant(Shading::Phong, &[polygons.as_slice(), &[Feature::PointLights]].concat()));
         assert!(together.contains("polygon_form_factor") && together.contains("attenuate"), "{together}");
-        // Clusters alone: of inverse-square lights nothing is asked that they do not have; with others, all is there.
+        // With clusters alone, inverse-square lights are evaluated without anything that they do not have;
+        // with other lights, all of that is there.
         let clusters = [Feature::Lit, Feature::InverseSquareClusters, Feature::UniformLights];
         let lean = valid(&variant(Shading::Phong, &clusters));
         assert!(lean.contains("cluster_lists") && lean.contains("attenuate_quadratic"), "{lean}");
@@ -163,7 +165,7 @@ mod tests {
         let all = valid(&variant(Shading::Phong, &[clusters.as_slice(), &lightmapped].concat()));
         assert!(all.contains("spot_factor"), "{all}");
         assert!(all.contains("first_baked"), "baked lights are told apart:\n{all}");
-        // Shadows of one kind of light know nothing of the others'.
+        // Shadows of one kind of light contain nothing of the other kinds.
         let spots = valid(&variant(
             Shading::Phong,
             &[LIT.as_slice(), &[Feature::SpotLights, Feature::Shadows]].concat(),
@@ -174,7 +176,8 @@ mod tests {
         }
         let dark = valid(&variant(Shading::Phong, &[Feature::Lit]));
         assert!(!dark.contains("for ("), "a scene without lights loops:\n{dark}");
-        // An irradiance volume by itself: at its rate, on the normals of a map, without a loop or a highlight.
+        // An irradiance volume alone is evaluated at the rate of the shading, with the normals of a normal
+        // map, without a loop or a highlight.
         let by_volume = [Feature::Lit, Feature::IrradianceVolume, Feature::Uv0, Feature::NormalTexture];
         for shading in Shading::ALL {
             let variant = variant(*shading, &by_volume);

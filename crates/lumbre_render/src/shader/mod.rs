@@ -1,4 +1,5 @@
-//! Shaders: the embedded sources, the variants that a frame calls for, and their compilation. Not pipelines: those are `pipelines`.
+//! Shaders: the variants that a frame needs, and their compilation from the embedded sources. Pipelines are
+//! created in `pipelines`.
 
 mod compile;
 mod variant;

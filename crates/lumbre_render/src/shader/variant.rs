@@ -1,4 +1,4 @@
-//! Shader variants: the set of features that one draw calls for. What is not in the set is not in the shader.
+//! Shader variants: the set of features that a draw needs. What is not in the set is not in the shader.
 
 use lumbre_optics::{ReflectionModel, Shading};
 
@@ -6,7 +6,7 @@ use crate::Display;
 
 macro_rules! features {
     ($($(#[$doc:meta])* $name:ident = $bit:literal => $word:literal),+ $(,)?) => {
-        /// One thing that a shader may or may not do.
+        /// A feature that a shader may or may not have.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u64)]
         pub enum Feature {
@@ -17,7 +17,7 @@ macro_rules! features {
             /// Every feature.
             pub const ALL: &'static [Self] = &[$(Self::$name),+];
 
-            /// The name in the shaders.
+            /// Returns its name in the shaders.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$name => $word),+ }
             }
@@ -40,11 +40,11 @@ features! {
     MetallicRoughnessTexture = 5 => "METALLIC_ROUGHNESS_TEXTURE",
     /// Writes alpha.
     Alpha = 6 => "ALPHA",
-    /// Discards below the alpha cutoff.
+    /// Discards fragments below the alpha cutoff.
     AlphaMask = 7 => "ALPHA_MASK",
     /// Samples a lightmap.
     Lightmap = 8 => "LIGHTMAP",
-    /// Lights the back side by itself.
+    /// Lights back faces with their own side of the material.
     TwoSided = 9 => "TWO_SIDED",
     /// Is lit at all.
     Lit = 10 => "LIT",
@@ -52,13 +52,13 @@ features! {
     DynamicLights = 11 => "DYNAMIC_LIGHTS",
     /// Loops over baked lights.
     StaticLights = 12 => "STATIC_LIGHTS",
-    /// Knows directional lights.
+    /// Supports directional lights.
     DirectionalLights = 13 => "DIRECTIONAL_LIGHTS",
-    /// Knows point lights.
+    /// Supports point lights.
     PointLights = 14 => "POINT_LIGHTS",
-    /// Knows spot cones.
+    /// Supports spot cones.
     SpotLights = 15 => "SPOT_LIGHTS",
-    /// The viewer is near.
+    /// The viewer is at a finite distance.
     LocalViewer = 16 => "LOCAL_VIEWER",
     /// Linear fog.
     FogLinear = 17 => "FOG_LINEAR",
@@ -74,25 +74,25 @@ features! {
     Clamp = 22 => "CLAMP",
     /// Clamps vertex colours before interpolation.
     ClampVertices = 23 => "CLAMP_VERTICES",
-    /// Vertex light is modulated per fragment, so that specular light travels apart.
+    /// Light from the vertex stage is modulated per fragment, so specular light is passed on separately.
     Modulated = 24 => "MODULATED",
-    /// Takes the precise form of highlights with exponents above 256.
+    /// Uses the precise form of highlights, for exponents above 256.
     SharpHighlights = 25 => "SHARP_HIGHLIGHTS",
-    /// Widens highlights by what the normals change within a pixel.
+    /// Widens highlights by how much the normals change within a pixel.
     SpecularAntialiasing = 26 => "SPECULAR_ANTIALIASING",
-    /// Knows the faces of emissive objects as lights.
+    /// Supports the faces of emissive objects as lights.
     PolygonLights = 27 => "POLYGON_LIGHTS",
     /// Torrance-Sparrow with a distribution or a Fresnel reflectance other than the defaults.
     Microfacets = 28 => "MICROFACETS",
-    /// Microfacets spread as a power of the cosine.
+    /// The microfacet distribution is a power of the cosine.
     DistributionCosinePower = 29 => "DISTRIBUTION_COSINE_POWER",
-    /// Microfacets spread as a Gaussian.
+    /// The microfacet distribution is a Gaussian.
     DistributionGaussian = 30 => "DISTRIBUTION_GAUSSIAN",
-    /// Microfacets of a conductor.
+    /// The microfacets are those of a conductor.
     FresnelConductor = 31 => "FRESNEL_CONDUCTOR",
-    /// Microfacets that reflect k_s at normal incidence.
+    /// The microfacets reflect k_s at normal incidence.
     FresnelNormalReflectance = 32 => "FRESNEL_NORMAL_REFLECTANCE",
-    /// Writes into half floats: what is brighter than the largest of them is as bright as that.
+    /// Writes half floats, and clamps to the largest one.
     HalfRange = 33 => "HALF_RANGE",
     /// Has no highlight: every specular coefficient is 0.
     Matt = 34 => "MATT",
@@ -100,7 +100,7 @@ features! {
     Clusters = 35 => "CLUSTERS",
     /// Loops over a cluster's inverse-square lights.
     InverseSquareClusters = 36 => "INVERSE_SQUARE_CLUSTERS",
-    /// These stand in a uniform buffer: there are no more than it holds.
+    /// Reads these lights from a uniform buffer, which has room for all of them.
     UniformLights = 37 => "UNIFORM_LIGHTS",
     /// Loops over a cluster's other lights with a range.
     RangedClusters = 38 => "RANGED_CLUSTERS",
@@ -108,29 +108,29 @@ features! {
     NormalTexture = 39 => "NORMAL_TEXTURE",
     /// Samples an occlusion texture.
     OcclusionTexture = 40 => "OCCLUSION_TEXTURE",
-    /// Its highlight keeps its energy, as glTF's do.
+    /// Its highlight is normalized, like glTF's.
     EnergyKeeping = 41 => "ENERGY_KEEPING",
-    /// Writes the numbers of the target itself: the frame has no display pass.
+    /// Writes the target's final values; the frame has no display pass.
     Display = 42 => "DISPLAY",
-    /// Shows people what they would see: a tone curve.
+    /// Applies a tone curve, for viewing.
     DisplaySrgb = 43 => "DISPLAY_SRGB",
-    /// Shows OpenGL's clamp.
+    /// Applies OpenGL's clamp.
     DisplayClamp = 44 => "DISPLAY_CLAMP",
-    /// Encodes sRGB, as the target's format does not.
+    /// Encodes sRGB, because the target's format does not.
     EncodeSrgb = 45 => "ENCODE_SRGB",
-    /// Decodes sRGB, as the target's format encodes what is to be stored as it is.
+    /// Decodes sRGB, because the target's format would encode values that are to be stored unchanged.
     DecodeSrgb = 46 => "DECODE_SRGB",
     /// Reads shadow maps.
     Shadows = 47 => "SHADOWS",
-    /// Knows the six views of a point light.
+    /// Supports the six views of a point light.
     ShadowCubes = 48 => "SHADOW_CUBES",
-    /// Knows the cascades of a directional light.
+    /// Supports the cascades of a directional light.
     ShadowCascades = 49 => "SHADOW_CASCADES",
-    /// Filters shadows by the size of a light.
+    /// Filters shadows by the size of the light.
     SoftShadows = 50 => "SOFT_SHADOWS",
-    /// Loops over lights of any kind, and so needs points and normals.
+    /// Loops over lights of any kind, so it needs points and normals.
     Lights = 51 => "LIGHTS",
-    /// Has one colour all over, which the vertex stage makes.
+    /// Has the same colour everywhere, which the vertex stage computes.
     Constant = 52 => "CONSTANT",
     /// Some of a cluster's inverse-square lights have a cone.
     InverseSquareSpots = 53 => "INVERSE_SQUARE_SPOTS",
@@ -138,20 +138,20 @@ features! {
     IrradianceVolume = 54 => "IRRADIANCE_VOLUME",
     /// Counts the lights that it tests and those that contribute.
     CountLights = 55 => "COUNT_LIGHTS",
-    /// Reads one texel of a shadow map.
+    /// Reads a single texel of a shadow map.
     HardShadows = 56 => "HARD_SHADOWS",
-    /// Draws a shape into the G-buffer.
+    /// Draws a surface into the G-buffer.
     GBuffer = 57 => "G_BUFFER",
     /// The G-buffer has details.
     GBufferDetails = 58 => "G_BUFFER_DETAILS",
-    /// Lights what is in the G-buffer.
+    /// Lights the surfaces in the G-buffer.
     Deferred = 59 => "DEFERRED",
 }
 
-/// What shaders ask about that read the tables of a frame: whether these are textures.
+/// The feature flag of shaders that read the tables of a frame: whether the tables are textures.
 pub(crate) const TABLES_IN_TEXTURES: &str = "TABLES_IN_TEXTURES";
 
-/// Features that the frame, its lights and their lists decide on, and not a material alone.
+/// Features that are decided by the frame, its lights and their lists, not by a material alone.
 const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::IrradianceVolume as u64
     | Feature::Lit as u64
@@ -189,7 +189,7 @@ const OF_THE_FRAME: u64 = Feature::Lightmap as u64
     | Feature::GBufferDetails as u64
     | Feature::Deferred as u64;
 
-/// Features that make a colour differ from place to place on a surface, or from its front to its back.
+/// Features that make the colour of a surface vary over it, or between its front and its back.
 const VARYING: u64 = Feature::Lights as u64
     | Feature::Lightmap as u64
     | Feature::IrradianceVolume as u64
@@ -202,7 +202,7 @@ const VARYING: u64 = Feature::Lights as u64
     | Feature::TwoSided as u64
     | Feature::Fog as u64;
 
-/// A variant of the shaders of lit surfaces: of the forward shader, or of those that shade deferred.
+/// A variant of the shaders of lit surfaces: of the forward shader, or of those for deferred shading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Rate of evaluation.
@@ -213,7 +213,7 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// No features yet.
+    /// Creates a variant without features.
     pub fn new(shading: Shading, reflection: ReflectionModel) -> Self {
         Self { shading, reflection, bits: 0 }
     }
@@ -225,23 +225,23 @@ impl Variant {
         }
     }
 
-    /// The variant without these features.
+    /// Returns the variant without these features.
     pub(crate) fn without(mut self, features: &[Feature]) -> Self {
         features.iter().for_each(|feature| self.bits &= !(*feature as u64));
         self
     }
 
-    /// Whether a lightmap is bound: into the G-buffer go its coordinates alone.
+    /// Returns true if a lightmap is bound. The geometry pass stores only its coordinates in the G-buffer.
     pub(crate) fn samples_lightmap(&self) -> bool {
         self.has(Feature::Lightmap) && !self.has(Feature::GBuffer)
     }
 
-    /// How many textures it draws into.
+    /// Returns the number of textures that it draws into.
     pub(crate) fn targets(&self) -> usize {
         if self.has(Feature::GBuffer) && self.has(Feature::GBufferDetails) { 2 } else { 1 }
     }
 
-    /// The shader module that it is a variant of.
+    /// Returns the shader module that it is a variant of.
     pub(crate) fn module(&self) -> &'static str {
         match (self.has(Feature::GBuffer), self.has(Feature::Deferred)) {
             (true, _) => "g_buffer",
@@ -250,26 +250,27 @@ impl Variant {
         }
     }
 
-    /// Whether the feature is in it.
+    /// Returns true if it has the feature.
     pub fn has(&self, feature: Feature) -> bool {
         self.bits & feature as u64 != 0
     }
 
-    /// Whether both take the same light by the same lists, and write the same numbers: what is left to differ in is the material's own.
+    /// Returns true if both use the same light from the same lists and write the same kind of values. They
+    /// can only differ in what the material alone decides.
     pub(crate) fn is_lit_as(&self, other: &Self) -> bool {
         (self.bits ^ other.bits) & OF_THE_FRAME == 0 && self.shading == other.shading
     }
 
-    /// In how much two variants differ.
+    /// Returns a measure of how much two variants differ, for comparing candidates.
     pub(crate) fn differences(&self, other: &Self) -> (u32, bool, u64) {
         let differ = self.bits ^ other.bits;
         (differ.count_ones(), self.reflection != other.reflection, differ)
     }
 
-    /// The variant with everything that cannot matter taken out, so that fewer pipelines are made.
+    /// Returns the variant without features that have no effect, so that fewer pipelines are created.
     pub fn reduced(mut self) -> Self {
         if !self.has(Feature::Lit) {
-            // Unlit: neither lights nor normals, whatever the technique.
+            // An unlit surface needs neither lights nor normals, whatever its shading.
             let keep = !(Feature::DynamicLights as u64
                 | Feature::StaticLights as u64
                 | Feature::InverseSquareClusters as u64
@@ -285,7 +286,7 @@ impl Variant {
             (self.shading, self.reflection) = (Shading::Flat, ReflectionModel::Phong);
         }
         if self.shading != Shading::Phong {
-            // Nothing is lit in a pixel, and no vertex is in a cluster.
+            // Light is not evaluated per fragment, and vertices do not use clusters.
             self.bits &= !(Feature::SpecularAntialiasing as u64
                 | Feature::NormalTexture as u64
                 | Feature::InverseSquareClusters as u64
@@ -299,7 +300,7 @@ impl Variant {
         }
         let listed = self.has(Feature::DynamicLights) || self.has(Feature::StaticLights);
         if !listed && !self.has(Feature::RangedClusters) {
-            // What is left has kinds of its own.
+            // The remaining inverse-square lights need no kinds.
             self.bits &= !(Feature::DirectionalLights as u64
                 | Feature::PointLights as u64
                 | Feature::SpotLights as u64
@@ -316,7 +317,7 @@ impl Variant {
         if !listed && !clusters {
             let by_volume = self.has(Feature::IrradianceVolume);
             if self.has(Feature::Lit) && !self.has(Feature::ClampVertices) && !by_volume {
-                // How often nothing is evaluated makes no difference.
+                // Without lights the rate of evaluation makes no difference.
                 self.shading = Shading::Phong;
                 self.bits &= !(Feature::Modulated as u64);
             }
@@ -327,7 +328,7 @@ impl Variant {
                 | Feature::CountLights as u64
                 | Feature::Matt as u64);
             if by_volume {
-                // It lights the normals of a map, and makes no highlight.
+                // A volume lights the normals of a normal map, but gives no highlight.
                 self.set(Feature::Matt, true);
             } else {
                 self.bits &= !(Feature::NormalTexture as u64);
@@ -354,7 +355,8 @@ impl Variant {
         self
     }
 
-    /// The shader's feature flags on a device that reads tables from textures or does not: each name, and whether it is on.
+    /// Returns the shader's feature flags on a device that keeps tables in textures or in buffers: each name,
+    /// and whether it is on.
     pub(crate) fn flags(&self, tables_in_textures: bool) -> Vec<(&'static str, bool)> {
         let features = Feature::ALL.iter().map(|feature| (feature.name(), self.has(*feature)));
         let shading = [
@@ -370,7 +372,7 @@ impl Variant {
             ("REFLECTION_TORRANCE_SPARROW", ReflectionModel::TorranceSparrow),
         ];
         features
-            // Ambient lights are summed before the frame: no shader meets one.
+            // Ambient lights are summed before the frame, so no shader handles them.
             .chain([("AMBIENT_LIGHTS", false), (TABLES_IN_TEXTURES, tables_in_textures)])
             .chain(shading.map(|(name, value)| (name, value == self.shading)))
             .chain(reflection.map(|(name, value)| (name, value == self.reflection)))
@@ -391,25 +393,25 @@ impl std::fmt::Display for Variant {
     }
 }
 
-/// How colours become the numbers of a target.
+/// How colours are converted to the values of a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DisplayVariant {
-    /// What is shown.
+    /// The kind of conversion.
     pub display: Display,
-    /// The shader encodes sRGB (the target's format does not).
+    /// The shader encodes sRGB, because the target's format does not.
     pub encode: bool,
-    /// The shader decodes sRGB: the target's format encodes, and is to hold the numbers as they are.
+    /// The shader decodes sRGB, because the target's format encodes and is to store the values unchanged.
     pub decode: bool,
 }
 
 impl DisplayVariant {
-    /// For a target of this format.
+    /// Creates the variant for a target of this format.
     pub fn new(display: Display, target: wgpu::TextureFormat) -> Self {
         let shown = display == Display::Srgb;
         Self { display, encode: shown && !target.is_srgb(), decode: !shown && target.is_srgb() }
     }
 
-    /// What it calls for.
+    /// Returns the features that it needs.
     pub(crate) fn features(self) -> [(Feature, bool); 4] {
         [
             (Feature::DisplaySrgb, self.display == Display::Srgb),

@@ -1,4 +1,5 @@
-//! What each rate of evaluation costs on an object: how many times its lights are evaluated, by vertices or by pixels. Not the lights: they are about the same for all three.
+//! The cost of each rate of evaluation for an object: how often its lights are evaluated, by vertices or by
+//! pixels. The lights themselves do not matter, because they are about the same for all three.
 
 use glam::DVec3;
 use lumbre_scene::{ObjectTraits, SceneSettings};
@@ -7,10 +8,10 @@ use super::SizedView;
 use crate::extract::{Object, ViewVolume};
 use crate::mesh_buffers::GpuMesh;
 
-/// What it costs to evaluate the lights at a vertex, where it costs 1 at a fragment.
+/// Cost of evaluating the lights at a vertex, relative to a fragment.
 const VERTEX: f64 = 1.0;
 
-/// Evaluations of all lights, in those of a fragment.
+/// Evaluations of all lights, relative to those of one fragment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Evaluations {
     pub flat: f64,
@@ -18,7 +19,7 @@ pub(super) struct Evaluations {
     pub phong: f64,
 }
 
-/// Where an object stands: its box along the world's axes, and the ball around the same middle.
+/// Placement of an object: its box along the world's axes, and the sphere around the same centre.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub center: DVec3,
@@ -26,7 +27,7 @@ pub(super) struct Place {
     pub radius: f64,
 }
 
-/// How much of a mesh there is.
+/// The size of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MeshSize {
     pub vertices: usize,
@@ -55,7 +56,7 @@ impl Evaluations {
     ) -> Self {
         let sides = if traits.double_sided && settings.two_sided { 2.0 } else { 1.0 };
         Self {
-            // All three vertices of a triangle evaluate the same.
+            // All three vertices of a triangle evaluate the same values.
             flat: VERTEX * sides * 3.0 * mesh.triangles as f64,
             gouraud: VERTEX * sides * mesh.vertices as f64,
             phong: pixels(place, view),
@@ -63,10 +64,10 @@ impl Evaluations {
     }
 }
 
-/// Pixels within the bounding rectangle of an object's box, at most those of the frame.
+/// Estimates the pixels that an object's box covers, at most those of the frame.
 fn pixels(Place { center, half_size: half, radius }: Place, view: &SizedView) -> f64 {
     let [width, height] = view.size.map(f64::from);
-    // Of the box seen from a direction, in square metres: of each pair of faces one is seen.
+    // Projected area of the box in square metres: one face of each pair is visible.
     let projected = |direction: DVec3| {
         4.0 * DVec3::new(half.y * half.z, half.x * half.z, half.x * half.y).dot(direction.abs())
     };
@@ -103,7 +104,7 @@ mod tests {
         let ViewVolume::Perspective { half_width, half_height, .. } = view.volume else { panic!() };
         let view = SizedView { view, size: [400, 200], exposure: 1.0 };
         let object = Place { center: DVec3::ZERO, half_size: DVec3::new(2.0, 1.0, 1e-3), radius: 3.0 };
-        // Its front face of 4 x 2 m at 100 m.
+        // Its front face of 4 x 2 m at a distance of 100 m.
         let expected = (4.0 * 400.0 / (200.0 * half_width)) * (2.0 * 200.0 / (200.0 * half_height));
         assert!((pixels(object, &view) / expected - 1.0).abs() < 1e-9);
         let around = Place { center: DVec3::new(0.0, 0.0, 99.0), ..object };

@@ -1,12 +1,13 @@
-//! Shading by need: which of flat, Gouraud and Phong shading an object takes in a view, where `Shading::Auto` asks for no more than an error. Not the bounds on that error, which
-//! are `lumbre_optics::interpolation_error`, nor how often anything is shaded in the end: that is the variant that is drawn.
+//! Shading by need: chooses flat, Gouraud or Phong shading for each object of a view, where `Shading::Auto`
+//! only states an error bound. The bounds on the error of each kind are computed in
+//! `lumbre_optics::interpolation_error`; the rate of evaluation itself is part of the variant that is drawn.
 //!
 //! ```text
 //!   vertices, pixels of its box ──────────────► evaluations: is anything cheaper than Phong? ──┐
 //!   mesh ► patches of its triangles ──┐                                                        ▼
-//!   object ► place, reflectance ──────┼─► prediction: errors of flat and Gouraud ──► choice: the cheapest that is within the bound
-//!   lights that reach it ► Lamp ──────┤   (kept while none of these changes and
-//!   eye, with room to move ───────────┘    the eye stays near where it was)
+//!   object ► place, reflectance ──────┼─► prediction: errors of flat and Gouraud ──► choice: the cheapest
+//!   lights that reach it ► Lamp ──────┤   (kept while none of these changes and      within the bound
+//!   eye, with room to move ───────────┘    the eye stays near its position)
 //! ```
 
 mod evaluations;
@@ -28,7 +29,7 @@ use prediction::Prediction;
 use surface::LitSurface;
 pub(crate) use world_needs::WorldNeeds;
 
-/// What a frame is shaded by, as far as predictions know it.
+/// The conditions of a frame that predictions depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Conditions {
     settings: SceneSettings,
@@ -36,12 +37,13 @@ pub(crate) struct Conditions {
     lightmaps: bool,
     irradiance_volumes: bool,
     specular_antialiasing: bool,
-    /// Colours of vertices are clamped.
+    /// Whether vertex colours are clamped.
     clamp: bool,
 }
 
 impl Conditions {
-    /// Of a frame with these features, and settings in which the flat rule is that of the frame.
+    /// Creates the conditions of a frame with these features. The flat rule in `settings` must be that of the
+    /// frame.
     pub fn new(settings: &SceneSettings, frame: &FrameFeatures) -> Self {
         Self {
             settings: *settings,
@@ -54,7 +56,7 @@ impl Conditions {
     }
 }
 
-/// From where a frame is seen, how large it is, and how bright.
+/// The view of a frame, its size and its exposure.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SizedView {
     pub view: CameraView,
@@ -63,7 +65,7 @@ pub(crate) struct SizedView {
     pub exposure: f32,
 }
 
-/// Whether a frame of such objects asks for predictions.
+/// Returns true if a frame of such objects needs predictions.
 pub(crate) fn is_shaded_by_need(
     objects: &ObjectCensus,
     options: &FrameOptions,
@@ -75,32 +77,33 @@ pub(crate) fn is_shaded_by_need(
     }
 }
 
-/// Predictions, kept while what they follow from stays as it was.
+/// Predictions, kept as long as nothing changes that they follow from.
 #[derive(Debug, Default)]
 pub(crate) struct ShadingByNeed {
     conditions: Option<Conditions>,
     lamps: Vec<Lamp>,
-    /// Lamps that were otherwise a frame before, as they were and as they are.
+    /// Lights that changed since the last frame, both as they were and as they are.
     moved: Vec<Lamp>,
     /// By slot.
     kept: Vec<Option<Kept>>,
 }
 
-/// More changes of lamps than this in a frame are taken for all of them.
+/// If more lights than this change in a frame, all predictions are dropped.
 const MOST_MOVED: usize = 128;
 
 #[derive(Debug)]
 struct Kept {
-    /// [`Object::changed`].
+    /// The value of [`Object::changed`].
     object: u64,
-    /// From where it was predicted.
+    /// The viewer that it was predicted for.
     eye: DVec3,
     backward: DVec3,
     prediction: Prediction,
 }
 
 impl ShadingByNeed {
-    /// Begins a frame: predictions under other conditions are forgotten, and those under lamps that changed.
+    /// Begins a frame: drops predictions that were made under other conditions or that depend on lights that
+    /// changed.
     pub fn begin(&mut self, conditions: Conditions, lamps: Vec<Lamp>, objects: &Objects) {
         self.moved.clear();
         if lamps.len() == self.lamps.len() {
@@ -125,7 +128,8 @@ impl ShadingByNeed {
         self.lamps = lamps;
     }
 
-    /// What an object takes. `lights` are the numbers of the lamps that reach it, looked up only if nothing is known of it.
+    /// Chooses the shading of an object. `lights` returns the indices of the lights that reach it, and is
+    /// called only if there is no valid prediction.
     pub fn choose(
         &mut self,
         (slot, object): (usize, &Object),
@@ -169,8 +173,8 @@ impl ShadingByNeed {
     }
 }
 
-/// The cheapest that is within the bound; the simpler one of two that cost the same. `predict` is asked, for errors up to a radiance, only where something may be cheaper than
-/// Phong shading.
+/// Chooses the cheapest shading within the bound; of two with the same cost the simpler one. `predict` is
+/// called, for errors up to a given radiance, only if something may be cheaper than Phong shading.
 fn chosen(
     evaluations: &Evaluations,
     lit: bool,
@@ -179,7 +183,7 @@ fn chosen(
     predict: impl FnOnce(f64) -> Prediction,
 ) -> Chosen {
     let phong = |reason, errors| Chosen { shading: Shading::Phong, reason, errors, error: 0.0 };
-    // Without any light Phong shading evaluates a colour once for the whole object.
+    // Without any light, Phong shading evaluates one colour for the whole object.
     if !lit {
         return phong(Reason::Unlit, [0.0; 2]);
     }

@@ -1,4 +1,5 @@
-//! The errors that flat and Gouraud shading would have on an object, from the lights that reach it. Not which of them is taken.
+//! Predicts the errors of flat and Gouraud shading on an object from the lights that reach it. Which shading
+//! is chosen is decided by the caller.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -15,26 +16,29 @@ use crate::shader::Feature;
 use crate::shading_need::Reason;
 use crate::texture_sets;
 
-/// A prediction is made for all eyes within this part of the distance to the object: a camera that moves seldom asks for another.
+/// A prediction is valid for all eye positions within this fraction of the distance to the object, so that a
+/// moving camera rarely needs a new one.
 const ROOM: f64 = 0.2;
-/// Radians by which cones are taken wider than they are, for roundings of the device.
+/// By how much cones are widened, in radians, to allow for rounding on the device.
 const MARGIN: f64 = 1e-3;
 
-/// What there is to say of one object.
+/// The prediction for one object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Prediction {
     pub reason: Reason,
-    /// Of flat and of Gouraud shading against Phong shading, in radiance: no pixel and channel is farther. Both are larger than what was enough, where that is all that was
-    /// looked for.
+    /// Upper bounds on the difference of flat and of Gouraud shading from Phong shading, in radiance, for any
+    /// pixel and channel. If both exceed the requested bound, the prediction stopped there, and the values
+    /// may be too low.
     pub errors: [f64; 2],
-    /// From where on errors were all the same; infinite where they were looked for to the end.
+    /// The bound at which the prediction stopped because both errors exceed it; infinite if it was completed.
     enough: f64,
-    /// How far the eye may go from where it was, in metres.
+    /// How far the eye may move from its position, in metres.
     room: f64,
 }
 
 impl Prediction {
-    /// Looks at the whole, and at each patch where that alone does not show that both errors are within `enough`, until neither is.
+    /// Evaluates the whole surface, and then each patch if that does not show both errors to be within
+    /// `enough`. Stops when both errors exceed it.
     pub fn new<'l>(
         surface: &LitSurface<'_>,
         conditions: &Conditions,
@@ -95,7 +99,7 @@ impl Prediction {
         let of_patch = |patch: &WorldPatch| {
             let all = lit.errors(&reaching, patch);
             let errors = of_vertices.as_ref().map_or([all.flat, all.gouraud], |of| of.errors(&all));
-            // Infinity times 0: nothing is known.
+            // Infinity times 0 means that nothing is known.
             errors.map(|error| if error.is_nan() { f64::INFINITY } else { error })
         };
         let room = if shiny { room } else { f64::INFINITY };
@@ -105,7 +109,8 @@ impl Prediction {
             return predicted(of_whole, f64::INFINITY);
         }
         let mut errors = [0.0_f64; 2];
-        // Where the place of the eye counts anyway, what it cannot see is left out.
+        // With highlights the prediction depends on the eye anyway, so patches that it cannot see are
+        // skipped.
         for patch in surface.patches().filter(|patch| !shiny || lit.may_be_seen(patch)) {
             let one = of_patch(&patch);
             errors = [errors[0].max(one[0]), errors[1].max(one[1])];
@@ -116,12 +121,12 @@ impl Prediction {
         predicted([errors[0].min(of_whole[0]), errors[1].min(of_whole[1])], f64::INFINITY)
     }
 
-    /// Whether it says all that there is to say about errors up to this one.
+    /// Returns true if the prediction is sufficient for errors up to this bound.
     pub fn suffices(&self, enough: f64) -> bool {
         enough <= self.enough
     }
 
-    /// Whether what was predicted from an eye holds in a view.
+    /// Returns true if a prediction for an eye position is still valid for a view.
     pub fn holds_from(&self, eye: DVec3, backward: DVec3, view: &CameraView, local_viewer: bool) -> bool {
         if self.room.is_infinite() {
             return true;
@@ -133,10 +138,10 @@ impl Prediction {
     }
 }
 
-/// The larger coefficients of the sides that are seen.
+/// The coefficients of the sides that may be visible.
 struct Sides {
     seen: [Surface; 2],
-    /// Both sides are lit.
+    /// Whether both sides are lit.
     both: bool,
     lightmapped: bool,
 }
@@ -150,20 +155,21 @@ impl Sides {
         Self { seen: [front, back], both, lightmapped }
     }
 
-    /// The largest channel of a coefficient times a colour.
+    /// Returns the largest channel of a coefficient times a colour, over both sides.
     fn reflected(&self, color: Vec3, coefficient: fn(&Surface) -> Vec3) -> f64 {
         let of = |side: &Surface| f64::from((coefficient(side) * color).abs().max_element());
         of(&self.seen[0]).max(of(&self.seen[1]))
     }
 
-    /// The largest of what is there without lights.
+    /// Returns the largest channel of the light that does not come from lights.
     fn constant(&self, conditions: &Conditions) -> f64 {
         let ambient = conditions.settings.ambient_with_sky();
         self.reflected(ambient, |side| side.ambient) + self.reflected(Vec3::ONE, |side| side.emission)
     }
 }
 
-/// Vertices of OpenGL's display: their colours are clamped before they are interpolated and before a texture weakens them.
+/// With OpenGL's clamped display, vertex colours are clamped before they are interpolated and before a
+/// texture modulates them.
 struct ClampedVertices {
     constant: f64,
     modulated: bool,
@@ -173,25 +179,25 @@ impl ClampedVertices {
     fn errors(&self, all: &InterpolationError) -> [f64; 2] {
         let beyond = (self.constant + all.brightest - 1.0).max(0.0);
         let lost = if self.modulated { beyond } else { 0.0 };
-        // An upper limit has a corner, as the terminator has.
+        // The upper limit causes a corner, like the terminator.
         let corner = if beyond > 0.0 { 0.25 * all.change } else { 0.0 };
         [all.flat + lost, all.gouraud + lost + corner]
     }
 }
 
-/// All but the lamps that the light on a patch follows from.
+/// What the light on a patch follows from, except the lights.
 struct LitPatch<'a> {
     surface: &'a LitSurface<'a>,
     sides: &'a Sides,
     conditions: &'a Conditions,
     view: &'a CameraView,
     model: ReflectionModel,
-    /// How far the eye may go, in metres.
+    /// How far the eye may move, in metres.
     room: f64,
 }
 
 impl LitPatch<'_> {
-    /// Under all of these lamps.
+    /// Returns the errors with all of these lights.
     fn errors(&self, lamps: &[&Lamp], patch: &WorldPatch) -> InterpolationError {
         let rule = self.conditions.settings.flat_rule;
         let lights = lamps.iter().filter_map(|lamp| self.light_over(lamp, patch));
@@ -199,7 +205,7 @@ impl LitPatch<'_> {
         one.fold(InterpolationError::default(), |sum, one| sum + one)
     }
 
-    /// What a lamp can do on a patch; nothing if it does not light it.
+    /// Returns the bounds on a light's effect on a patch; `None` if it does not light the patch.
     fn light_over(&self, lamp: &Lamp, patch: &WorldPatch) -> Option<LightOverObject> {
         let Self { surface, sides, model, .. } = *self;
         let light = &lamp.light;
@@ -241,7 +247,7 @@ impl LitPatch<'_> {
         if ambient == 0.0 && diffuse == 0.0 && specular == 0.0 {
             return None;
         }
-        // The sharper highlight of both sides: none is sharper.
+        // The sharper highlight of both sides is a bound for both.
         let shininess = |side: &Surface| f64::from(side.shininess_in_range());
         let [front, back] = sides.seen.each_ref().map(shininess);
         let (to_viewer, viewer_half_angle, viewer_distance) = self.viewer(patch);
@@ -260,7 +266,7 @@ impl LitPatch<'_> {
         })
     }
 
-    /// Whether an eye may see its front, or its back where that is drawn.
+    /// Returns true if an eye position may see its front, or its back if that is drawn.
     fn may_be_seen(&self, patch: &WorldPatch) -> bool {
         let perspective = matches!(self.view.volume, ViewVolume::Perspective { .. });
         let one_sided =
@@ -270,7 +276,9 @@ impl LitPatch<'_> {
         normals.axis.angle_between(to_viewer) - normals.half_angle - half_angle - MARGIN <= FRAC_PI_2
     }
 
-    /// From a patch's middle to the viewer: direction, how far from it that of any of its points to any eye may be, in radians, and metres between the nearest ones.
+    /// Returns the direction from a patch's centre to the viewer, the largest angle in radians between it and
+    /// the direction from any point of the patch to any eye position, and the least distance between such
+    /// points in metres.
     fn viewer(&self, patch: &WorldPatch) -> (DVec3, f64, f64) {
         if !self.conditions.settings.local_viewer {
             return (self.view.basis.z_axis, 0.0, f64::INFINITY);
@@ -282,7 +290,7 @@ impl LitPatch<'_> {
     }
 }
 
-/// Where normals look, as a light has it.
+/// Which side of a surface a light may reach.
 #[derive(Clone, Copy, PartialEq)]
 enum Facing {
     Front,
@@ -290,7 +298,9 @@ enum Facing {
     Anywhere,
 }
 
-/// A cone over an object whose middle is so far from its axis, in radians, and which fills such a half angle; none if it is dark there.
+/// Returns the bounds on a spot cone over an object. `angle` is the angle between its axis and the object's
+/// centre, `half_angle` that of the cone around the object, both in radians. `None` if the object is outside
+/// the cone.
 fn cone_over(cone: SpotCone, angle: f64, half_angle: f64) -> Option<ConeOverObject> {
     let (least, most) = (angle - half_angle - MARGIN, angle + half_angle + MARGIN);
     if least > f64::from(cone.outer_angle()) {

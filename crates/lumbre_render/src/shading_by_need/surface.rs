@@ -1,4 +1,5 @@
-//! A surface as lights fall on it: what of an object decides how far interpolated lighting is off. From a frame's record of an object, or from the World.
+//! The surface of an object as lights fall on it: the properties that determine the error of interpolated
+//! lighting. It is created from a frame's record of an object, or from the World.
 
 use std::f64::consts::PI;
 
@@ -9,7 +10,7 @@ use lumbre_scene::{GlobalTransform, ObjectTraits};
 
 use crate::extract::{Reflectance, world_box};
 
-/// An object, as predictions see it.
+/// An object in the form that predictions need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LitSurface<'a> {
     pub traits: &'a ObjectTraits,
@@ -32,12 +33,12 @@ impl<'a> LitSurface<'a> {
         Self { traits, reflectance, spread, world_from_mesh, world_from_mesh_normal, stretch }
     }
 
-    /// All of it as one patch in the world; none of a mesh without area.
+    /// Returns the whole surface as one patch in world space; `None` for a mesh without area.
     pub fn whole(&self) -> Option<WorldPatch> {
         self.spread.whole.as_ref().map(|patch| self.in_world(patch))
     }
 
-    /// Its patches in the world.
+    /// Returns its patches in world space.
     pub fn patches(&self) -> impl Iterator<Item = WorldPatch> + '_ {
         self.spread.patches.iter().map(|patch| self.in_world(patch))
     }
@@ -61,7 +62,8 @@ impl<'a> LitSurface<'a> {
     }
 }
 
-/// A part of a surface in the world: its box and the ball around it, the cone of its normals, and the largest and most curved of its triangles.
+/// A part of a surface in world space: its box and the sphere around it, the cone of its normals, and the
+/// bounds on size and curvature of its triangles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WorldPatch {
     pub center: DVec3,
@@ -72,13 +74,15 @@ pub(super) struct WorldPatch {
 }
 
 impl WorldPatch {
-    /// From a point to the nearest point, and to the farthest one at most, of its box, in metres.
+    /// Returns the distance in metres from a point to the nearest point of its box, and an upper bound of the
+    /// distance to any point of the box.
     pub fn distances(&self, from: DVec3) -> [f64; 2] {
         let apart = (from - self.center).abs();
         [(apart - self.half_size).max(DVec3::ZERO).length(), (apart + self.half_size).length()]
     }
 
-    /// The half angle in radians of the cone of directions from its points to all points within `room` of one that is so far from its middle.
+    /// Returns the half angle in radians of the cone of directions from its points to all points within
+    /// `room` of a point at this distance from its centre.
     pub fn half_angle(&self, distance: f64, room: f64) -> f64 {
         let within = self.radius + room;
         if distance > within { (within / distance).asin() } else { PI }
@@ -93,12 +97,13 @@ fn chord_of(angle: f64) -> f64 {
     2.0 * (0.5 * angle).sin()
 }
 
-/// What a matrix does to lengths and angles at most.
+/// Upper bounds on how a matrix changes lengths and angles.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     /// Factor on a length.
     longest: f64,
-    /// Factor on an angle between directions, normals too: the quotient of the largest and the smallest singular value.
+    /// Factor on an angle between directions, including normals: the ratio of the largest to the smallest
+    /// singular value.
     bend: f64,
 }
 
@@ -114,7 +119,8 @@ impl Stretch {
         match orthogonal {
             true if longest <= shortest * (1.0 + 1e-6) => Self { longest, bend: 1.0 },
             true => Self { longest, bend: longest / shortest.max(f64::MIN_POSITIVE) },
-            // Frobenius' norm f is at least the largest singular value, and f³ over the determinant at least the quotient.
+            // The Frobenius norm f is at least the largest singular value, and f³ divided by the determinant
+            // is at least the ratio.
             false => {
                 let norm = lengths.into_iter().map(|length| length * length).sum::<f64>().sqrt();
                 let determinant = matrix.determinant().abs().max(f64::MIN_POSITIVE);

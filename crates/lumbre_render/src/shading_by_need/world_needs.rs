@@ -1,4 +1,4 @@
-//! Shading by need of a whole World, without a device and whatever is in view: what `explain` tells.
+//! Shading by need for a whole World, without a device and regardless of what is in view, for `explain`.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::mesh_buffers::mesh_box;
 use crate::shading_need::{Chosen, ShadingNeed};
 use crate::{FrameOptions, RenderError};
 
-/// What the objects of a World take, each when it is asked for.
+/// The choices for the objects of a World, each made when it is asked for.
 #[derive(Default)]
 pub(crate) struct WorldNeeds {
     /// In the order of `lumbre_scene::shown_objects`.
@@ -36,7 +36,8 @@ struct ShownObject {
 }
 
 impl WorldNeeds {
-    /// Of the shown objects of a World, for a frame of this size. Global transforms must be up to date. Without a camera everything takes Phong shading.
+    /// Collects the objects of a World that are not hidden, for a frame of this size. Global transforms must
+    /// be up to date. Without a camera, all objects take Phong shading.
     ///
     /// # Errors
     /// [`RenderError::TooManyEmissiveFaces`].
@@ -76,7 +77,7 @@ impl WorldNeeds {
         Ok(Self { objects, lamps, seen, chosen: Vec::new() })
     }
 
-    /// What the object of this number takes.
+    /// Chooses the shading of the object with this index.
     pub fn choose(&mut self, number: usize, max_error: ErrorBound) -> Shading {
         let (Some(object), Some((conditions, view))) = (self.objects.get(number), &self.seen) else {
             return Shading::Phong;
@@ -99,7 +100,7 @@ impl WorldNeeds {
         chosen.shading
     }
 
-    /// What was chosen, grouped.
+    /// Returns the choices so far, grouped.
     pub fn groups(&self) -> Vec<ShadingNeed> {
         ShadingNeed::group(&self.chosen)
     }

@@ -1,10 +1,11 @@
-//! Where the maps of a frame's shadows lie in one square texture: sides by what each light contributes to the picture, places without gaps.
+//! The layout of a frame's shadow maps in one square texture: the side of each map follows from what its
+//! light contributes to the picture, and maps are packed without gaps.
 
-/// Largest side of a map at the usual resolution, and least one at any, in texels.
+/// Largest side of a map at the default resolution, and smallest side at any resolution, in texels.
 pub(super) const MOST: u32 = 1024;
 pub(super) const LEAST: u32 = 64;
 
-/// A map's place in the atlas, in texels.
+/// The place of a map in the atlas, in texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Tile {
     pub x: u32,
@@ -13,8 +14,9 @@ pub(super) struct Tile {
     pub side: u32,
 }
 
-/// The tiles for maps that want these sides, `most` of them at most, and the side of the atlas, at most `limit`. If they do not fit all are halved, down to [`LEAST`]; what does not fit even
-/// then, from the end, has none.
+/// Packs maps that want these sides, clamped to `most`. Returns the side of the atlas, at most `limit`, and
+/// the tiles. If the maps do not fit, all sides are halved, down to [`LEAST`]. Maps at the end of the list
+/// that still do not fit get no tile.
 pub(super) fn pack(wanted: &[f64], most: f64, limit: u32) -> (u32, Vec<Option<Tile>>) {
     let limit = if limit.is_power_of_two() { limit } else { limit.next_power_of_two() / 2 };
     let mut sides: Vec<u32> =
@@ -27,7 +29,7 @@ pub(super) fn pack(wanted: &[f64], most: f64, limit: u32) -> (u32, Vec<Option<Ti
     while area(&sides) > u64::from(atlas).pow(2) && atlas < limit {
         atlas *= 2;
     }
-    // Largest first along a Z-order curve: each begins where its own size divides what lies before it.
+    // Largest first along a Z-order curve, so that each tile begins at a multiple of its own size.
     let mut order: Vec<usize> = (0..sides.len()).collect();
     order.sort_by_key(|index| (std::cmp::Reverse(sides[*index]), *index));
     let mut tiles = vec![None; sides.len()];
@@ -46,12 +48,12 @@ pub(super) fn pack(wanted: &[f64], most: f64, limit: u32) -> (u32, Vec<Option<Ti
 }
 
 fn power_of_two(side: f64, most: f64) -> u32 {
-    // NaN is the least.
+    // NaN becomes the smallest side.
     let side = side.max(f64::from(LEAST)).min(most.max(f64::from(LEAST)));
     1 << (side.log2().round() as u32)
 }
 
-/// Column and row of a cell of the Z-order curve.
+/// Returns column and row of a cell on the Z-order curve.
 fn z_order(cell: u64) -> (u32, u32) {
     let every_second = |bits: u64| (0..32).map(|bit| ((bits >> (2 * bit) & 1) as u32) << bit).sum();
     (every_second(cell), every_second(cell >> 1))
@@ -78,7 +80,7 @@ mod tests {
                     assert!(apart, "{a:?} {b:?}");
                 }
             }
-            // 512 holds 64 tiles of the least size.
+            // An atlas of 512 texels has room for 64 tiles of the smallest size.
             assert_eq!(placed.len(), 60, "in {limit}");
         }
         let (_, tiles) = pack(&[2000.0; 70], f64::from(MOST), 512);

@@ -1,5 +1,6 @@
-//! Shadow maps of the lights that ask for them: their views, their places in one atlas, who casts into which, and what of it has to be drawn again. How a surface reads
-//! them is shaders/shadows.wesl; the pass that draws them is `effects::shadows`.
+//! Shadow maps of the lights that ask for them: their views, their tiles in one atlas, the casters in each,
+//! and which maps have to be drawn again. How a surface reads them is in shaders/shadows.wesl; the pass that
+//! draws them is `effects::shadows`.
 
 mod atlas;
 mod views;
@@ -18,7 +19,7 @@ use crate::{Gpu, RenderError, Uploads};
 
 /// Largest side of the atlas, in texels.
 const MOST_TEXELS: u32 = 4096;
-/// The stride of records that are bound with an offset: what WebGPU promises.
+/// Stride of records that are bound at a dynamic offset: the largest alignment that WebGPU may require.
 const STRIDE: usize = 256;
 
 /// `ShadowView` of shaders/shadows.wesl.
@@ -26,17 +27,18 @@ const STRIDE: usize = 256;
 #[repr(C)]
 struct ViewData {
     map_from_frame: [[f32; 4]; 4],
-    /// Corner and side in the atlas, and a texel, as parts of it.
+    /// Corner and side in the atlas, and the size of a texel, all relative to the atlas.
     tile: [f32; 4],
-    /// Metres a texel shows, near plane or negative depth, size of the light, end of a cascade.
+    /// Size of a texel in metres (in a perspective view at a distance of one metre), near plane or negative
+    /// depth range, size of the light, end of a cascade.
     parameters: [f32; 4],
 }
 
-/// A caster's draw in a view.
+/// A caster to draw in a view.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Caster {
     pub mesh: MeshKey,
-    /// Its number in the table of objects.
+    /// Its index in the table of objects.
     pub slot: u32,
 }
 
@@ -45,40 +47,40 @@ pub(crate) struct Caster {
 pub(crate) struct StaleMap {
     /// Corner and side in texels.
     pub place: [u32; 3],
-    /// Where its matrix begins in the buffer of matrices.
+    /// Offset of its matrix in the buffer of matrices.
     pub matrix_offset: u32,
     pub casters: Vec<Caster>,
 }
 
-/// What the views of a frame need to know of its camera.
+/// What the shadow views of a frame need to know about its camera.
 #[derive(Clone, Debug)]
 pub(crate) struct ShadowedView {
     pub view: CameraView,
-    /// The views that it has in mirrors.
+    /// The camera's reflections in mirrors.
     pub reflected: Vec<CameraView>,
     /// Rows of the frame.
     pub height: u32,
     /// Nearest and farthest depth of what is in any view, in metres.
     pub depths: [f64; 2],
-    /// Texels of the maps beside the usual number, along a side.
+    /// Factor on the default side of the maps.
     pub resolution: f32,
 }
 
 /// The shadow maps of a renderer.
 #[derive(Debug)]
 pub(crate) struct ShadowMaps {
-    /// By view: what its map shows, and 0 where it has to be drawn.
+    /// For each view, a hash of what its map shows; 0 if the map has to be drawn.
     drawn: Vec<u64>,
     pub stale: Vec<StaleMap>,
     views: GrowableBuffer<ViewData>,
     matrices: Vec<u8>,
     casters: Option<Deferred<CasterPipelines>>,
     device: Option<OnDevice>,
-    /// Of the next atlas, in texels.
+    /// Side of the next atlas, in texels.
     side: u32,
 }
 
-/// How casters are drawn into a map.
+/// The pipelines that draw casters into a map.
 #[derive(Debug)]
 pub(crate) struct CasterPipelines {
     layout: wgpu::BindGroupLayout,
@@ -87,13 +89,13 @@ pub(crate) struct CasterPipelines {
 }
 
 impl CasterPipelines {
-    /// How many there are.
+    /// Returns the number of pipelines.
     pub fn count(&self) -> usize {
         [&self.caster, &self.clear].len()
     }
 }
 
-/// The maps themselves, and how they are bound.
+/// The atlas and its bind groups.
 #[derive(Debug)]
 pub(crate) struct OnDevice {
     pub atlas: wgpu::Texture,
@@ -116,11 +118,12 @@ impl ShadowMaps {
         }
     }
 
-    /// Begins to make the pipelines that draw casters, unless they are there or on their way; whether they are there. With `wait` they are; else what `afterwards`
-    /// answers with is done before they count as there.
+    /// Starts to create the pipelines that draw casters, unless they exist or are being created. Returns true
+    /// if they exist, which is always the case with `wait`. Without `wait`, the job that `afterwards` returns
+    /// runs before they count as existing.
     ///
     /// # Errors
-    /// [`RenderError::Shader`], a fault of ours.
+    /// [`RenderError::Shader`], which is a bug in this crate.
     pub fn prepare(
         &mut self,
         gpu: &Gpu,
@@ -141,12 +144,12 @@ impl ShadowMaps {
         casters.is_there(wait).map_err(|message| RenderError::Shader { variant: variant(), message })
     }
 
-    /// The pipelines, once `prepare` has made them.
+    /// Returns the pipelines, once `prepare` has created them.
     pub fn pipelines(&self) -> Option<&CasterPipelines> {
         self.casters.as_ref()?.get()?.ok()
     }
 
-    /// Chooses views and places for the lights of a frame, and finds out which maps are as they have to be.
+    /// Chooses views and tiles for the lights of a frame, and finds out which maps are out of date.
     pub fn plan(&mut self, lights: &[ShadowLight], objects: &Objects, seen: &ShadowedView) {
         let casters = objects.iter().filter(|(_, object)| object.casts_shadow());
         let (low, high) = casters.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (_, object)| {
@@ -189,7 +192,7 @@ impl ShadowMaps {
         let mut data = Vec::with_capacity(found.len());
         for (((light, view), tile), drawn) in found.iter().zip(&tiles).zip(&mut self.drawn) {
             let Some(tile) = tile else {
-                // It shows nothing, and nothing is hidden from it.
+                // This view has no map, so it hides nothing.
                 data.push(ViewData::default());
                 continue;
             };
@@ -197,7 +200,7 @@ impl ShadowMaps {
             let place =
                 [f64::from(tile.x) * part, f64::from(tile.y) * part, f64::from(tile.side) * part, part];
             let parameters = [view.width / f64::from(tile.side), view.near_or_depth, light.size, view.end];
-            // From clip space to the map's own coordinates, [0, 1] and downwards.
+            // From clip space to the map's coordinates, which are [0, 1] with y downwards.
             let map_from_clip = DMat4::from_cols(
                 DVec4::new(0.5, 0.0, 0.0, 0.0),
                 DVec4::new(0.0, -0.5, 0.0, 0.0),
@@ -224,10 +227,11 @@ impl ShadowMaps {
         self.views.replace(data);
     }
 
-    /// Makes and uploads what the stale maps are drawn with, and what surfaces read, after `prepare`. `objects` is the table of transforms.
+    /// Creates and uploads what the stale maps are drawn with and what surfaces read, after `prepare`.
+    /// `objects` is the table of transforms.
     ///
     /// # Errors
-    /// [`RenderError::Shader`], a fault of ours; [`RenderError::BufferTooLarge`].
+    /// [`RenderError::Shader`], which is a bug in this crate; [`RenderError::BufferTooLarge`].
     pub fn upload(
         &mut self,
         gpu: &Gpu,
@@ -260,28 +264,28 @@ impl ShadowMaps {
         Ok(uploads)
     }
 
-    /// The maps, once `upload` has made them.
+    /// Returns the maps, once `upload` has created them.
     pub fn device(&self) -> Option<&OnDevice> {
         self.device.as_ref()
     }
 
-    /// What is drawn into the maps may be gone.
+    /// Marks all maps as out of date.
     pub fn forget(&mut self) {
         self.drawn.clear();
     }
 }
 
 impl Object {
-    /// Whether light stops at it: it is opaque, and takes light at all.
+    /// Returns true if the object casts a shadow: it is lit, opaque, and not transparent glass.
     fn casts_shadow(&self) -> bool {
-        // Of glass most light passes: no shadow is nearer to the truth than a whole one.
+        // Glass transmits most of the light, so no shadow is closer to the truth than a full one.
         let clear = self.refractor.is_some_and(|refractor| refractor.lets_most_pass());
         !self.traits.unlit && self.traits.alpha_mode != lumbre_optics::AlphaMode::Blend && !clear
     }
 }
 
-/// Who casts into a view, and a number for all that its map shows. A lamp casts no shadow of its own light: neither its own mesh nor a bulb, which glows and has
-/// it inside.
+/// Returns the casters of a view, and a hash of everything that its map shows. A lamp casts no shadow of its
+/// own light: neither its own mesh nor a glowing bulb with the light inside.
 fn casters_of(
     objects: &Objects,
     lamp: &ShadowLight,
@@ -290,7 +294,8 @@ fn casters_of(
     place: [u32; 3],
 ) -> (Vec<Caster>, u64) {
     let rows = view.clip_from_frame.transpose();
-    // Casters between the light and its near plane are kept out, those before an orthographic view's are none.
+    // The near plane is not tested: nearer casters are clipped when they are drawn, and an orthographic view
+    // begins before its first caster.
     let planes = [
         rows.w_axis + rows.x_axis,
         rows.w_axis - rows.x_axis,
@@ -311,21 +316,21 @@ fn casters_of(
             continue;
         }
         let center = (object.center - objects.origin).extend(1.0);
-        // The last plane of an infinite view is no plane: its distance is a constant that is not negative.
+        // The last plane of an infinite view is degenerate; its distance is a constant that is not negative.
         if !planes.iter().all(|plane| plane.dot(center) >= -object.radius) {
             continue;
         }
         hash.add(object.mesh.0 as u64);
         object.world_from_mesh.to_cols_array().iter().for_each(|number| hash.add(number.to_bits()));
-        // As many objects as a storage buffer holds.
+        // There are at most as many objects as a table holds.
         casters.push(Caster { mesh: object.mesh, slot: slot as u32 });
     }
-    // One mesh after the other, so that its buffers are bound once.
+    // Sorted by mesh, so that its buffers are bound only once.
     casters.sort_unstable_by_key(|caster| (caster.mesh.0, caster.slot));
     (casters, hash.finish())
 }
 
-/// FNV-1a over words: changes are to be told apart here, not attacks.
+/// FNV-1a over words. It only has to detect changes, not to resist attacks.
 struct Hash(u64);
 
 impl Hash {
@@ -337,13 +342,13 @@ impl Hash {
         self.0 = (self.0 ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
     }
 
-    /// Never 0, which stands for a map that was not drawn.
+    /// Never 0, which stands for a map that has not been drawn.
     fn finish(&self) -> u64 {
         self.0 | 1
     }
 }
 
-/// The layout of the group that surfaces read shadows from.
+/// Creates the layout of the group that surfaces read shadows from.
 pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
@@ -364,7 +369,7 @@ pub(crate) fn receiver_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
 }
 
 impl CasterPipelines {
-    /// On a device that reads tables from textures or does not.
+    /// Creates the pipelines for a device that keeps tables in textures or in buffers.
     pub fn new(device: &wgpu::Device, tables_in_textures: bool) -> Result<Self, RenderError> {
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
@@ -404,7 +409,7 @@ impl CasterPipelines {
                     compilation_options: Default::default(),
                     buffers,
                 },
-                // Both sides cast: a sheet has a shadow from behind too.
+                // Both sides cast, so that a sheet has a shadow from behind, too.
                 primitive: Default::default(),
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: crate::target::DEPTH_FORMAT,
@@ -426,7 +431,7 @@ impl CasterPipelines {
         })
     }
 
-    /// What they read: the table of objects, and a matrix at an offset.
+    /// Creates their bind group: the table of objects, and a matrix at a dynamic offset.
     pub fn group(
         &self,
         device: &wgpu::Device,

@@ -1,72 +1,73 @@
-//! The views of a light that casts shadows: one for a spotlight, six for a point light, cascades for a directional light. In frame space; where they lie in the atlas is
-//! decided in `atlas`.
+//! The shadow views of a light, in frame space: one for a spotlight, six for a point light, cascades for a
+//! directional light. Their tiles in the atlas are chosen in `atlas`.
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use crate::extract::{CameraView, ViewVolume};
 use crate::shadow_light::{CASCADES, ShadowKind, WIDEST_CONE};
 
-/// Nearest depth of a view, in metres: what stands nearer to a light casts no shadow.
+/// Near plane of a view, in metres. Anything nearer to a light casts no shadow.
 const NEAR: f64 = 0.01;
-/// Part of a view's half side by which it is wider than what it is for, so that a filter finds neighbours.
+/// By how much a view is wider than what it covers, relative to half its side, so that a filter finds
+/// neighbours.
 const BORDER: f64 = 0.03;
-/// Cascades end at this depth, in metres, whatever is seen beyond.
+/// Largest depth of the cascades, in metres.
 const FARTHEST: f64 = 2000.0;
 
 /// One view of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
-    /// From frame space to the view's clip space, reversed-Z.
+    /// Transforms frame space to the view's clip space, reversed-Z.
     pub clip_from_frame: DMat4,
-    /// Width of the part of the world that the view shows, in metres: at a distance of a metre in a perspective view.
+    /// Width of the visible part of the world in metres; for a perspective view at a distance of one metre.
     pub width: f64,
-    /// Near plane of a perspective view, in metres; the negative depth of an orthographic one.
+    /// Near plane of a perspective view in metres, or the negative depth range of an orthographic one.
     pub near_or_depth: f64,
-    /// Where a cascade ends along the camera's line of sight.
+    /// Depth along the camera's line of sight at which a cascade ends.
     pub end: f64,
-    /// Side in texels that would serve the picture.
+    /// Side in texels that the picture would need.
     pub wanted: f64,
 }
 
-/// A light, as its views depend on it.
+/// The properties of a light that its views depend on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     pub kind: ShadowKind,
-    /// Frame space.
+    /// In frame space.
     pub position: DVec3,
-    /// Unit: where it shines.
+    /// Direction that it shines in, of unit length.
     pub axis: DVec3,
     /// Half angle of its cone, in radians.
     pub cone: f64,
-    /// Metres; may be infinite.
+    /// In metres; may be infinite.
     pub range: f64,
 }
 
-/// The camera, as cascades depend on it.
+/// The properties of the camera that cascades depend on.
 #[derive(Clone, Debug)]
 pub(super) struct Seen {
     pub view: CameraView,
-    /// The views that it has in mirrors.
+    /// The camera's reflections in mirrors.
     pub reflected: Vec<CameraView>,
     pub origin: DVec3,
     /// Nearest and farthest depth of what is in view, in metres.
     pub depths: [f64; 2],
     /// Rows of the frame.
     pub height: u32,
-    /// A ball that holds all casters, in frame space.
+    /// A sphere that contains all casters, in frame space.
     pub casters: (DVec3, f64),
-    /// Texels of a map beside the usual number, along a side.
+    /// Factor on the default side of a map.
     pub resolution: f64,
 }
 
 impl Seen {
-    /// The largest side of a map, in texels.
+    /// Returns the largest side of a map, in texels.
     pub fn most_texels(&self) -> f64 {
         self.resolution * f64::from(super::atlas::MOST)
     }
 }
 
-/// The views of a light, as many as its kind has.
+/// Returns the views of a light, as many as its kind has.
 pub(super) fn views(lamp: &Lamp, seen: &Seen) -> Vec<View> {
     match lamp.kind {
         ShadowKind::Cone => vec![cone(lamp, seen)],
@@ -86,7 +87,7 @@ fn view_from_frame(basis: DMat3, position: DVec3) -> DMat4 {
     DMat4::from_mat3(rotation) * DMat4::from_translation(-position)
 }
 
-/// Depth 1 at the near plane and 0 at infinity.
+/// Depth is 1 at the near plane and 0 at infinity.
 fn perspective(tangent: f64, near: f64) -> DMat4 {
     DMat4::from_cols(
         DVec4::new(1.0 / tangent, 0.0, 0.0, 0.0),
@@ -96,7 +97,8 @@ fn perspective(tangent: f64, near: f64) -> DMat4 {
     )
 }
 
-/// Rows of the picture that the ball of a light covers, at least: a map with as many texels shows its shadows as sharp as the picture can.
+/// Returns the least number of rows of the picture that the sphere of a light covers. A map with that many
+/// texels shows shadows as sharply as the picture can.
 fn wanted(lamp: &Lamp, seen: &Seen) -> f64 {
     let eye = seen.view.eye - seen.origin;
     let half_height = match seen.view.volume {
@@ -127,14 +129,16 @@ fn cube(lamp: &Lamp, seen: &Seen) -> [View; 6] {
         width: 2.0 * tangent,
         near_or_depth: NEAR,
         end: f64::INFINITY,
-        // Six of them share the budget of a light.
+        // Six views share the budget of a light.
         wanted: 0.5 * wanted(lamp, seen),
     })
 }
 
-/// Slices of the view volume, each in a ball of its own whose size does not depend on where the camera looks; moved by whole texels only, so that the edges of shadows
-/// stand still while the camera moves (Valient, "Stable Rendering of Cascaded Shadow Maps", ShaderX6, 2008). The ends are between logarithmic and even (Zhang et al.,
-/// "Parallel-Split Shadow Maps", 2006).
+/// Returns the views of slices of the view volume. Each slice is bounded by a sphere whose size does not
+/// depend on the direction of the camera, and moves only by whole texels, so that the edges of shadows do not
+/// shimmer while the camera moves (Valient, "Stable Rendering of Cascaded Shadow Maps", ShaderX6, 2008). The
+/// ends of the slices are spaced between logarithmically and evenly (Zhang et al., "Parallel-Split Shadow
+/// Maps", 2006).
 fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
     let [near, far] = seen.depths;
     let near = near.max(1e-2);
@@ -148,7 +152,7 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
             let (center, radius) = slice_of_all(seen, begin, finish);
             begin = finish;
             let texel = 2.0 * radius * (1.0 + BORDER) / seen.most_texels();
-            // In a grid that is fixed in the world.
+            // Snaps to a grid that is fixed in the world.
             let snap = |axis: DVec3| {
                 let along = axis.dot(center + seen.origin);
                 axis * ((along / texel).round() * texel - along)
@@ -178,14 +182,15 @@ fn cascades(lamp: &Lamp, seen: &Seen) -> Vec<View> {
         .collect()
 }
 
-/// The ball around what all views show between two depths, in frame space. With mirrors its size depends on where the camera looks: in steps, so that most frames have the
-/// grid of texels of the one before.
+/// Returns the sphere, in frame space, around what all views show between two depths. With mirrors its size
+/// depends on the direction of the camera, so it is rounded up to steps, and most frames keep the texel grid
+/// of the previous one.
 fn slice_of_all(seen: &Seen, begin: f64, end: f64) -> (DVec3, f64) {
     let own = slice(&seen.view, seen.origin, begin, end);
     let reflected = seen.reflected.iter().filter_map(|view| {
         let corners = view.corners(seen.origin, [begin, end]);
         let mirror = view.frustum(seen.origin)[4];
-        // Behind the mirror there is nothing to light.
+        // Nothing behind the mirror has to be lit.
         corners.iter().any(|corner| mirror.dot(corner.extend(1.0)) > 0.0).then(|| {
             let center = corners.iter().sum::<DVec3>() / corners.len() as f64;
             (center, corners.iter().map(|corner| corner.distance(center)).fold(0.0, f64::max))
@@ -208,13 +213,14 @@ fn slice_of_all(seen: &Seen, begin: f64, end: f64) -> (DVec3, f64) {
     }
 }
 
-/// The ball around the part of the view volume between two depths, in frame space.
+/// Returns the sphere, in frame space, around the part of the view volume between two depths.
 fn slice(view: &CameraView, origin: DVec3, begin: f64, end: f64) -> (DVec3, f64) {
     let eye = view.eye - origin;
     let forward = -view.basis.z_axis;
     match view.volume {
         ViewVolume::Perspective { half_width, half_height, .. } => {
-            // On the axis, as far from the near corners as from the far ones, or in the middle of the far side.
+            // The centre lies on the axis, equally far from the near and the far corners, or in the middle of
+            // the far side.
             let spread = half_width * half_width + half_height * half_height;
             let middle = (0.5 * (begin + end) * (1.0 + spread)).min(end);
             let radius = |depth: f64| ((depth - middle).powi(2) + spread * depth * depth).sqrt();
@@ -332,7 +338,7 @@ mod tests {
             }
             begin = cascade.end;
         }
-        // A point of the world falls on the same part of a texel wherever the camera stands.
+        // A point in the world falls on the same part of a texel for every camera position.
         let mut elsewhere = seen;
         elsewhere.view.eye += DVec3::new(0.123, 0.01, -0.2);
         let moved = views(&sun, &elsewhere);
