@@ -8,7 +8,7 @@ use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
 use crate::denoise::lanes::BESIDE_A_ROW;
 use crate::denoise::replicates::Estimates;
 use crate::error::mebibytes;
-use crate::final_gather::gather::Gathered;
+use crate::final_gather::gathered::Gathered;
 use crate::radiosity::exchange::Resolution;
 use crate::radiosity::patches::{Patch, Patches};
 use crate::rebake::TexelSamples;

@@ -27,8 +27,8 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::radiosity::form_factors::Cast;
     use crate::radiosity::patch_index::PatchIndex;
+    use crate::radiosity::ray_counts::Cast;
     use crate::sources::direct::{Direct, Seen};
 
     #[test]

@@ -2,10 +2,11 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::lanes::{Kernel, Strips, lanes};
+use super::lanes::{Strips, lanes};
 use super::neighbours::Block;
 use super::plane::{HALF, VALUES};
-use super::smooth::Smoothed;
+use crate::denoise::filter_pass::Smoothed;
+use crate::denoise::kernel::Kernel;
 use crate::denoise::replicates::REPLICATES;
 
 /// Reach over which a texel's noise is averaged, in steps.

@@ -3,12 +3,11 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Select, Simd, dispatch, f32x8, prelude::*, u32x8};
+use fearless_simd::{Level, Simd, prelude::*};
 use rayon::prelude::*;
 
-use super::neighbours::Block;
-use super::surroundings::{NONE, Surface};
 use crate::cancel_token::CancelToken;
+use crate::denoise::surface::{NONE, Surface};
 
 /// Texels side by side.
 pub(crate) const LANES: usize = 8;
@@ -23,7 +22,7 @@ pub(crate) const WINDOW: usize = MARGIN + LANES + MARGIN;
 pub(crate) struct Grid {
     pub rows: Vec<MapRow>,
     /// First columns of the blocks of all rows.
-    blocks: Vec<u32>,
+    pub blocks: Vec<u32>,
     /// Of each cell of the rows its surface; [`NONE`] where nothing is covered, and in the margins.
     pub ground: Vec<u32>,
     pub surfaces: Vec<Surface>,
@@ -44,18 +43,12 @@ pub(crate) struct MapRow {
     /// Rows of the same map before and after it.
     pub before: u32,
     pub after: u32,
-    blocks: Range<usize>,
+    pub blocks: Range<usize>,
 }
 
 /// `N` numbers of each cell, row by row: a row of the first, a row of the second, and so on. Zero where no texel is.
 pub(crate) struct Strips<const N: usize> {
     pub values: Vec<f32>,
-}
-
-/// Something to be computed of eight texels.
-pub(crate) trait Kernel<const N: usize>: Sync {
-    /// Of each lane, given what was there before, or zero; what it says of lanes without a texel does not count.
-    fn at<S: Simd>(&self, block: &Block<'_, S>, before: &[f32x8<S>; N]) -> [f32x8<S>; N];
 }
 
 impl Grid {
@@ -103,62 +96,13 @@ impl Grid {
         strips
     }
 
-    /// What a kernel makes of all covered texels.
-    pub fn compute<const N: usize>(&self, kernel: &impl Kernel<N>) -> Strips<N> {
-        let mut strips = self.strips();
-        self.change(&mut strips, kernel);
-        strips
-    }
-
-    /// What a kernel makes of all covered texels, in place of what was there.
-    pub fn change<const N: usize>(&self, strips: &mut Strips<N>, kernel: &impl Kernel<N>) {
-        self.by_rows(strips, |index, strip| {
-            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            if let Some(simd) = self.level.as_avx2() {
-                return simd.vectorize(
-                    #[inline(always)]
-                    || self.change_row(simd, kernel, index, strip),
-                );
-            }
-            dispatch!(Level::baseline(), simd => self.change_row(simd, kernel, index, strip));
-        });
-    }
-
-    #[inline(always)]
-    fn change_row<const N: usize, S: Simd>(
-        &self,
-        simd: S,
-        kernel: &impl Kernel<N>,
-        index: usize,
-        strip: &mut [f32],
-    ) {
-        let row = &self.rows[index];
-        let zero = simd.splat_f32x8(0.0);
-        for &column in &self.blocks[row.blocks.clone()] {
-            let column = column as usize;
-            let own: u32x8<S> = lanes(simd, window(&self.ground, row.start + column), MARGIN);
-            let covered = simd.not_mask32x8(own.simd_eq(simd.splat_u32x8(NONE)));
-            let block = Block::new(self, simd, index, column);
-            let mut values = [zero; N];
-            for (channel, value) in values.iter_mut().enumerate() {
-                let at = channel * row.stride + MARGIN + column;
-                *value = f32x8::from_slice(simd, &strip[at..at + LANES]);
-            }
-            let values = kernel.at(&block, &values);
-            for (channel, value) in values.into_iter().enumerate() {
-                let at = channel * row.stride + MARGIN + column;
-                covered.select(value, zero).store_slice(&mut strip[at..at + LANES]);
-            }
-        }
-    }
-
     /// Zero everywhere.
-    fn strips<const N: usize>(&self) -> Strips<N> {
+    pub fn strips<const N: usize>(&self) -> Strips<N> {
         Strips { values: vec![0.0; N * self.cells + MARGIN] }
     }
 
     /// Writes every row's strips, each for itself.
-    fn by_rows<const N: usize>(&self, strips: &mut Strips<N>, write: impl Fn(usize, &mut [f32]) + Sync) {
+    pub fn by_rows<const N: usize>(&self, strips: &mut Strips<N>, write: impl Fn(usize, &mut [f32]) + Sync) {
         let mut rest = &mut strips.values[..];
         let mut rows = Vec::with_capacity(self.rows.len());
         for row in &self.rows {

@@ -2,8 +2,9 @@
 
 use fearless_simd::{Select, Simd, f32x8, mask32x8, prelude::*, u32x8};
 
-use super::lanes::{Grid, Kernel, LANES, MARGIN, MapRow, Strips, WINDOW, lanes, window};
-use super::surroundings::{NONE, goes_on};
+use super::lanes::{Grid, LANES, MARGIN, MapRow, Strips, WINDOW, lanes, window};
+use crate::denoise::kernel::Kernel;
+use crate::denoise::surface::{NONE, goes_on};
 
 /// Eight texels side by side, at least the first of them covered.
 pub(crate) struct Block<'g, S: Simd> {
@@ -188,8 +189,8 @@ pub(crate) mod tests {
     use fearless_simd::Level;
     use glam::Vec3;
 
-    use super::super::surroundings::Surface;
     use super::*;
+    use crate::denoise::surface::Surface;
 
     const SIZES: [(u32, u32); 4] = [(37, 23), (5, 3), (1, 40), (90, 30)];
 

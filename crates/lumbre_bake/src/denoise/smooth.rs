@@ -3,6 +3,7 @@
 //! In levels: the second takes what the first has made of every third texel, and so reaches three times as far for the same work
 //! (Dammertz, Sewtz, Hanika and Lensch, "Edge-Avoiding À-Trous Wavelet Transform", 2010).
 
+use crate::denoise::filter_pass::{BIAS, Level, Smoothed};
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -10,28 +11,14 @@ use rayon::prelude::*;
 use super::filter_features::{
     FEATURES, Features, NOISE, NOISE_STEPS, Variances, own_values, sum_of_variances,
 };
-use super::lanes::{Grid, Kernel, Strips};
+use super::lanes::{Grid, Strips};
 use super::neighbours::Block;
 use super::plane::VALUES;
 use super::replicates::Estimates;
 use super::smoothing_bias::{Products, squared_bias};
 use super::surroundings::Surroundings;
 use super::weighted_fit::Fit;
-
-/// The channels of the estimates, and the squared bias, mean of the channels.
-pub(crate) type Smoothed = Strips<{ VALUES + 1 }>;
-const BIAS: usize = VALUES;
-
-/// One pass over all texels.
-pub(crate) struct Level {
-    /// Texels at which a neighbour weighs e⁻¹; and where things are near, the share of their harmonic mean distance, inverted.
-    pub width: f32,
-    pub near: f32,
-    /// Reach of the means that tell edges, in steps.
-    pub guide_steps: usize,
-    /// Of the variance of what goes in, the part that chance leaves in the squared bias.
-    pub chance: f32,
-}
+use crate::denoise::kernel::Kernel;
 
 /// The first reaches little further than a texel's own size, whatever is near; the second only where everything is far. `chance`, for
 /// the first: four times the variance of a texel for one replicate, a ninth of it in a block, of which the radius holds 49/9, twice for

@@ -3,10 +3,11 @@
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 use super::filter_features::own_values;
-use super::lanes::{Kernel, Strips, lanes};
+use super::lanes::{Strips, lanes};
 use super::neighbours::Block;
 use super::plane::{OF_HALF, VALUES};
-use super::smooth::Smoothed;
+use crate::denoise::filter_pass::Smoothed;
+use crate::denoise::kernel::Kernel;
 
 /// Texels around one over which differences are averaged with their sign, and then without it.
 const BLOCK_RADIUS: usize = 1;

@@ -1,8 +1,8 @@
 //! Which texels lie around a texel on the same surface. Not what is done with them.
 
+use crate::denoise::surface::{NONE, Surface};
 use std::collections::HashMap;
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::lanes::{Grid, Strips};
@@ -21,17 +21,6 @@ pub(crate) struct Surroundings<'a> {
     first_rows: Vec<usize>,
     firsts: Vec<usize>,
 }
-
-/// Triangles of one chart with the very same normal, in texels of one group.
-#[derive(Clone, Copy)]
-pub(crate) struct Surface {
-    pub chart: u32,
-    pub normal: Vec3,
-    pub group: u32,
-}
-
-/// No texel, no surface.
-pub(crate) const NONE: u32 = u32::MAX;
 
 impl<'a> Surroundings<'a> {
     /// Texels of different groups are not compared with each other; an empty list has all in one.
@@ -104,12 +93,4 @@ impl<'a> Surroundings<'a> {
         };
         self.texels.par_iter().map(of).collect()
     }
-}
-
-/// Whether light may be compared over two surfaces.
-pub(crate) fn goes_on(surfaces: &[Surface], surface: u32, other: u32) -> bool {
-    let [Some(own), Some(other)] = [surface, other].map(|index| surfaces.get(index as usize)) else {
-        return false;
-    };
-    own.chart == other.chart && own.group == other.group && own.normal.dot(other.normal) > 0.9
 }

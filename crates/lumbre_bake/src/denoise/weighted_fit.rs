@@ -3,10 +3,11 @@
 use fearless_simd::{Select, Simd, f32x8, prelude::*};
 
 use super::filter_features::{FEATURES, NOISE, own_values};
-use super::lanes::{Kernel, Strips, lanes};
+use super::lanes::{Strips, lanes};
 use super::neighbours::{Beside, Block, OWN};
 use super::plane::{HALF, Planes, VALUES};
-use super::smooth::{Level, Smoothed};
+use crate::denoise::filter_pass::{Level, Smoothed};
+use crate::denoise::kernel::Kernel;
 
 /// Squared differences of this many variances weigh e⁻¹.
 const GUIDE_SIGMAS: f32 = 8.0;
@@ -126,8 +127,8 @@ mod tests {
 
     use super::super::lanes::{LANES, MARGIN};
     use super::super::neighbours::tests::{random_grid, random_strips};
-    use super::super::surroundings::{NONE, goes_on};
     use super::*;
+    use crate::denoise::surface::{NONE, goes_on};
 
     /// The value at the middle of the plane a + b x + c y that makes the sum of w ((value - plane)² + .002 (b² + c²)) least, in double
     /// precision: by elimination in the normal equations. Points are weight, x, y, value.

@@ -5,10 +5,10 @@ use crate::denoise::replicates::standard_error;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::gather::Gathered;
 use crate::coverage::footprint::Texel;
 use crate::denoise::replicates::{Estimates, mean};
 use crate::denoise::surroundings::Surroundings;
+use crate::final_gather::gathered::Gathered;
 
 /// Texels around one over which checks are put together.
 const CHECK_RADIUS: usize = 3;

@@ -29,12 +29,12 @@ use crate::squared_errors::SquaredErrors;
 use rayon::prelude::*;
 
 use super::error_estimate::PatchBias;
-use super::gather::Gathered;
 use crate::ErrorPart;
 use crate::coverage::footprint::Texel;
 use crate::denoise::replicates::{Estimates, mean};
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
+use crate::final_gather::gathered::Gathered;
 use crate::sources::direct::Direct;
 
 /// What the gather leaves.

@@ -1,6 +1,6 @@
 //! The light by bounces that is kept of a former bake. Not the choice of what is: that is `rebake`'s.
 
-use super::gather::Gathered;
+use crate::final_gather::gathered::Gathered;
 
 /// The light by bounces that is kept.
 pub(crate) struct Kept {

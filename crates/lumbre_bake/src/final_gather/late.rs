@@ -2,9 +2,10 @@
 
 use glam::{Vec2, Vec3};
 
-use super::gather::{Gathered, RadianceCache};
 use crate::coverage::footprint::Texel;
 use crate::denoise::replicates::{REPLICATES, mean, variance};
+use crate::final_gather::gathered::Gathered;
+use crate::final_gather::radiance_cache::RadianceCache;
 use crate::scene::material::Side;
 
 /// Fewer gathered texels than this say nothing about the others.

@@ -4,6 +4,7 @@
 pub(crate) mod error_estimate;
 pub(crate) mod error_ledger;
 pub(crate) mod gather;
+pub(crate) mod gathered;
 pub(crate) mod incident;
 pub(crate) mod kept;
 pub(crate) mod late;

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::error_estimate::{PatchBias, patch_bias};
 use super::error_ledger::{ErrorLedger, GatherErrors, open_sum, relative_to, root};
-use super::gather::{Gathered, RadianceCache};
 use super::kept::Kept;
 use super::late::from_patches;
 use super::texel_radiance::GatheredLight;
@@ -19,6 +18,8 @@ use crate::denoise::smooth::smooth;
 use crate::denoise::surroundings::Surroundings;
 use crate::direct_light::DirectLight;
 use crate::direct_light::local_light::LocalLight;
+use crate::final_gather::gathered::Gathered;
+use crate::final_gather::radiance_cache::RadianceCache;
 use crate::progress::Watch;
 use crate::sources::direct::Direct;
 use crate::squared_errors::SquaredErrors;

@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::gather::Gathered;
 use crate::coverage::footprint::{Footprint, FootprintPoint, Texel};
+use crate::final_gather::gathered::Gathered;
 use crate::radiosity::patches::Patches;
 use crate::scene::material::Side;
 use crate::scene::{BakeScene, LightmapLayout};

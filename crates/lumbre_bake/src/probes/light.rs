@@ -8,7 +8,7 @@ use lumbre_scene::AmbientCube;
 
 use super::ProbeEffort;
 use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather::RadianceCache;
+use crate::final_gather::radiance_cache::RadianceCache;
 use crate::sampling::{Sequence, Stream, sphere_direction};
 use crate::scene::Receiver;
 use crate::scene::{BakeScene, SurfaceHit};

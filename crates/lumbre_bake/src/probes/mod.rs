@@ -18,7 +18,7 @@ pub(crate) use light::ProbeSample;
 
 use self::grid::Grid;
 use crate::chunks::in_chunks_anew;
-use crate::final_gather::gather::RadianceCache;
+use crate::final_gather::radiance_cache::RadianceCache;
 use crate::progress::{Stage, Watch};
 use crate::scene::{BakeScene, StaticScene};
 use crate::sources::light_sources::Sources;

@@ -1,12 +1,12 @@
 //! Counts for form factors by cosine rays: from points spread over each patch, in directions by the cosine, the patch that is met first.
 //! Stratified within each patch. Not what becomes of the counts: that is `form_factors`.
 
-use super::form_factors::{Cast, counted};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::in_chunks;
 use crate::progress::Watch;
+use crate::radiosity::ray_counts::{Cast, counted};
 use crate::sampling::{Sequence, Stream, cosine_about, triangle_point};
 use crate::scene::{BakeScene, SurfaceHit};
 

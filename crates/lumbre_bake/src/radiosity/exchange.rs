@@ -14,9 +14,8 @@ use crate::chunks::in_chunks;
 use crate::options::Solver;
 use crate::progress::{Stage, Watch};
 use crate::sampling::{Sequence, Stream, triangle_point};
-use crate::scene::BakeScene;
-use crate::scene::Receiver;
 use crate::scene::material::Side;
+use crate::scene::{BakeScene, Receiver};
 use crate::sources::light_sources::Sources;
 use crate::{BakeError, BakeOptions, BakeReport};
 

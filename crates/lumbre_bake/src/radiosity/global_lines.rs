@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::cosine_rays::{self, LEAST_RAYS};
-use super::form_factors::{Cast, counted};
 use super::patch_index::PatchIndex;
 use super::patches::Patches;
 use crate::BakeError;
 use crate::chunks::{in_chunks, in_chunks_in_time};
 use crate::progress::Watch;
+use crate::radiosity::ray_counts::{Cast, counted};
 use crate::sampling::{Sequence, Stream, cosine_direction, frame, sphere_direction};
 use crate::scene::BakeScene;
 use crate::scene::crossings::Face;

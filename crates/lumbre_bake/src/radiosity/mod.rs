@@ -19,6 +19,7 @@ pub(crate) mod patch_light;
 #[cfg(test)]
 mod patch_tests;
 pub(crate) mod patches;
+pub(crate) mod ray_counts;
 pub(crate) mod sampling_guide;
 pub(crate) mod size_error;
 pub(crate) mod solution;

@@ -9,7 +9,8 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::changes::{ChangedBox, Changes};
+use super::changed_box::ChangedBox;
+use super::changes::Changes;
 use super::choice;
 use super::estimate::{Estimate, Range, cap, in_cap};
 use super::relit::ShadowVolumes;

@@ -1,16 +1,19 @@
 //! What differs between a scene and the one that samples are of: objects that moved, came or went, with the boxes around them then and now,
 //! and the lights. Not what that does to the light.
 
+use super::fingerprints::bounds;
+use crate::rebake::changed_box::ChangedBox;
+use crate::rebake::fingerprints::{emission, layouts};
 use std::collections::HashMap;
 
 use glam::Vec3;
 
+use super::fingerprints::{fingerprint, first_triangles};
 use super::relit::shadowed;
-use super::samples::{Content, ObjectSamples, Samples, TexelSamples, fingerprint, first_triangles};
+use super::samples::{Content, ObjectSamples, Samples, TexelSamples};
 use crate::content_hash::{ContentHash, Hashes};
 use crate::coverage::covered_texels::CoveredTexels;
 use crate::coverage::footprint::Texel;
-use crate::sampling::hash;
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject, StaticScene, density_of};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
@@ -21,27 +24,6 @@ const MOST_CHANGED: usize = 64;
 /// The density and the middle of a scene may be off by so much of the density and of the scene's size before everything is laid out anew.
 const DENSITY_SLACK: f64 = 0.05;
 const CENTER_SLACK: f64 = 0.25;
-
-/// A box that a changed object filled, or fills now; canonical units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ChangedBox {
-    pub low: Vec3,
-    pub high: Vec3,
-    /// For what is gone: the least and the most that left it, W/m². None for what is here now.
-    pub left: Option<[Vec3; 2]>,
-}
-
-impl ChangedBox {
-    /// Of the sphere around it.
-    pub fn center(&self) -> Vec3 {
-        0.5 * (self.low + self.high)
-    }
-
-    /// Of the sphere around it.
-    pub fn radius(&self) -> f32 {
-        0.5 * (self.high - self.low).length()
-    }
-}
 
 /// A former bake whose samples can be used, before the scene is laid out.
 pub(crate) struct Usable<'a> {
@@ -224,48 +206,6 @@ fn names(objects: &[SceneObject], changed: &[bool], gone: &[&ObjectSamples], lig
         names.push("the lights".into());
     }
     names
-}
-
-/// The box around each object, canonical units; empty for one without triangles.
-pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, Vec3)> {
-    let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); layout.maps.len()];
-    for triangle in &scene.triangles {
-        let (low, high) = &mut bounds[triangle.object as usize];
-        for corner in triangle.corners {
-            (*low, *high) = (low.min(corner), high.max(corner));
-        }
-    }
-    bounds
-}
-
-/// Per object, what of it shines, in one number; 0 for nothing.
-pub(crate) fn emission(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<u32> {
-    let first = first_triangles(scene, layout);
-    let mut emission = vec![0; layout.maps.len()];
-    for emitter in &sources.emitters {
-        let object = scene.triangles[emitter.triangle as usize].object as usize;
-        let own = emitter.radiance.to_array().map(f32::to_bits);
-        let words = own.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
-        emission[object] = words.fold(emission[object], fold).max(1);
-    }
-    emission
-}
-
-/// Per object, where its texels are on it, in one number.
-pub(crate) fn layouts(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
-    let mut sums: Vec<u32> = layout.maps.iter().map(|map| fold(fold(0, map.width), map.height)).collect();
-    for triangle in &scene.triangles {
-        let sum = &mut sums[triangle.object as usize];
-        for uv in triangle.uv {
-            *sum = fold(fold(*sum, uv.x.to_bits()), uv.y.to_bits());
-        }
-    }
-    sums
-}
-
-/// A hash of a hash and a word more.
-pub(super) fn fold(sum: u32, word: u32) -> u32 {
-    hash(sum ^ word).wrapping_mul(0x9e37_79b9)
 }
 
 /// The samples of every covered texel that shows what it showed; and the light of all, per texel of all maps.

@@ -5,7 +5,7 @@ use super::changes::Changes;
 use super::samples::TexelSamples;
 use crate::coverage::footprint::Texel;
 use crate::direct_light::local_light::LocalLight;
-use crate::final_gather::gather::Gathered;
+use crate::final_gather::gathered::Gathered;
 use crate::final_gather::kept::Kept;
 
 /// Of the error asked for, what all that is neglected may be together (RMSE), and at most in one texel. What is neglected is systematic, while the rest of

@@ -14,9 +14,11 @@
 //! its source (what the boxes hide or show, and what direct light has changed). That is solved on the patches, so that it brings no noise where nothing changes. What is neglected is added to the stated error.
 
 mod change;
+mod changed_box;
 mod changes;
 mod choice;
 mod estimate;
+mod fingerprints;
 mod relit;
 mod report;
 mod samples;

@@ -7,7 +7,7 @@ use glam::Vec3;
 use lumbre_optics::LightKind;
 use rayon::prelude::*;
 
-use super::changes::ChangedBox;
+use super::changed_box::ChangedBox;
 use crate::coverage::blocks::Blocks;
 use crate::coverage::footprint::{Texel, receiver};
 use crate::coverage::tiles::positions_of;

@@ -1,14 +1,15 @@
 //! What a bake has found of every texel, before it became a map: what the next bake of a changed scene can keep. Not a file of it: that is
 //! `samples_file`.
 
+use crate::rebake::fingerprints::{fingerprint, first_triangles};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::changes::{bounds, emission, fold, layouts};
+use super::fingerprints::{bounds, emission, layouts};
 use super::settled;
 use crate::content_hash::{ContentHash, Hashes};
-use crate::coverage::footprint::{Footprint, Texel};
-use crate::final_gather::gather::{Gathered, Weights};
+use crate::coverage::footprint::Texel;
+use crate::final_gather::gathered::{Gathered, Weights};
 use crate::scene::{BakeScene, Canonical, LightmapLayout, SceneObject};
 use crate::sources::direct::Direct;
 use crate::sources::light_sources::Sources;
@@ -124,31 +125,6 @@ impl Weights {
         let light_squares = (sum.element_sum() / 3.0).powi(2) / count.max(1.0);
         Self { sum: count, squares: count, products: sum, light_squares }
     }
-}
-
-/// What a texel shows, in one number: the same as long as its object and what hides it are the same. `first` is the first triangle of its
-/// object.
-pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
-    match &texel.footprint {
-        Footprint::Hidden => 0,
-        Footprint::Whole(triangle) => fold(1, triangle - first),
-        Footprint::Points(points) => points.iter().fold(2, |sum, point| {
-            let (u, v) = point.at;
-            let sum = fold(sum, point.triangle - first);
-            let sum = fold(fold(sum, u.to_bits()), v.to_bits());
-            fold(fold(sum, point.offset.x.to_bits()), point.offset.y.to_bits())
-        }),
-    }
-}
-
-/// The first triangle of each object.
-pub(crate) fn first_triangles(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
-    let mut first = vec![u32::MAX; layout.maps.len()];
-    for (index, triangle) in scene.triangles.iter().enumerate() {
-        let first = &mut first[triangle.object as usize];
-        *first = (*first).min(index as u32);
-    }
-    first
 }
 
 /// What a bake has found, sorted by object. `neglected` is empty where nothing was kept.

@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::denoise::replicates::REPLICATES;
-use crate::final_gather::gather::{Gathered, Weights};
+use crate::final_gather::gathered::{Gathered, Weights};
 
 /// Of serde's `with`: the fields that are kept, in the order in which [`deserialize`] takes them.
 pub(super) fn serialize<S: Serializer>(own: &Gathered, serializer: S) -> Result<S::Ok, S::Error> {

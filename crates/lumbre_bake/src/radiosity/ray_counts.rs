@@ -1,0 +1,91 @@
+//! What the rays of a patch have met, as counts per patch. Not the rays, nor the form factors that follow from them.
+
+use serde::{Deserialize, Serialize};
+
+use super::patch_index::PatchIndex;
+
+/// Rays of one patch, in two halves: how many met each other patch, began inside other geometry, met nothing.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Cast {
+    pub met: [Vec<(PatchIndex, u32)>; 2],
+    pub inside: [u32; 2],
+    pub missed: [u32; 2],
+    /// How many they were.
+    pub count: [u32; 2],
+}
+
+/// The same, of one half or of both together.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Counts {
+    pub met: Vec<(PatchIndex, u32)>,
+    pub inside: u32,
+    pub missed: u32,
+    pub count: u32,
+}
+
+impl Counts {
+    /// Share of the rays that did not begin inside other geometry; of none all.
+    pub fn open(&self) -> f32 {
+        if self.count == 0 { 1.0 } else { (self.count - self.inside) as f32 / self.count as f32 }
+    }
+}
+
+impl Cast {
+    /// Both halves together.
+    pub fn whole(&self) -> Counts {
+        let [even, odd] = &self.met;
+        Counts {
+            met: merged(even, odd),
+            inside: self.inside.iter().sum(),
+            missed: self.missed.iter().sum(),
+            count: self.count.iter().sum(),
+        }
+    }
+
+    /// One of them.
+    pub fn half(&self, half: usize) -> Counts {
+        Counts {
+            met: self.met[half].clone(),
+            inside: self.inside[half],
+            missed: self.missed[half],
+            count: self.count[half],
+        }
+    }
+
+    /// Adds the rays of another.
+    pub fn add(&mut self, other: &Self) {
+        for half in 0..2 {
+            self.met[half] = merged(&self.met[half], &other.met[half]);
+            self.inside[half] += other.inside[half];
+            self.missed[half] += other.missed[half];
+            self.count[half] += other.count[half];
+        }
+    }
+}
+
+pub(crate) fn merged(a: &[(PatchIndex, u32)], b: &[(PatchIndex, u32)]) -> Vec<(PatchIndex, u32)> {
+    let mut both = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    loop {
+        let next = [a.peek().map(|own| own.0), b.peek().map(|own| own.0)];
+        let Some(patch) = next.into_iter().flatten().min() else { return both };
+        let is_next = |&&(own, _): &&(PatchIndex, u32)| own == patch;
+        both.push((
+            patch,
+            a.next_if(is_next).map_or(0, |own| own.1) + b.next_if(is_next).map_or(0, |own| own.1),
+        ));
+    }
+}
+
+/// How often each patch occurs, in order.
+pub(crate) fn counted(mut met: Vec<PatchIndex>) -> Vec<(PatchIndex, u32)> {
+    met.sort_unstable();
+    let mut row: Vec<(PatchIndex, u32)> = Vec::new();
+    for patch in met {
+        match row.last_mut() {
+            Some((last, n)) if *last == patch => *n += 1,
+            _ => row.push((patch, 1)),
+        }
+    }
+    row
+}

@@ -1,0 +1,76 @@
+//! What is compared between two bakes of an object: its box, what of it shines, where its texels are and what they show, each in one number. Not the
+//! comparison.
+
+use glam::Vec3;
+
+use crate::coverage::footprint::{Footprint, Texel};
+use crate::sampling::hash;
+use crate::scene::{BakeScene, LightmapLayout};
+use crate::sources::light_sources::Sources;
+
+/// The box around each object, canonical units; empty for one without triangles.
+pub(crate) fn bounds(scene: &BakeScene, layout: &LightmapLayout) -> Vec<(Vec3, Vec3)> {
+    let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); layout.maps.len()];
+    for triangle in &scene.triangles {
+        let (low, high) = &mut bounds[triangle.object as usize];
+        for corner in triangle.corners {
+            (*low, *high) = (low.min(corner), high.max(corner));
+        }
+    }
+    bounds
+}
+
+/// Per object, what of it shines, in one number; 0 for nothing.
+pub(crate) fn emission(scene: &BakeScene, sources: &Sources<'_>, layout: &LightmapLayout) -> Vec<u32> {
+    let first = first_triangles(scene, layout);
+    let mut emission = vec![0; layout.maps.len()];
+    for emitter in &sources.emitters {
+        let object = scene.triangles[emitter.triangle as usize].object as usize;
+        let own = emitter.radiance.to_array().map(f32::to_bits);
+        let words = own.into_iter().chain([emitter.triangle - first[object], emitter.side as u32]);
+        emission[object] = words.fold(emission[object], fold).max(1);
+    }
+    emission
+}
+
+/// Per object, where its texels are on it, in one number.
+pub(crate) fn layouts(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
+    let mut sums: Vec<u32> = layout.maps.iter().map(|map| fold(fold(0, map.width), map.height)).collect();
+    for triangle in &scene.triangles {
+        let sum = &mut sums[triangle.object as usize];
+        for uv in triangle.uv {
+            *sum = fold(fold(*sum, uv.x.to_bits()), uv.y.to_bits());
+        }
+    }
+    sums
+}
+
+/// A hash of a hash and a word more.
+pub(super) fn fold(sum: u32, word: u32) -> u32 {
+    hash(sum ^ word).wrapping_mul(0x9e37_79b9)
+}
+
+/// What a texel shows, in one number: the same as long as its object and what hides it are the same. `first` is the first triangle of its
+/// object.
+pub(crate) fn fingerprint(texel: &Texel, first: u32) -> u32 {
+    match &texel.footprint {
+        Footprint::Hidden => 0,
+        Footprint::Whole(triangle) => fold(1, triangle - first),
+        Footprint::Points(points) => points.iter().fold(2, |sum, point| {
+            let (u, v) = point.at;
+            let sum = fold(sum, point.triangle - first);
+            let sum = fold(fold(sum, u.to_bits()), v.to_bits());
+            fold(fold(sum, point.offset.x.to_bits()), point.offset.y.to_bits())
+        }),
+    }
+}
+
+/// The first triangle of each object.
+pub(crate) fn first_triangles(scene: &BakeScene, layout: &LightmapLayout) -> Vec<u32> {
+    let mut first = vec![u32::MAX; layout.maps.len()];
+    for (index, triangle) in scene.triangles.iter().enumerate() {
+        let first = &mut first[triangle.object as usize];
+        *first = (*first).min(index as u32);
+    }
+    first
+}
