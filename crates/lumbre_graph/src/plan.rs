@@ -137,11 +137,11 @@ pub(crate) struct ResourcePlan {
 pub struct Memory {
     /// Largest sum of the transients alive in one step: no allocator could do with less.
     pub peak_bytes: u64,
-    /// What the pool provides: one piece for each set of transients that take turns.
+    /// Bytes that the pool provides: one piece of memory for each set of transients that use it in turn.
     pub pool_bytes: u64,
-    /// What the transients would take if none shared memory.
+    /// Bytes that the transients would need without sharing.
     pub unshared_bytes: u64,
-    /// What is kept from frame to frame.
+    /// Bytes kept from frame to frame.
     pub retained_bytes: u64,
 }
 

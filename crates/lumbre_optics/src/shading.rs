@@ -46,7 +46,7 @@ pub enum ReflectionModel {
     /// (r·v)^n, Phong 1975.
     #[default]
     Phong,
-    /// (n·h)^n, the exponent as it stands (OpenGL).
+    /// (n·h)^n, with the exponent used unchanged (OpenGL).
     Blinn,
     /// (n·h)^(4n), equal to Phong's highlight in the plane of incidence.
     Blinn4n,

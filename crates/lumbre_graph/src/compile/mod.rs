@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! names ─► shapes ─► order ─► flow ─► retain ─► cull ─► merge ─► alias
-//! unique   formats   cycle    what a  what is   who is  one wgpu  memory
-//!          sizes     or sort  version unchanged needed  pass      in turns
+//! unique   formats   cycle    what a  what is   what is one wgpu  memory
+//!          sizes     or sort  version unchanged needed  pass      shared
 //!                             holds
 //! ```
 
